@@ -1,0 +1,1 @@
+"""Contact of measured rough surfaces with linear viscoelastic materials."""

@@ -1,0 +1,21 @@
+"""What can go wrong, as exceptions with one readable message each.
+
+Every error that roughvisc raises on purpose is a :class:`RoughviscError`; the command line prints its message
+without a traceback.
+"""
+
+
+class RoughviscError(Exception):
+    """Base of all errors raised on purpose by roughvisc."""
+
+
+class InputError(RoughviscError, ValueError):
+    """The input is wrong: the message names the file, the key or the point, what was found and what was expected."""
+
+
+class EdgeContactError(InputError):
+    """Contact reached the border of a free-space domain that cannot grow."""
+
+
+class ConvergenceError(RoughviscError, RuntimeError):
+    """A step did not reach its tolerance: the message names the time, the residual and what to try."""

@@ -1,0 +1,1 @@
+"""Surfaces: instrument files and recipes become labelled height grids ``height(x, y)``."""

@@ -1,0 +1,149 @@
+"""The vocabulary: every variable that a result Dataset may hold, declared once.
+
+Dimensions, units and prose of each variable stand here and nowhere else; :func:`annotate` writes them on a Dataset
+and refuses a variable that is not declared or whose dimensions differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: How an accepted step ended; the values of ``status``, in order.
+STATUS_MEANINGS = (
+    "converged",
+    "not_converged",
+    "open",
+    "full_contact",
+)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One entry of the vocabulary: what a variable is, and how it is written."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    comment: str = ""
+    dtype: str = "float64"
+
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes of this variable."""
+        attrs: dict[str, Any] = {"long_name": self.long_name}
+        if self.units:
+            attrs["units"] = self.units
+        if self.comment:
+            attrs["comment"] = self.comment
+        return attrs
+
+
+_GRID = ("x", "y")
+_FRAME = ("time", "x", "y")
+_SERIES = ("time",)
+
+VARIABLES: dict[str, Variable] = {
+    # coordinates: x and y carry no `axis` attribute, which would make ParaView wrap the surface on a sphere
+    "time": Variable(("time",), "s", "time since the start of the program", "at a jump the right-hand state is kept"),
+    "x": Variable(("x",), "m", "position of the cell centre along x"),
+    "y": Variable(("y",), "m", "position of the cell centre along y"),
+    # the surface
+    "height": Variable(_GRID, "m", "height of the rigid profile, peaks up", "as conditioned; missing where absent"),
+    # fields
+    "pressure": Variable(_FRAME, "Pa", "contact pressure", "zero outside the contact and where the profile is absent"),
+    "gap": Variable(
+        _FRAME,
+        "m",
+        "gap between the surfaces",
+        "zero inside the contact; missing where the profile is absent",
+    ),
+    "displacement": Variable(
+        _FRAME,
+        "m",
+        "normal displacement of the half-space's surface",
+        "positive into the half-space; with periodic boundaries its mean is zero",
+    ),
+    # histories
+    "force": Variable(_SERIES, "N", "normal force", "prescribed under load control, found under approach control"),
+    "approach": Variable(
+        _SERIES,
+        "m",
+        "rigid-body approach from first touch",
+        "free space: against the undeformed plane; periodic: mean undeformed gap minus mean gap; "
+        "while the contact is open: the value at which it would just close",
+    ),
+    "contact_area": Variable(_SERIES, "m2", "real contact area", "cells that carry pressure, counted"),
+    "contact_area_corrected": Variable(
+        _SERIES,
+        "m2",
+        "real contact area, corrected for the grid",
+        "counted area less 0.088 times the staircase perimeter times the cell side",
+    ),
+    "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area"),
+    "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells"),
+    # accuracy and cost
+    "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32"),
+    "convolutions": Variable(
+        _SERIES,
+        "1",
+        "convolutions since the previous kept time",
+        "displacements and preconditioner applications, each one forward and one inverse transform",
+        dtype="int32",
+    ),
+    "residual": Variable(
+        _SERIES,
+        "1",
+        "bound on the relative error of the pressure, in the energy norm, left by the contact solver",
+        "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
+    ),
+    "time_error": Variable(
+        _SERIES,
+        "1",
+        "estimated relative error of pressure (L1) and approach due to time steps",
+        "not available (missing) for fixed time steps without an estimate",
+    ),
+    "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
+    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),
+}
+
+#: Fields that the user may ask for in ``fields``.
+FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
+
+
+def annotate(dataset: xr.Dataset) -> xr.Dataset:
+    """Dataset with the declared dtype and attributes on every variable.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Holds declared variables only; extra leading dimensions (``case``) are allowed.
+
+    Raises
+    ------
+    KeyError
+        If a variable is not declared.
+    ValueError
+        If a variable's dimensions are not the declared ones.
+    """
+    annotated = dataset.copy()
+    for name in annotated.variables:
+        if name not in VARIABLES:
+            raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
+        declared = VARIABLES[str(name)]
+        found = annotated[name].dims
+        if found[-len(declared.dims) :] != declared.dims:
+            raise ValueError(f"variable {name!r} has dimensions {found}, declared are {declared.dims}")
+        if annotated[name].dtype != np.dtype(declared.dtype) and annotated[name].dtype.kind != "f":
+            annotated[name] = annotated[name].astype(declared.dtype)
+        annotated[name].attrs.update(declared.attributes())
+    if "status" in annotated:
+        annotated["status"].attrs.update(
+            flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),
+            flag_meanings=" ".join(STATUS_MEANINGS),
+        )
+    return annotated
