@@ -349,7 +349,8 @@ def _kept(scene: Scene, time: float) -> bool:
     return scene.times is None or time in scene.times
 
 
-def _check_edge(scene: Scene, pressure: Array, time: float) -> None:
+def check_edge(scene: Scene, pressure: Array, time: float) -> None:
+    """Refuse pressure at the border of a free-space grid, which would act as the edge of a punch."""
     if scene.halfspace.boundary != "free" or scene.accept_edge:
         return
     border = [pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]]
@@ -401,11 +402,12 @@ def _jump(scene: Scene, state: State, segment: Segment) -> tuple[State, _Trial |
         start = value if following and following[0].control == "load" else entered.start
         return replace(entered, unresolved=True, start=start), None
     trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
-    _check_edge(scene, trial.instant.pressure, state.now.time)
+    check_edge(scene, trial.instant.pressure, state.now.time)
     return _entered(scene, _committed(scene, _spent(state, trial), trial)), trial
 
 
-def _next_event(scene: Scene, state: State, end: float) -> float:
+def next_event(scene: Scene, state: State, end: float) -> float:
+    """Next kept time or the end of the segment, whichever comes first. [s]"""
     if scene.times is None:
         return end
     return min((t for t in scene.times if state.now.time < t < end), default=end)
@@ -417,7 +419,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
     held: Step | None = None  # first step after an event: provisional until the second one confirms it
     base = state
     while state.now.time < end:
-        event = _next_event(scene, state, end)
+        event = next_event(scene, state, end)
         fresh = state.before is None
         if fresh and state.now.force == 0 and not state.unresolved:
             closing = _closing_time(scene, state, segment, event)
@@ -449,7 +451,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
                 convolutions=spent[1],
             )
             continue
-        _check_edge(scene, trial.instant.pressure, arrival)
+        check_edge(scene, trial.instant.pressure, arrival)
         unresolved = state.unresolved
         accepted = _committed(scene, state, trial)
         accepted = replace(
