@@ -86,7 +86,7 @@ def axis_step(h: xr.DataArray, axis: str, step: str) -> float:
             f"{step}: coordinate {axis!r} has steps from {steps.min():.6g} to {steps.max():.6g} m: "
             "expected a uniform, ascending grid"
         )
-    return float(f"{d:.14g}")
+    return float(f"{d:.15g}")
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
