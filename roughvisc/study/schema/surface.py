@@ -1,0 +1,150 @@
+"""``[surface]``: an instrument file, a surface card or a recipe, and what is done to its heights."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator, create_model
+
+from roughvisc.errors import InputError
+from roughvisc.study.schema.entries import FilePath, Flag, Text, choice, measured, optional, paired, shown, whole
+from roughvisc.study.schema.section import Section, close, nearest, refuse
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LENGTH = measured("m", above=0)
+PURE = measured("1", above=0)
+SIZE = paired(LENGTH, "lengths")
+SHAPE = paired(whole(2), "numbers of cells")
+SPACING = Annotated[
+    paired(LENGTH, "lengths"),
+    BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value, value]),
+    Field(description="a length, or a list of two, along x and along y"),
+]
+_GRID = {"size": (SIZE, ...), "shape": (SHAPE, ...)}
+
+#: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
+RECIPES: dict[str, dict[str, Any]] = {
+    "sphere": {"radius": (LENGTH, ...), **_GRID, "exact": (Flag, False)},
+    "cone": {"slope": (PURE, ...), **_GRID},
+    "flat_punch": {"radius": (LENGTH, ...), **_GRID},
+    "wavy": {"amplitude": (LENGTH, ...), "wavelength": (LENGTH, ...), **_GRID, "waves": (whole(1, 2), 2)},
+    "self_affine": {
+        **_GRID,
+        "hurst": (measured("1", above=0, most=1), ...),
+        "rms_slope": (optional(PURE), None),
+        "rms_height": (optional(LENGTH), None),
+        "rolloff": (optional(LENGTH), None),
+        "shortcut": (optional(LENGTH), None),
+        "seed": (whole(0), ...),
+    },
+}
+
+
+def _order(value: Any) -> Any:
+    if value is not False and (isinstance(value, bool) or value not in (0, 1, 2)):
+        raise InputError(f"found {shown(value)}: expected false, or the order of the surface removed: 0, 1 or 2")
+    return value
+
+
+_CHANNEL = "the name or the number of a channel"
+
+
+def _channel(value: Any) -> Any:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, str | int)):
+        raise InputError(f"found {shown(value)}: expected {_CHANNEL}")
+    return value
+
+
+class SurfaceSection(Section):
+    """What every surface may have done to it, in this order: outliers masked, levelled, filled, resampled."""
+
+    outliers: Flag = False
+    level: Annotated[
+        Literal[False, 0, 1, 2],
+        BeforeValidator(_order),
+        Field(description="false, or the order of the polynomial removed"),
+    ] = False
+    fill: Flag = False
+    resample: optional(SHAPE) = None
+    missing: choice("refuse", "absent") = "refuse"
+
+    def raw(self) -> xr.DataArray:
+        """The heights as read or made. [m]"""
+        raise NotImplementedError
+
+    def height(self) -> xr.DataArray:
+        """The heights as conditioned, peaks up. [m]"""
+        from roughvisc.topography import conditioning
+
+        height = self.raw()
+        if self.outliers:
+            height = conditioning.mask_outliers(height)
+        if self.level is not False:
+            height = conditioning.level(height, self.level)
+        if self.fill:
+            height = conditioning.fill(height)
+        if self.resample:
+            height = conditioning.resample(height, self.resample)
+        return height
+
+
+class FileSurface(SurfaceSection):
+    """An instrument file or a surface card."""
+
+    file: FilePath
+    format: optional(Text) = None
+    channel: Annotated[
+        Any, BeforeValidator(_channel), WithJsonSchema({"type": ["string", "integer"]}), Field(description=_CHANNEL)
+    ] = None
+    unit: optional(Text) = None
+    spacing: optional(SPACING) = None
+
+    def raw(self) -> xr.DataArray:
+        from roughvisc.topography.readers import open_scan
+
+        return open_scan(self.file, format=self.format, channel=self.channel, unit=self.unit, spacing=self.spacing)
+
+
+class RecipeSurface(SurfaceSection):
+    """A surface made by a recipe; each recipe has a class of its own, made from :data:`RECIPES`."""
+
+    generate: str
+
+    def raw(self) -> xr.DataArray:
+        from roughvisc.topography import synthesis
+
+        return getattr(synthesis, self.generate)(**{key: getattr(self, key) for key in RECIPES[self.generate]})
+
+
+GENERATED = {
+    name: create_model(name, __base__=RecipeSurface, generate=(Literal[name], ...), **keys)
+    for name, keys in RECIPES.items()
+}
+
+
+def _pick(data: Any, _: Any, info: Any) -> Any:
+    """The table as the class of the surface that it is."""
+    if isinstance(data, SurfaceSection):
+        return data
+    if not isinstance(data, dict):
+        raise InputError(f"found {shown(data)}: expected a table with a file, or with generate")
+    if ("file" in data) == ("generate" in data):
+        hints = [close(key, ("file", "generate")) for key in data if key not in ("file", "generate")]
+        raise InputError(f"found {shown(data)}: expected either file or generate{next(filter(None, hints), '')}")
+    if "file" in data:
+        return FileSurface.model_validate(data, context=info.context)
+    recipe = data["generate"]
+    if recipe not in GENERATED:
+        raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, GENERATED)}")
+    return GENERATED[recipe].model_validate(data, context=info.context)
+
+
+AnySurface = Annotated[
+    reduce(or_, (FileSurface, *GENERATED.values())),
+    WrapValidator(_pick),
+    Field(description="a [surface] table with a file, or with generate"),
+]
