@@ -167,54 +167,103 @@ def test_program__table_from_bad_csv(study, tmp_path, rows, found):
     assert found in message
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            '"3 MPa"',
-            '"3 MN"',
-            "material.shear_modulus: found '3 MN', which is in meganewton: "
-            "expected a number in Pa, or a string with a unit of its kind",
-        ),
-        (
-            "kelvin_modulus",
-            "kelvin_modlus",
-            "2 problems\n  material.kelvin_modulus: missing: expected a number in Pa, or a string with a unit of its "
-            "kind, above 0\n  material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?",
-        ),
-        (
-            'over = "50 ms"',
-            "",
-            "program.0.over: missing: expected a number in s, or a string with a unit of its kind, at least 0",
-        ),
-        (
-            '"3 MPa"',
-            '"-3 MPa"',
-            "material.shear_modulus: found '-3 MPa': "
-            "expected a number in Pa, or a string with a unit of its kind, above 0",
-        ),
-        ("[[program]]\nload", "poisson = 0.6\n[[program]]\nload", "material.poisson: found 0.6: expected a number above -1 and up to 0.5"),
-        ("[[program]]\nload", "poisson = -1\n[[program]]\nload", "material.poisson: found -1: expected a number above -1 and up to 0.5"),
-        ("[32, 24]", "[0, 24]", "surface.shape.0: found 0: expected a whole number at least 2"),
-        ("[32, 24]", "[32]", "surface.shape: found [32]: expected a list of two numbers of cells, along x and along y"),
-        ('"2 N"', "nan", "program.0.load: found nan: expected a number in N, or a string with a unit of its kind, finite"),
-        ('"2 N"', '"2"', "program.0.load: found '2', a text without a unit: expected a number in N, or a string with a unit of its kind (such as '2 N')"),
-        ('"2 N"', "true", "program.0.load: found True: expected a number in N, or a string with a unit of its kind"),
-        ('"zener"', '"zenner"', "material.model: found 'zenner', which is no known model; did you mean 'zener'?"),
-        ('"sphere"', '"ball"', "surface.generate: found 'ball', which is no known recipe: expected one of " + ", ".join(RECIPES)),
-        ('generate = "sphere"', "", "surface: found a table with radius, size, shape: expected either file or generate"),
-        ('generate = "sphere"', 'generat = "sphere"', "surface: found a table with generat, radius, size, shape: expected either file or generate; did you mean 'generate'?"),
-        ('load = "2 N"', 'laod = "2 N"', "program.0: found a table with laod, over: expected exactly one of load, approach, hold, cycle, table; did you mean 'load'?"),
-        ('hold = "5 s"', 'hold = "5 s"\ncontrol = "force"', "program.1.control: found 'force': expected 'load' or 'approach'"),
-        ("[material]", "[materials]", "2 problems\n  material: missing: expected a [material] table with a model\n  materials: unknown key; did you mean 'material'?"),
-        ("title", "[solve]\nboundary = 'periodc'\n[x]\ntitle", "2 problems\n  solve.boundary: found 'periodc': expected 'free' or 'periodic'; did you mean 'periodic'?\n  x: unknown key: expected one of title, surface, material, program, solve, keep"),
-        ("[surface]", "[keep]\nfields = ['presure']\n[surface]", "keep.fields: found 'presure', which is no field; did you mean 'pressure'?"),
-        ("[surface]", "[keep]\ntimes = [1, '6 s']\n[surface]", "keep.times: found 6 s: expected times up to the end of the program, 5.05 s"),
-        ("[surface]", "[keep]\ntimes = 0\n[surface]", "keep.times: found 0: expected a whole number at least 1"),
-        ("[surface]", "[solve]\ntolerance = 0\n[surface]", "solve.tolerance: found 0: expected a number above 0 and below 1"),
-        ("[surface]", "[solve]\ntime_step = 'automatic'\n[surface]", "solve.time_step: found 'automatic': expected 'auto', or a time in s above 0"),
-    ],
-)  # fmt: skip
+#: what is changed in BALL  =>  into what, and the message: ``|`` begins a line of it, ``| -`` one of several problems
+REFUSED = r"""
+"3 MPa"  =>  "3 MN"
+| material.shear_modulus: found '3 MN', which is in meganewton: expected a number in Pa, or a string with a unit
+    of its kind
+
+kelvin_modulus  =>  kelvin_modlus
+| 2 problems
+| - material.kelvin_modulus: missing: expected a number in Pa, or a string with a unit of its kind, above 0
+| - material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?
+
+over = "50 ms"  =>  # gone
+| program.0.over: missing: expected a number in s, or a string with a unit of its kind, at least 0
+
+"3 MPa"  =>  "-3 MPa"
+| material.shear_modulus: found '-3 MPa': expected a number in Pa, or a string with a unit of its kind, above 0
+
+[[program]]\nload  =>  poisson = 0.6\n[[program]]\nload
+| material.poisson: found 0.6: expected a number above -1 and up to 0.5
+
+[[program]]\nload  =>  poisson = -1\n[[program]]\nload
+| material.poisson: found -1: expected a number above -1 and up to 0.5
+
+[32, 24]  =>  [0, 24]
+| surface.shape.0: found 0: expected a whole number at least 2
+
+[32, 24]  =>  [32]
+| surface.shape: found [32]: expected a list of two numbers of cells, along x and along y
+
+"2 N"  =>  nan
+| program.0.load: found nan: expected a number in N, or a string with a unit of its kind, finite
+
+"2 N"  =>  "2"
+| program.0.load: found '2', a text without a unit: expected a number in N, or a string with a unit of its kind
+    (such as '2 N')
+
+"2 N"  =>  true
+| program.0.load: found True: expected a number in N, or a string with a unit of its kind
+
+"zener"  =>  "zenner"
+| material.model: found 'zenner', which is no known model; did you mean 'zener'?
+
+"sphere"  =>  "ball"
+| surface.generate: found 'ball', which is no known recipe: expected one of sphere, cone, flat_punch, wavy,
+    self_affine
+
+generate = "sphere"  =>  # gone
+| surface: found a table with radius, size, shape: expected either file or generate
+
+generate = "sphere"  =>  generat = "sphere"
+| surface: found a table with generat, radius, size, shape: expected either file or generate; did you mean
+    'generate'?
+
+load = "2 N"  =>  laod = "2 N"
+| program.0: found a table with laod, over: expected exactly one of load, approach, hold, cycle, table; did you
+    mean 'load'?
+
+hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
+| program.1.control: found 'force': expected 'load' or 'approach'
+
+[material]  =>  [materials]
+| 2 problems
+| - material: missing: expected a [material] table with a model
+| - materials: unknown key; did you mean 'material'?
+
+title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
+| 2 problems
+| - solve.boundary: found 'periodc': expected 'free' or 'periodic'; did you mean 'periodic'?
+| - x: unknown key: expected one of title, surface, material, program, solve, keep
+
+[surface]  =>  [keep]\nfields = ['presure']\n[surface]
+| keep.fields: found 'presure', which is no field; did you mean 'pressure'?
+
+[surface]  =>  [keep]\ntimes = [1, '6 s']\n[surface]
+| keep.times: found 6 s: expected times up to the end of the program, 5.05 s
+
+[surface]  =>  [keep]\ntimes = 0\n[surface]
+| keep.times: found 0: expected a whole number at least 1
+
+[surface]  =>  [solve]\ntolerance = 0\n[surface]
+| solve.tolerance: found 0: expected a number above 0 and below 1
+
+[surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
+| solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
+"""
+
+
+def refused():
+    """The blocks of REFUSED: what to replace, by what, and the whole message."""
+    for block in REFUSED.strip().split("\n\n"):
+        change, *rest = block.split("\n")
+        old, new = (side.replace(r"\n", "\n") for side in change.split("  =>  "))
+        lines = " ".join(line.strip() for line in rest).removeprefix("| ").split(" | ")
+        yield old, new, "\n".join("  " + line.removeprefix("- ") if line.startswith("- ") else line for line in lines)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), list(refused()))
 def test_read_study__refuses_in_plain_words(study, old, new, message):
     assert refusal(study(BALL, (old, new))) == message
 
