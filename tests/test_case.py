@@ -194,7 +194,7 @@ over = "50 ms"  =>  # gone
 | surface.shape.0: found 0: expected a whole number at least 2
 
 [32, 24]  =>  [32]
-| surface.shape: found [32]: expected a list of two numbers of cells, along x and along y
+| surface.shape: found [32]: expected a whole number of cells, or a list of two, along x and along y
 
 "2 N"  =>  nan
 | program.0.load: found nan: expected a number in N, or a string with a unit of its kind, finite

@@ -93,9 +93,17 @@ def listed(kind: Any, name: str) -> Any:
 
 
 def paired(kind: Any, name: str) -> Any:
-    """Kind: a list of two, along x and along y; ``name`` says of what."""
-    wanted = f"a list of two {name}, along x and along y"
-    return Annotated[tuple[kind, kind], BeforeValidator(lambda v: a_list(v, wanted, 2)), Field(description=wanted)]
+    """Kind: a list of two, along x and along y, or one for both; ``name`` says of what."""
+    wanted = f"{name}, or a list of two, along x and along y"
+
+    def spread(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return a_list(value, wanted, 2)
+        check(value)  # so that a problem is told of the value that was written
+        return (value, value)
+
+    check = kind.__metadata__[0].func
+    return Annotated[tuple[kind, kind], BeforeValidator(spread), Field(description=wanted)]
 
 
 def located(value: Any, info: ValidationInfo) -> str:

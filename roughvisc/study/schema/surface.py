@@ -17,13 +17,8 @@ if TYPE_CHECKING:
 
 LENGTH = measured("m", above=0)
 PURE = measured("1", above=0)
-SIZE = paired(LENGTH, "lengths")
-SHAPE = paired(whole(2), "numbers of cells")
-SPACING = Annotated[
-    paired(LENGTH, "lengths"),
-    BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value, value]),
-    Field(description="a length, or a list of two, along x and along y"),
-]
+SIZE = paired(LENGTH, "a length")
+SHAPE = paired(whole(2), "a whole number of cells")
 _GRID = {"size": (SIZE, ...), "shape": (SHAPE, ...)}
 
 #: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
@@ -39,6 +34,7 @@ RECIPES: dict[str, dict[str, Any]] = {
         "rms_height": (optional(LENGTH), None),
         "rolloff": (optional(LENGTH), None),
         "shortcut": (optional(LENGTH), None),
+        "anisotropy": (PURE, 1.0),
         "seed": (whole(0), ...),
     },
 }
@@ -101,7 +97,7 @@ class FileSurface(SurfaceSection):
         Any, BeforeValidator(_channel), WithJsonSchema({"type": ["string", "integer"]}), Field(description=_CHANNEL)
     ] = None
     unit: optional(Text) = None
-    spacing: optional(SPACING) = None
+    spacing: optional(SIZE) = None
 
     def raw(self) -> xr.DataArray:
         from roughvisc.topography.readers import open_scan
