@@ -1,0 +1,249 @@
+"""Units on axes, and what all figures share: prefixes, fonts, colours, the choice of time axis and of frames.
+
+The package computes in SI; figures show readable prefixes (µm, MPa, ms). A :class:`Unit` is chosen from the data of
+one axis and then used for every artist on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, SymmetricalLogLocator
+
+from roughvisc.errors import InputError
+
+#: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
+STYLE = {
+    "font.family": "sans-serif",
+    "font.size": 8.5,
+    "axes.labelsize": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 3.5,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+}
+
+#: Okabe and Ito's colours: told apart by all common kinds of colour vision, and in grey.
+BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"
+CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000")
+#: Cells where the profile is absent.
+ABSENT = "0.82"
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit to show values in: ``shown = values / factor``.
+
+    Parameters
+    ----------
+    factor : float
+        Size of the unit in SI.
+    symbol : str
+        How it is written; empty for a pure number.
+    """
+
+    factor: float
+    symbol: str
+
+    def __call__(self, values) -> np.ndarray:
+        """Values [SI] in this unit."""
+        return np.asarray(values, dtype=float) / self.factor
+
+    def label(self, name: str) -> str:
+        """Axis label: the name and, in brackets, the unit."""
+        return f"{name} [{self.symbol}]" if self.symbol else name
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """One value [SI] with its unit, as read in running text."""
+        shown = float(value) / self.factor
+        if 1e3 <= abs(shown) < 1e6:  # not 5e+03
+            return f"{shown:.0f} {self.symbol}".rstrip()
+        return f"{shown:.{digits}g} {self.symbol}".rstrip()
+
+
+def unit_for(values, si: str) -> Unit:
+    """Unit with the engineering prefix that suits the largest of some values.
+
+    Parameters
+    ----------
+    values : array_like
+        Values of one axis; missing and infinite ones are ignored. [SI]
+    si : str
+        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"m2"``, ``"N/m"``, ``"s"``, ``"1"``.
+
+    Returns
+    -------
+    Unit
+
+    Examples
+    --------
+    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m2").symbol, unit_for([0.04, 2e6], "Pa").symbol
+    ('µm', 'mm²', 'MPa')
+    >>> unit_for([9000.0], "s")
+    Unit(factor=3600.0, symbol='h')
+    """
+    values = np.abs(np.asarray(values, dtype=float))
+    largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
+    if si in ("1", ""):
+        return Unit(1.0, "")
+    if si == "s":
+        for least, factor, symbol in _CLOCK:
+            if largest >= least:
+                return Unit(factor, symbol)
+    head, _, tail = si.partition("/")
+    name = head.rstrip("0123456789")
+    power = int(head[len(name) :] or 1)
+    least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
+    exponent = 0
+    if largest > 0:
+        exponent = 3 * math.floor(math.log10(largest / least * (1 + 1e-12)) / (3 * power))
+    exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
+    symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
+    return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
+
+
+def styled(draw):
+    """Decorator: draw a figure in the package's style, whatever the reader's own settings are."""
+    return matplotlib.rc_context(STYLE)(draw)
+
+
+def new_figure(width: float, height: float, layout: str = "constrained") -> Figure:
+    """Figure of a size [inch] that belongs to no window and to no global state."""
+    return Figure(figsize=(width, height), layout=layout)
+
+
+def letter_panels(axes: Sequence[Axes]) -> None:
+    """Write (a), (b), ... at the top left of the panels."""
+    for letter, ax in zip("abcdefghijklmnopqrstuvwxyz", axes, strict=False):
+        ax.set_title(f"({letter})", loc="left", fontweight="bold", fontsize=8)
+
+
+# --------------------------------------------------------------------------------------------------------- time
+
+
+def spans_decades(values) -> bool:
+    """Whether increasing values lie more evenly on a logarithmic than on a linear axis, over two decades or more."""
+    values = np.asarray(values, dtype=float)
+    values = values[np.isfinite(values) & (values > 0)]
+    if len(values) < 4 or values[-1] < 100 * values[0]:
+        return False
+
+    def unevenness(shown):
+        return np.max(np.abs((shown - shown[0]) / (shown[-1] - shown[0]) - np.linspace(0, 1, len(shown))))
+
+    return bool(unevenness(np.log(values)) < 0.7 * unevenness(values))
+
+
+@dataclass(frozen=True)
+class TimeAxis:
+    """How times are shown: their unit, and a linear or a logarithmic scale chosen by the data."""
+
+    unit: Unit
+    logarithmic: bool
+    first: float
+
+    @classmethod
+    def of(cls, times) -> TimeAxis:
+        """Axis for some increasing times [s]."""
+        times = np.asarray(times, dtype=float)
+        positive = times[times > 0]
+        if spans_decades(times):
+            return cls(Unit(1.0, "s"), True, float(positive[0]))
+        return cls(unit_for(times, "s"), False, float(positive[0]) if len(positive) else 1.0)
+
+    def apply(self, ax: Axes, times, name: str = "Time") -> None:
+        """Set scale, limits and label of a time axis; zero keeps its place on a logarithmic one."""
+        times = self.unit(times)
+        if self.logarithmic and times[0] <= 0:
+            ax.set_xscale("symlog", linthresh=self.first, linscale=0.5)
+            ax.xaxis.set_minor_locator(SymmetricalLogLocator(base=10, linthresh=self.first, subs=range(2, 10)))
+            ax.set_xlim(-0.15 * self.first, 1.2 * times[-1])
+        elif self.logarithmic:
+            ax.set_xscale("log")
+            ax.xaxis.set_minor_locator(LogLocator(subs=range(2, 10), numticks=99))
+            ax.set_xlim(times[0] / 1.2, 1.2 * times[-1])
+        elif len(times) > 1:
+            margin = 0.02 * (times[-1] - times[0])
+            ax.set_xlim(times[0] - margin, times[-1] + margin)
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.set_xlabel(self.unit.label(name))
+
+
+def time_text(time: float) -> str:
+    """A time [s] as read in running text, such as ``"t = 50 ms"``."""
+    return f"t = {unit_for([time], 's').text(time)}"
+
+
+def spread_frames(times, count: int) -> np.ndarray:
+    """Indices of at most ``count`` kept times [s], even on the axis that suits them, first and last included."""
+    times = np.asarray(times, dtype=float)
+    if len(times) <= count:
+        return np.arange(len(times))
+    if count == 1:
+        return np.array([len(times) - 1])
+    place = times
+    if spans_decades(times):
+        first = times[times > 0][0]
+        place = np.log(np.maximum(times, first / 2))
+    wanted = np.linspace(place[0], place[-1], count)
+    nearest = np.abs(place[:, None] - wanted).argmin(axis=0)
+    return np.unique(nearest)
+
+
+def frame_at(times, time: float) -> int:
+    """Index of the kept time nearest to ``time`` [s]; a negative whole number counts frames from the end."""
+    times = np.asarray(times, dtype=float)
+    if not np.isfinite(time):
+        raise InputError(f"time is {time!r}: expected a number [s], or -1 for the last kept one")
+    if time < 0:
+        if time != int(time) or -int(time) > len(times):
+            raise InputError(f"time is {time!r}: expected a time [s], or -1 to -{len(times)} to count from the end")
+        return len(times) + int(time)
+    return int(np.abs(times - time).argmin())
+
+
+# --------------------------------------------------------------------------------------------------------- data
+
+
+def require(dataset: xr.Dataset, *names: str) -> None:
+    """Refuse a Dataset that is not one case's result, or lacks variables; say how to get them."""
+    if not isinstance(dataset, xr.Dataset):
+        raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
+    extra = [dim for dim in dataset.dims if dim not in ("time", "x", "y")]
+    if extra:
+        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
+    for name in names:
+        if name not in dataset.variables:
+            stored = ", ".join(str(known) for known in dataset.data_vars)
+            raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
+    if "time" in dataset.sizes and dataset.sizes["time"] == 0:
+        raise InputError("the result holds no time at all: nothing to draw")
+
+
+def edges(centres) -> np.ndarray:
+    """Cell borders of evenly spaced cell centres; a lone cell gets unit width. [m]"""
+    centres = np.asarray(centres, dtype=float)
+    step = (centres[-1] - centres[0]) / (len(centres) - 1) if len(centres) > 1 else 1.0
+    return centres[0] - step / 2 + step * np.arange(len(centres) + 1)
