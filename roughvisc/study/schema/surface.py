@@ -40,9 +40,21 @@ RECIPES: dict[str, dict[str, Any]] = {
 }
 
 
-def _order(value: Any) -> Any:
-    if value is not False and (isinstance(value, bool) or value not in (0, 1, 2)):
-        raise InputError(f"found {shown(value)}: expected false, or the order of the surface removed: 0, 1 or 2")
+_LEVEL = "false, or the order of the polynomial removed: 0, 1, 2 or 3"
+_FILL = "true, false, 'harmonic', 'nearest' or 'linear'"
+
+
+def _level(value: Any) -> Any:
+    if value is not False and (not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 3):
+        raise InputError(f"found {shown(value)}: expected {_LEVEL}")
+    return value
+
+
+def _fill(value: Any) -> Any:
+    if isinstance(value, bool):
+        return "harmonic" if value else False
+    if value not in ("harmonic", "nearest", "linear"):
+        raise InputError(f"found {shown(value)}: expected {_FILL}")
     return value
 
 
@@ -55,17 +67,20 @@ def _channel(value: Any) -> Any:
     return value
 
 
+def _either(check: Any, kinds: list[str], wanted: str) -> Any:
+    """Kind: several types of value, told apart by a check."""
+    return Annotated[Any, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
+
+
 class SurfaceSection(Section):
-    """What every surface may have done to it, in this order: outliers masked, levelled, filled, resampled."""
+    """What every surface may have done to it, in the order in which it is done."""
 
     outliers: Flag = False
-    level: Annotated[
-        Literal[False, 0, 1, 2],
-        BeforeValidator(_order),
-        Field(description="false, or the order of the polynomial removed"),
-    ] = False
-    fill: Flag = False
+    level: _either(_level, ["boolean", "integer"], _LEVEL) = False
+    fill: _either(_fill, ["boolean", "string"], _FILL) = False
     resample: optional(SHAPE) = None
+    taper: optional(SIZE) = None
+    mirror: Flag = False
     missing: choice("refuse", "absent") = "refuse"
 
     def raw(self) -> xr.DataArray:
@@ -76,15 +91,18 @@ class SurfaceSection(Section):
         """The heights as conditioned, peaks up. [m]"""
         from roughvisc.topography import conditioning
 
+        steps = (
+            (self.outliers, conditioning.mask_outliers, ()),
+            (self.level is not False, conditioning.level, (self.level,)),
+            (self.fill, conditioning.fill, (self.fill,)),
+            (self.resample, conditioning.resample, (self.resample,)),
+            (self.taper, conditioning.taper, (self.taper,)),
+            (self.mirror, conditioning.mirror, ()),
+        )
         height = self.raw()
-        if self.outliers:
-            height = conditioning.mask_outliers(height)
-        if self.level is not False:
-            height = conditioning.level(height, self.level)
-        if self.fill:
-            height = conditioning.fill(height)
-        if self.resample:
-            height = conditioning.resample(height, self.resample)
+        for wanted, step, arguments in steps:
+            if wanted:
+                height = step(height, *arguments)
         return height
 
 
@@ -93,9 +111,7 @@ class FileSurface(SurfaceSection):
 
     file: FilePath
     format: optional(Text) = None
-    channel: Annotated[
-        Any, BeforeValidator(_channel), WithJsonSchema({"type": ["string", "integer"]}), Field(description=_CHANNEL)
-    ] = None
+    channel: _either(_channel, ["string", "integer"], _CHANNEL) = None
     unit: optional(Text) = None
     spacing: optional(SIZE) = None
 
