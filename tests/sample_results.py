@@ -109,6 +109,7 @@ def hertz_cycle(frames=60, shape=(31, 24), cycles=2):
         force=("time", 0.5 * wave),
         approach=("time", 2e-5 * lag ** (2 / 3)),
         contact_area=("time", 2e-7 * lag ** (2 / 3)),
+        contact_fraction=("time", 2e-7 / 3e-6 * lag ** (2 / 3)),
         contact_area_corrected=("time", 1.95e-7 * lag ** (2 / 3)),
     )
     return _attributes(made, "Sphere in cycles", "free")

@@ -118,7 +118,7 @@ def unit_for(values, si: str) -> Unit:
     least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
     exponent = 0
     if largest > 0:
-        exponent = 3 * math.floor(math.log10(largest / least * (1 + 1e-12)) / (3 * power))
+        exponent = 3 * math.floor(math.log10(largest / least * 1.0005) / (3 * power))  # 0.99999 N is not 1000 mN
     exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
     symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
     return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
@@ -187,6 +187,8 @@ class TimeAxis:
         elif len(times) > 1:
             margin = 0.02 * (times[-1] - times[0])
             ax.set_xlim(times[0] - margin, times[-1] + margin)
+        else:
+            ax.set_xticks(times, [f"{times[0]:.4g}"])
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_xlabel(self.unit.label(name))
 

@@ -1,0 +1,87 @@
+"""Figures and animations of results: each function takes a result and returns a matplotlib Figure.
+
+In a notebook a figure shows itself; elsewhere ``figure.savefig("name.pdf")`` writes it. Quantities are drawn with
+readable prefixes; nothing here touches matplotlib's global state.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.views.animate import animate
+from roughvisc.views.axes import require
+from roughvisc.views.distributions import contact_clusters, distributions
+from roughvisc.views.fields import maps, section
+from roughvisc.views.histories import area_against_load, history, hysteresis
+from roughvisc.views.surfaces import surface
+
+__all__ = [
+    "animate",
+    "area_against_load",
+    "contact_clusters",
+    "distributions",
+    "history",
+    "hysteresis",
+    "maps",
+    "save_figures",
+    "section",
+    "surface",
+]
+
+#: What :func:`save_figures` draws: name -> (function, variables of which all, variables of which one is needed).
+FIGURES = {
+    "history": (history, (), ("force", "approach", "contact_area")),
+    "maps": (maps, ("x", "y"), ("pressure", "gap")),
+    "section": (section, ("height",), ("gap", "displacement")),
+    "distributions": (distributions, (), ("pressure", "gap")),
+    "clusters": (contact_clusters, ("x", "y"), ("pressure", "gap")),
+    "hysteresis": (hysteresis, ("force", "approach"), ()),
+    "surface": (surface, ("height",), ()),
+}
+
+
+def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
+    """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    folder : path-like
+        Where to write; made if absent.
+    stem : str
+        First part of every file name.
+    suffix : str
+        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+    dpi : float
+        Resolution of pictures made of pixels.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result or allows no figure.
+    """
+    require(dataset)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, (draw, needed, wanted) in FIGURES.items():
+        if not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted)):
+            continue
+        if name == "hysteresis" and dataset.sizes["time"] < 3:
+            continue  # two states are no loop
+        path = folder / f"{stem}-{name}{suffix}"
+        draw(dataset).savefig(path, dpi=dpi)
+        written.append(path)
+    if not written:
+        stored = ", ".join(str(known) for known in dataset.variables)
+        raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")
+    return written

@@ -1,0 +1,166 @@
+"""Quick look at a height grid: map, profile, distribution of heights, power spectrum."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.views.axes import ABSENT, BLUE, VERMILION, Unit, edges, letter_panels, new_figure, styled, unit_for
+from roughvisc.views.fields import draw_map, plane_ratio, plane_unit
+
+
+def _checked(height: xr.DataArray) -> xr.DataArray:
+    if isinstance(height, xr.Dataset):
+        if "height" not in height:
+            raise InputError("the Dataset holds no 'height'")
+        height = height["height"]
+    if not isinstance(height, xr.DataArray) or set(height.dims) != {"x", "y"}:
+        found = height.dims if isinstance(height, xr.DataArray) else type(height).__name__
+        raise InputError(f"expected heights with dimensions x and y, found {found}")
+    height = height.transpose("x", "y").load().rename("height")
+    if not np.isfinite(height).any():
+        raise InputError("the surface is all missing: nothing to draw")
+    return height
+
+
+@styled
+def surface(height: xr.DataArray) -> Figure:
+    """Quick look at a surface: map, profile through its middle, distribution of heights, power spectrum.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y), or a Dataset that holds one as ``height``
+        Heights, peaks up; missing points are drawn in light grey and counted. [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Notes
+    -----
+    The spectrum is the radial mean of the two-dimensional power spectral density of the heights less their mean
+    plane, under a Hann window, missing points on the plane: a quick look, not a measurement. The distribution is
+    shown with the normal one of the same mean and Sq.
+    """
+    height = _checked(height)
+    unit, plane = unit_for(height - height.mean(), "m"), plane_unit(height)
+    figure = new_figure(7.0, 5.2)
+    (on_map, histogram), (profile, spectrum) = figure.subplots(2, 2, width_ratios=[1.25, 1])
+    image = draw_map(on_map, height, unit, plane)
+    beside = plane_ratio(height) > 0.6
+    bar = figure.colorbar(image, ax=on_map, location="right" if beside else "top", pad=0.02, aspect=18)
+    bar.set_label(unit.label("Height"))
+    on_map.set_xlabel(plane.label("x"))
+    on_map.set_ylabel(plane.label("y"))
+    on_map.tick_params(direction="out")
+    missing = float(height.isnull().mean())
+    if missing:
+        note = Patch(color=ABSENT, label=f"missing: {100 * missing:.2g} % of the points")
+        on_map.legend(handles=[note], loc="upper left", bbox_to_anchor=(0, -0.18), borderaxespad=0, handlelength=1)
+    _draw_profile(profile, on_map, height, unit, plane)
+    _draw_heights(histogram, height, unit)
+    _draw_spectrum(spectrum, height)
+    letter_panels((on_map, histogram, profile, spectrum))
+    return figure
+
+
+def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plane: Unit) -> None:
+    middle = height.sizes["y"] // 2
+    ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=BLUE, lw=0.9)
+    place = float(height["y"][middle])
+    on_map.axhline(plane(place), color="w", lw=0.8, ls=(0, (4, 2)))
+    limits = plane(edges(height["x"]))
+    ax.set_xlim(limits[0], limits[-1])
+    ax.set_title(f"y = {plane.text(place)}", loc="right")
+    ax.set_xlabel(plane.label("x"))
+    ax.set_ylabel(unit.label("Height"))
+    ax.grid(color="0.9", lw=0.5)
+
+
+def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
+    values = unit(height.values[np.isfinite(height.values)])
+    deviation = float(values.std())
+    bins = int(np.clip(math.sqrt(values.size), 8, 120))
+    if deviation == 0:
+        ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        ax.set_xlabel(unit.label("Height"))
+        ax.set_yticks([])
+        return
+    ax.hist(values, bins=bins, density=True, color=BLUE, alpha=0.45, histtype="stepfilled", label="measured")
+    shown = np.linspace(values.min(), values.max(), 200)
+    bell = np.exp(-(((shown - values.mean()) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
+    ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
+    ax.set_ylim(0, 1.35 * ax.get_ylim()[1])
+    ax.legend(loc="upper right", ncols=2, handlelength=1.2, columnspacing=1)
+    ax.set_xlabel(unit.label("Height"))
+    ax.set_ylabel(f"Density [1/{unit.symbol}]")
+
+
+def radial_spectrum(height: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
+    """Radial mean of the power spectral density of a surface.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        Heights. [m]
+
+    Returns
+    -------
+    wavevector : ndarray
+        In rings of one step of the coarser axis, up to the lower of the two Nyquist values. [rad/m]
+    density : ndarray
+        ``C(q)`` with ``sum(C dqx dqy) / (4 pi^2)`` the mean square of the heights. [m4]
+    """
+    (nx, ny), sides = height.shape, [edges(height[name]) for name in ("x", "y")]
+    steps = [side[1] - side[0] for side in sides]
+    values = _less_its_plane(height.values)
+    window = np.outer(np.hanning(nx + 2)[1:-1], np.hanning(ny + 2)[1:-1])
+    power = np.abs(fft.rfft2(values * window)) ** 2 * steps[0] * steps[1] / (window**2).sum()
+    qx = 2 * np.pi * fft.fftfreq(nx, steps[0])
+    qy = 2 * np.pi * fft.rfftfreq(ny, steps[1])
+    q = np.hypot(qx[:, None], qy[None, :])
+    width = 2 * np.pi / min(nx * steps[0], ny * steps[1])
+    rings = np.arange(0.5 * width, np.pi / max(steps) + width / 2, width)
+    ring = np.digitize(q.ravel(), rings)
+    count = np.bincount(ring, minlength=len(rings) + 1)[1:-1]
+    total = np.bincount(ring, power.ravel(), minlength=len(rings) + 1)[1:-1]
+    known = count > 0
+    return ((rings[1:] + rings[:-1]) / 2)[known], (total[known] / count[known])
+
+
+def _less_its_plane(values: np.ndarray) -> np.ndarray:
+    """Heights less their mean plane, zero where they are missing."""
+    x, y = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij")
+    known = np.isfinite(values)
+    design = np.stack([np.ones(known.sum()), x[known], y[known]], axis=1)
+    plane = np.linalg.lstsq(design, values[known], rcond=None)[0]
+    return np.where(known, values - (plane[0] + plane[1] * x + plane[2] * y), 0.0)
+
+
+def _draw_spectrum(ax: Axes, height: xr.DataArray) -> None:
+    ax.set_xlabel("Wavevector [rad/m]")
+    ax.set_ylabel("Power spectral density [m⁴]")
+    drawn = False
+    if min(height.shape) >= 8:
+        wavevector, density = radial_spectrum(height)
+        scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
+        symbol = "µm" if wavevector[-1] > 1e4 else "mm"
+        symbol = "nm" if wavevector[-1] > 1e8 else symbol
+        shown = density > 0
+        if shown.any():
+            ax.loglog(wavevector[shown] * scale[symbol], density[shown] / scale[symbol] ** 4, color=BLUE, lw=1)
+            ax.set_xlabel(f"Wavevector [rad/{symbol}]")
+            ax.set_ylabel(f"Power spectral density [{symbol}⁴]")
+            ax.grid(color="0.9", lw=0.5)
+            drawn = True
+    if not drawn:
+        ax.text(0.5, 0.5, "too small or too flat", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        ax.set_xticks([])
+        ax.set_yticks([])
