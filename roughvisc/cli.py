@@ -128,7 +128,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
 def _say(console: Console, what: str, path: Path) -> None:
     """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)
-    console.print(f"{what + ':':8}{path if shown.startswith('..') else shown}", soft_wrap=True, highlight=False)
+    console.print(f"{what}: {path if shown.startswith('..') else shown}", soft_wrap=True, highlight=False)
 
 
 @main.command()

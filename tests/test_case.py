@@ -251,6 +251,27 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 
 [surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
 | solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
+
+[material]  =>  level = 4\n[material]
+| surface.level: found 4: expected true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3
+
+[material]  =>  fill = "cubic"\n[material]
+| surface.fill: found 'cubic': expected true, false, 'harmonic', 'nearest' or 'linear'
+
+[material]  =>  outliers = 5\n[material]
+| surface.outliers: found 5: expected true, false, or a table of window and threshold
+
+[material]  =>  outliers = { treshold = 5 }\n[material]
+| surface.outliers.treshold: unknown key; did you mean 'threshold'?
+
+[material]  =>  filter = "5 N"\n[material]
+| surface.filter.cutoff: found '5 N', which is in newton: expected a number in m, or a string with a unit of its kind
+
+[material]  =>  crop = { x = 3 }\n[material]
+| surface.crop.x: found 3: expected a list of two lengths, the lower and the upper limit
+
+[material]  =>  taper = [1, 2, 3]\n[material]
+| surface.taper: found [1, 2, 3]: expected a length, or a list of two, along x and along y
 """
 
 
@@ -437,3 +458,27 @@ def test_study_schema__names_every_model_and_recipe():
     text = json.dumps(schema)
     assert all(f'"{name}"' in text for name in (*MODELS, *RECIPES))
     assert {"surface", "material", "program"} <= set(schema["required"])
+
+
+def test_recipes__are_those_of_surface_cards():
+    from roughvisc.topography import cards
+
+    assert {name: set(keys) for name, keys in RECIPES.items()} == {n: set(keys) for n, keys in cards.RECIPES.items()}
+
+
+def test_height__is_conditioned_as_asked_for(study):
+    steps = (
+        'level = true\noutliers = true\nfill = "nearest"\nfilter = "200 um"\nresample = 16\ntaper = "100 um"\n'
+        'mirror = true\ninvert = true\nrotate90 = 1\ncrop = { x = ["100 um", "0.9 mm"] }\n[material]'
+    )
+    case = read_study(study(BALL, ("[material]", steps)))
+    h = case.height()
+    assert h.shape == (32, 32)
+    for step in ("cropped", "levelled", "outliers", "filter", "resampled", "tapered", "mirrored"):
+        assert step in h.attrs["history"]
+    again = Case.from_json(case.to_json())
+    assert again == case
+    assert again.height().identical(h)
+    plain = read_study(study()).height()
+    assert plain.shape == (32, 24)
+    assert plain.attrs["history"] == "generated: sphere"

@@ -11,6 +11,7 @@ from typing import Any
 from roughvisc.errors import InputError
 from roughvisc.study.schema import Study
 from roughvisc.study.schema.surface import FileSurface, SurfaceSection
+from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
 NUMERICS_REVISION = 1
@@ -61,24 +62,23 @@ def surface_content(surface: SurfaceSection) -> tuple[str, dict[str, Any]]:
         treatment = {key: stated.pop(key) for key in SurfaceSection.model_fields}
         return _digest(stated), treatment
     path = Path(stated.pop("file"))
-    content = _bytes(path)
     if path.suffix.lower() != ".toml":
-        return hashlib.sha256(content).hexdigest(), stated
+        return _checksum(path), stated
     try:
-        card = tomllib.loads(content.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no valid surface card: {error}") from error
+        card = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no surface card in TOML: {error}") from error
     stated["card"] = {key: value for key, value in card.items() if key not in _PROSE and key != "file"}
     if isinstance(card.get("file"), str):
-        return hashlib.sha256(_bytes(path.parent / card["file"])).hexdigest(), stated
+        return _checksum(path.parent / card["file"]), stated
     return _digest(stated["card"]), stated
 
 
-def _bytes(path: Path) -> bytes:
+def _checksum(path: Path) -> str:
     try:
-        return path.read_bytes()
+        return sha256(path)
     except OSError as error:
-        raise InputError(f"surface file {path} cannot be read: {error.strerror or error}") from error
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a scan file") from error
 
 
 def _digest(stated: Any) -> str:

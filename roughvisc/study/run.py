@@ -32,6 +32,9 @@ REFERENCES = (
 
 Progress = Callable[[float, float], None]
 
+#: Attributes of a surface that stay with the result: whence it came, and what was made up where it was missing.
+SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
+
 
 def run(case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True) -> xr.Dataset:
     """Compute one case and keep it in one file.
@@ -117,9 +120,8 @@ def compute(case: Case, *, progress: bool | Progress = True) -> xr.Dataset:
         )
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
-    dataset.attrs = _provenance(case, dataset.attrs.get("history", "")) | {
-        name: value for name, value in dataset.attrs.items() if name != "history"
-    }
+    scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
+    dataset.attrs = _provenance(case, dataset.attrs.pop("history", "")) | dataset.attrs | scan
     return dataset
 
 

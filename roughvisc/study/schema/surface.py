@@ -6,19 +6,17 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator, create_model
+from pydantic import Field, WrapValidator, create_model
 
 from roughvisc.errors import InputError
-from roughvisc.study.schema.entries import FilePath, Flag, Text, choice, measured, optional, paired, shown, whole
-from roughvisc.study.schema.section import Section, close, nearest, refuse
+from roughvisc.study.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, either
+from roughvisc.study.schema.entries import FilePath, Flag, Text, measured, optional, shown, whole
+from roughvisc.study.schema.section import close, nearest, refuse
 
 if TYPE_CHECKING:
     import xarray as xr
 
-LENGTH = measured("m", above=0)
 PURE = measured("1", above=0)
-SIZE = paired(LENGTH, "a length")
-SHAPE = paired(whole(2), "a whole number of cells")
 _GRID = {"size": (SIZE, ...), "shape": (SHAPE, ...)}
 
 #: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
@@ -40,24 +38,6 @@ RECIPES: dict[str, dict[str, Any]] = {
 }
 
 
-_LEVEL = "false, or the order of the polynomial removed: 0, 1, 2 or 3"
-_FILL = "true, false, 'harmonic', 'nearest' or 'linear'"
-
-
-def _level(value: Any) -> Any:
-    if value is not False and (not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 3):
-        raise InputError(f"found {shown(value)}: expected {_LEVEL}")
-    return value
-
-
-def _fill(value: Any) -> Any:
-    if isinstance(value, bool):
-        return "harmonic" if value else False
-    if value not in ("harmonic", "nearest", "linear"):
-        raise InputError(f"found {shown(value)}: expected {_FILL}")
-    return value
-
-
 _CHANNEL = "the name or the number of a channel"
 
 
@@ -67,21 +47,8 @@ def _channel(value: Any) -> Any:
     return value
 
 
-def _either(check: Any, kinds: list[str], wanted: str) -> Any:
-    """Kind: several types of value, told apart by a check."""
-    return Annotated[Any, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
-
-
-class SurfaceSection(Section):
-    """What every surface may have done to it, in the order in which it is done."""
-
-    outliers: Flag = False
-    level: _either(_level, ["boolean", "integer"], _LEVEL) = False
-    fill: _either(_fill, ["boolean", "string"], _FILL) = False
-    resample: optional(SHAPE) = None
-    taper: optional(SIZE) = None
-    mirror: Flag = False
-    missing: choice("refuse", "absent") = "refuse"
+class SurfaceSection(Conditioned):
+    """A surface, and what is done to its heights."""
 
     def raw(self) -> xr.DataArray:
         """The heights as read or made. [m]"""
@@ -89,21 +56,7 @@ class SurfaceSection(Section):
 
     def height(self) -> xr.DataArray:
         """The heights as conditioned, peaks up. [m]"""
-        from roughvisc.topography import conditioning
-
-        steps = (
-            (self.outliers, conditioning.mask_outliers, ()),
-            (self.level is not False, conditioning.level, (self.level,)),
-            (self.fill, conditioning.fill, (self.fill,)),
-            (self.resample, conditioning.resample, (self.resample,)),
-            (self.taper, conditioning.taper, (self.taper,)),
-            (self.mirror, conditioning.mirror, ()),
-        )
-        height = self.raw()
-        for wanted, step, arguments in steps:
-            if wanted:
-                height = step(height, *arguments)
-        return height
+        return self.conditioned(self.raw())
 
 
 class FileSurface(SurfaceSection):
@@ -111,7 +64,7 @@ class FileSurface(SurfaceSection):
 
     file: FilePath
     format: optional(Text) = None
-    channel: _either(_channel, ["string", "integer"], _CHANNEL) = None
+    channel: either(_channel, ["string", "integer"], _CHANNEL) = None
     unit: optional(Text) = None
     spacing: optional(SIZE) = None
 
