@@ -179,7 +179,7 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     ax.plot(x, unit(height), color="0.25", lw=0.9)
     body = ax.fill_between(x, unit(surfaces[0]), top, color=BLUE, alpha=0.16, lw=0)
     (line,) = ax.plot(x, unit(surfaces[0]), color=BLUE, lw=1)
-    (marked,) = ax.plot(x, np.full(len(x), np.nan), color=VERMILION, lw=2.2, marker=".", ms=2.2)
+    (marked,) = ax.plot(x, np.full(len(x), np.nan), color=VERMILION, lw=2.2, marker="o", ms=2.2, mew=0)
     ax.set_xlabel(plane.label("x"))
     ax.set_ylabel(unit.label("Height"))
     ax.set_title(f"y = {plane.text(float(dataset['y'][index]))}", loc="right")
@@ -203,6 +203,7 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     (run,) = ax.plot([], [], color=BLUE, lw=1.4)
     (now,) = ax.plot([], [], "o", color=VERMILION, ms=5)
     axis.apply(ax, dataset["time"])
+    ax.minorticks_off()  # each costs time in every picture
     if not lowest:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)

@@ -14,8 +14,9 @@ import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, SymmetricalLogLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
 
@@ -173,24 +174,43 @@ class TimeAxis:
             return cls(Unit(1.0, "s"), True, float(positive[0]))
         return cls(unit_for(times, "s"), False, float(positive[0]) if len(positive) else 1.0)
 
-    def apply(self, ax: Axes, times, name: str = "Time") -> None:
-        """Set scale, limits and label of a time axis; zero keeps its place on a logarithmic one."""
+    def apply(self, ax: Axes, times, most: int = 7) -> None:
+        """Set scale, limits, label and at most so many decades of a time axis; zero keeps its place on a log one."""
         times = self.unit(times)
-        if self.logarithmic and times[0] <= 0:
-            ax.set_xscale("symlog", linthresh=self.first, linscale=0.5)
-            ax.xaxis.set_minor_locator(SymmetricalLogLocator(base=10, linthresh=self.first, subs=range(2, 10)))
-            ax.set_xlim(-0.15 * self.first, 1.2 * times[-1])
-        elif self.logarithmic:
-            ax.set_xscale("log")
-            ax.xaxis.set_minor_locator(LogLocator(subs=range(2, 10), numticks=99))
-            ax.set_xlim(times[0] / 1.2, 1.2 * times[-1])
+        if self.logarithmic:
+            zero = times[0] <= 0
+            if zero:
+                ax.set_xscale("symlog", linthresh=self.first, linscale=0.8)
+                ax.set_xlim(-0.15 * self.first, 1.2 * times[-1])
+            else:
+                ax.set_xscale("log")
+                ax.set_xlim(times[0] / 1.2, 1.2 * times[-1])
+            low, high = math.ceil(math.log10(self.first) - 1e-9), math.floor(math.log10(times[-1]) + 1e-9)
+            labelled = 10.0 ** np.arange(low, high + 1, -(-(high - low + 1) // most))
+            fine = np.outer(10.0 ** np.arange(low - 1, high + 1), np.arange(1, 10)).ravel()
+            ax.xaxis.set_major_locator(FixedLocator([0.0, *labelled] if zero else labelled))
+            ax.xaxis.set_minor_locator(FixedLocator(fine[(fine >= self.first) & (fine <= times[-1])]))
         elif len(times) > 1:
             margin = 0.02 * (times[-1] - times[0])
             ax.set_xlim(times[0] - margin, times[-1] + margin)
+            ax.xaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
         else:
             ax.set_xticks(times, [f"{times[0]:.4g}"])
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_xlabel(self.unit.label(name))
+        ax.set_xlabel(self.unit.label("Time"))
+
+
+def spread_axis(axis: Axis, shown) -> None:
+    """Make one axis logarithmic where the values on it span a decade or more, with plain readable ticks."""
+    shown = np.asarray(shown, dtype=float)
+    shown = shown[np.isfinite(shown) & (shown > 0)]
+    if not shown.size or shown.max() < 10 * shown.min():
+        return
+    (axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale)("log")
+    if shown.max() < 300 * shown.min():
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=99))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def time_text(time: float) -> str:

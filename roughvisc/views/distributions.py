@@ -19,6 +19,7 @@ from roughvisc.views.axes import (
     letter_panels,
     new_figure,
     require,
+    spread_axis,
     spread_frames,
     styled,
     time_text,
@@ -44,7 +45,7 @@ def _colours(count: int) -> np.ndarray:
 
 
 @styled
-def distributions(dataset: xr.Dataset, times=None, bins: int = 40) -> Figure:
+def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> Figure:
     """Probability densities of the contact pressure and of the gap at chosen times.
 
     Parameters
@@ -54,8 +55,8 @@ def distributions(dataset: xr.Dataset, times=None, bins: int = 40) -> Figure:
     times : float or list of float, optional
         The nearest kept times are drawn; negative whole numbers count frames from the end. By default up to five over
         the whole history. [s]
-    bins : int
-        Number of bins from zero to the largest value drawn.
+    bins : int, optional
+        Number of bins from zero to the largest value drawn; by default as the number of cells suits.
 
     Returns
     -------
@@ -82,12 +83,25 @@ def distributions(dataset: xr.Dataset, times=None, bins: int = 40) -> Figure:
     figure = new_figure(2.9 * len(panels) + 0.2, 2.9)
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, (name, label, find) in zip(axes, panels, strict=True):
-        _draw_density(ax, chosen, find(chosen, bins)[f"{name}_density"], name, label)
-    handles, labels = axes[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=min(len(handles), 5), handlelength=1.2)
+        count = bins or _bin_count(chosen[name])
+        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name, label)
+    by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    ordered = [label for label in map(time_text, chosen["time"].values) if label in by_label]
+    figure.legend(
+        [by_label[label] for label in ordered], ordered, loc="outside upper center", ncols=5, handlelength=1.2
+    )
     letter_panels(axes)
     return figure
+
+
+def _bin_count(field: xr.DataArray) -> int:
+    """As many bins as the fullest frame has values to fill."""
+    return int(np.clip(np.sqrt(float((field > 0).sum(("x", "y")).max())) / 2, 6, 50))
+
+
+def _no_contact(ax: Axes, text: str = "no contact") -> None:
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="0.4")
+    ax.set_yticks([])
 
 
 def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str, label: str) -> None:
@@ -97,12 +111,16 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
     unit = unit_for(limits, VARIABLES[name].units)
     for number, colour in enumerate(_colours(dataset.sizes["time"])):
         values = density.isel(time=number).values * unit.factor
+        if not np.isfinite(values).all():
+            continue
         text = time_text(float(dataset["time"][number]))
-        ax.stairs(np.nan_to_num(values), unit(limits), color=colour, lw=1.2, label=text, baseline=None)
+        ax.stairs(values, unit(limits), color=colour, lw=1.2, label=text, baseline=None)
     ax.set_xlim(0, float(unit(limits[-1])))
     ax.set_ylim(bottom=0)
     ax.set_xlabel(unit.label(label))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
+    if not density.notnull().any():
+        _no_contact(ax, "no contact" if name == "pressure" else "full contact")
     ax.grid(color="0.9", lw=0.5)
 
 
@@ -132,17 +150,20 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     marker = "o" if len(times_shown) <= 40 else ""
     count.plot(times_shown, found["cluster_count"], color=BLUE, marker=marker)
     count.set_ylabel("Contact clusters")
-    count.set_ylim(0, 1.1 * max(int(found["cluster_count"].max()), 1))
+    most = max(int(found["cluster_count"].max()), 1)
+    count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
     unit = unit_for(found["cluster_area_largest"], "m2")
     area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
     area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
-    if (found["cluster_area_mean"] > 0).any():
-        area.set_yscale("log")
-    area.legend()
+    if found["cluster_count"].any():
+        spread_axis(area.yaxis, unit([found["cluster_area_largest"], found["cluster_area_mean"]]))
+        area.legend()
+    else:
+        _no_contact(area)
     for ax in (count, area):
-        axis.apply(ax, dataset["time"])
+        axis.apply(ax, dataset["time"], most=4)
     _draw_sizes(sizes, dataset, _frames(dataset, times, 4))
     for ax in (count, area, sizes):
         ax.grid(color="0.9", lw=0.5)
@@ -158,13 +179,19 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
     for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
         row = unit(row[np.isfinite(row)])
         if len(row):
-            ax.plot(row, np.arange(1, len(row) + 1), color=colour, drawstyle="steps-pre", label=time_text(float(time)))
+            ax.plot(row, np.arange(1, len(row) + 1), color=colour, drawstyle="steps-post", label=time_text(float(time)))
             if len(row) == 1:
                 ax.plot(row, [1], "o", color=colour)
     if np.isfinite(areas).any():
-        ax.set_xscale("log")
-        ax.set_yscale("log")
-        ax.set_ylim(bottom=0.8)
+        spread_axis(ax.xaxis, unit(areas))
+        spread_axis(ax.yaxis, [1, np.isfinite(areas).sum(axis=1).max()])
+        if ax.get_yscale() == "log":
+            ax.set_ylim(bottom=0.8)
+        else:
+            ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
+            ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
         ax.legend(fontsize=6.5, handlelength=1.0)
+    else:
+        _no_contact(ax)
     ax.set_xlabel(unit.label("Cluster area"))
     ax.set_ylabel("Clusters at least as large")

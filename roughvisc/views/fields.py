@@ -92,7 +92,7 @@ def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
         return None
     # a rim out of contact closes the outline at the border of the map
     x, y = (plane(_with_rim(touching[name].values)) for name in ("x", "y"))
-    width = 0.7 if touching.size < 2e4 else 0.4
+    width = 0.7 if touching.size < 2e4 else 0.3
     lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=width)
     lines.set_gid("contact outline")
     return lines
@@ -169,7 +169,7 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
     columns = -(-frames // rows)
     width = 4.0 if ratio < 0.4 else 3.0 if columns == 1 and ratio < 1.5 else 1.75 if ratio < 2 else 1.1
     height = width * ratio + (0.27 if rows > 1 else 0.12)
-    size = (width * columns + 1.2, max(height * rows, 1.2) * fields + 0.7)
+    size = (width * columns + 0.17 * (columns - 1) + 1.25, max(height * rows, 1.2) * fields + 0.6)
     figure = new_figure(*size, layout="compressed")
     axes = figure.subplots(rows * fields, columns, sharex=True, sharey=True, squeeze=False)
     return figure, axes.reshape(fields, rows, columns)
@@ -331,7 +331,7 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.plot(x, s, color=BLUE, lw=1)
     touching = contact(dataset.isel(time=frame)).isel({across: index}).values
     marked = np.where(touching, h, np.nan)
-    ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker=".", ms=2.4, label="contact")
+    ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
     if "approach" in dataset:
         level = float(dataset["height"].max()) - float(dataset["approach"][frame])
         if low - margin < unit(level) < high + 2 * margin:

@@ -25,6 +25,7 @@ from roughvisc.views.axes import (
     new_figure,
     require,
     spans_decades,
+    spread_axis,
     styled,
     unit_for,
 )
@@ -277,8 +278,8 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     _draw_low_load_lines(ax, next(iter(cases.values())), contact_modulus, across, up)
     loads = np.sort(np.concatenate([one["force"].values for one in cases.values()]))
     if spans_decades(loads):
-        ax.set_xscale("log")
-        ax.set_yscale("log")
+        spread_axis(ax.xaxis, across(loads))
+        spread_axis(ax.yaxis, up(np.concatenate([one["contact_area"].values for one in cases.values()])))
     else:
         _leave_room(ax, *(up(one["contact_area"]) for one in cases.values()))
         ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))

@@ -6,6 +6,7 @@ readable prefixes; nothing here touches matplotlib's global state.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import xarray as xr
@@ -79,7 +80,12 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         if name == "hysteresis" and dataset.sizes["time"] < 3:
             continue  # two states are no loop
         path = folder / f"{stem}-{name}{suffix}"
-        draw(dataset).savefig(path, dpi=dpi)
+        unfinished = path.with_name(f".{path.stem}.part{suffix}")
+        try:
+            draw(dataset).savefig(unfinished, dpi=dpi)
+            os.replace(unfinished, path)
+        finally:
+            unfinished.unlink(missing_ok=True)
         written.append(path)
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)

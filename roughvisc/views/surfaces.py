@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.views.axes import ABSENT, BLUE, VERMILION, Unit, edges, letter_panels, new_figure, styled, unit_for
+from roughvisc.views.axes import BLUE, VERMILION, Unit, edges, letter_panels, new_figure, styled, unit_for
 from roughvisc.views.fields import draw_map, plane_ratio, plane_unit
 
 
@@ -51,24 +50,39 @@ def surface(height: xr.DataArray) -> Figure:
     """
     height = _checked(height)
     unit, plane = unit_for(height - height.mean(), "m"), plane_unit(height)
-    figure = new_figure(7.0, 5.2)
-    (on_map, histogram), (profile, spectrum) = figure.subplots(2, 2, width_ratios=[1.25, 1])
+    figure, panels = _panels(plane_ratio(height))
+    on_map = panels["map"]
     image = draw_map(on_map, height, unit, plane)
-    beside = plane_ratio(height) > 0.6
-    bar = figure.colorbar(image, ax=on_map, location="right" if beside else "top", pad=0.02, aspect=18)
+    flat = plane_ratio(height) < 0.4
+    bar = figure.colorbar(image, ax=on_map, location="top" if flat else "right", pad=0.02, aspect=50 if flat else 20)
     bar.set_label(unit.label("Height"))
     on_map.set_xlabel(plane.label("x"))
     on_map.set_ylabel(plane.label("y"))
     on_map.tick_params(direction="out")
+    on_map.locator_params(axis="x", nbins=5)
+    on_map.locator_params(axis="y", nbins=2 if flat else 5)
     missing = float(height.isnull().mean())
     if missing:
-        note = Patch(color=ABSENT, label=f"missing: {100 * missing:.2g} % of the points")
-        on_map.legend(handles=[note], loc="upper left", bbox_to_anchor=(0, -0.18), borderaxespad=0, handlelength=1)
-    _draw_profile(profile, on_map, height, unit, plane)
-    _draw_heights(histogram, height, unit)
-    _draw_spectrum(spectrum, height)
-    letter_panels((on_map, histogram, profile, spectrum))
+        on_map.set_title(f"{100 * missing:.2g} % missing (grey)", loc="right")
+    _draw_profile(panels["profile"], on_map, height, unit, plane)
+    _draw_heights(panels["heights"], height, unit)
+    _draw_spectrum(panels["spectrum"], height)
+    letter_panels(list(panels.values()))
     return figure
+
+
+def _panels(ratio: float) -> tuple[Figure, dict[str, Axes]]:
+    """Figure and its panels, arranged so that a map of these proportions has room."""
+    rows, size, heights = (("map", "profile"), ("heights", "spectrum")), (7.0, 5.2), (1, 1)
+    if ratio < 0.4:
+        rows, size = (("map", "map"), ("profile", "profile"), ("heights", "spectrum")), (6.4, 6.0)
+        heights = (0.8, 1, 1.3)
+    elif ratio > 1.7:
+        rows, size = (("map", "profile"), ("map", "heights"), ("map", "spectrum")), (6.4, 6.4)
+        heights = (1, 1, 1)
+    figure = new_figure(*size)
+    panels = figure.subplot_mosaic(rows, height_ratios=heights)
+    return figure, panels
 
 
 def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plane: Unit) -> None:
@@ -87,7 +101,7 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
 def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
     values = unit(height.values[np.isfinite(height.values)])
     deviation = float(values.std())
-    bins = int(np.clip(math.sqrt(values.size), 8, 120))
+    bins = int(np.clip(math.sqrt(values.size) / 1.5, 8, 100))
     if deviation == 0:
         ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
         ax.set_xlabel(unit.label("Height"))
@@ -97,8 +111,8 @@ def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
     shown = np.linspace(values.min(), values.max(), 200)
     bell = np.exp(-(((shown - values.mean()) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
-    ax.set_ylim(0, 1.35 * ax.get_ylim()[1])
-    ax.legend(loc="upper right", ncols=2, handlelength=1.2, columnspacing=1)
+    ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
+    ax.legend(loc="upper right", handlelength=1.2)
     ax.set_xlabel(unit.label("Height"))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 

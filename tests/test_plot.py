@@ -1,0 +1,479 @@
+"""Figures by their artists: what is drawn, in which units, and that no label covers another."""
+
+import itertools
+import sys
+
+import matplotlib
+import numpy as np
+import pytest
+import sample_results as made
+import xarray as xr
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from PIL import Image
+
+from roughvisc.errors import InputError
+from roughvisc.views import animate as animation
+from roughvisc.views import axes, fields, plot, surfaces
+
+SAMPLES = {
+    "creep": made.hertz_creep,
+    "rough": made.rough_creep,
+    "cycle": lambda: made.hertz_cycle(500, (17, 12), 10),
+    "one frame": made.one_frame,
+    "open": made.open_contact,
+    "two frames": lambda: made.rough_creep(frames=2),
+    "strip": lambda: made.rough_creep((150, 21)).assign_coords(y=(np.arange(21) + 0.5) * 8e-6),
+    "pillar": lambda: made.rough_creep((21, 150)).assign_coords(x=(np.arange(21) + 0.5) * 8e-6),
+}
+FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()} | {"area_against_load": plot.area_against_load}
+
+
+def labels(figure):
+    return [text for ax in figure.axes for text in (ax.get_xlabel(), ax.get_ylabel()) if text]
+
+
+def lines(ax):
+    return {line.get_label(): line for line in ax.lines}
+
+
+def text_boxes(figure):
+    """Boxes of all texts that are seen, inset by a pixel."""
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    found = []
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            if not axis.get_visible():
+                continue
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            ticks = [t for t in axis.get_major_ticks() if low - slack <= t.get_loc() <= high + slack]
+            found += [tick.label1 for tick in ticks if tick.label1.get_visible()]
+            found += [tick.label2 for tick in ticks if tick.label2.get_visible()]
+            found += [axis.label, axis.offsetText]
+        found += [ax.title, ax._left_title, ax._right_title]
+        found += ax.get_legend().get_texts() if ax.get_legend() else []
+    for legend in figure.legends:
+        found += legend.get_texts()
+    return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
+    figure = FIGURES[name](SAMPLES[sample]())
+    assert isinstance(figure, Figure)
+    boxes = text_boxes(figure)
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not a.overlaps(b), f"{one!r} covers {other!r}"
+    page = figure.bbox.padded(2)
+    for text, box in boxes:
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        assert inside, f"{text!r} runs off the figure"
+    for label in labels(figure):
+        bare = label in ("Rel. error", "Contact clusters", "Clusters at least as large")
+        assert bare or label.endswith("]"), label
+
+
+def test_figures__leave_no_global_state():
+    before = dict(matplotlib.rcParams)
+    plot.history(made.hertz_creep())
+    plot.maps(made.one_frame())
+    assert dict(matplotlib.rcParams) == before
+    if "matplotlib.pyplot" in sys.modules:
+        assert sys.modules["matplotlib.pyplot"].get_fignums() == []
+
+
+@pytest.mark.parametrize("draw", [plot.history, plot.maps, plot.section, plot.hysteresis, plot.distributions])
+def test_figures__refuse_many_cases_and_other_things(draw):
+    with pytest.raises(InputError, match=r"ds\.isel\(case=0\)"):
+        draw(xr.concat([made.one_frame()] * 2, dim="case"))
+    with pytest.raises(InputError, match="found list"):
+        draw([1.0])
+    with pytest.raises(InputError, match="no time at all"):
+        draw(made.one_frame().isel(time=slice(0)))
+
+
+# ------------------------------------------------------------------------------------------------- units, times
+
+
+@pytest.mark.parametrize(
+    ("values", "si", "text"),
+    [
+        ([3e-9], "m", "3 nm"),
+        ([-2e-6, 1e-9], "m", "2 µm"),
+        ([0.9999999], "N", "1 N"),
+        ([999.0], "N", "999 N"),
+        ([4e5], "N/m", "400 kN/m"),
+        ([0.05e-6], "m2", "0.05 mm²"),
+        ([2e-12], "m2", "2 µm²"),
+        ([7200.0], "s", "2 h"),
+        ([3000.0], "s", "3000 s"),
+        ([3 * 86400.0], "s", "3 d"),
+        ([2e-5], "J", "20 µJ"),
+        ([0.0, np.nan], "Pa", "0 Pa"),
+        ([0.25], "1", "0.25"),
+    ],
+)
+def test_unit_for__reads_well(values, si, text):
+    assert axes.unit_for(values, si).text(np.nanmax(np.abs(values))) == text
+
+
+def test_time_axis__chosen_by_the_data():
+    assert not axes.TimeAxis.of(np.linspace(0, 5, 500)).logarithmic
+    assert axes.TimeAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
+    assert axes.TimeAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
+    assert not axes.TimeAxis.of([0.0]).logarithmic
+    assert axes.TimeAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
+
+
+def test_spread_frames__first_and_last_and_even():
+    times = np.r_[0, np.geomspace(1e-3, 1e3, 499)]
+    frames = axes.spread_frames(times, 4)
+    assert frames[0] == 0 and frames[-1] == 499 and len(frames) == 4
+    assert np.all(np.abs(np.diff(frames) - 500 / 3) < 10)
+    assert axes.spread_frames(np.linspace(0, 1, 500), 3).tolist() == [0, 249, 499]
+    assert axes.spread_frames([3.0], 4).tolist() == [0]
+    assert axes.spread_frames([1.0, 2.0], 1).tolist() == [1]
+
+
+def test_frame_at__nearest_time_or_counted_from_the_end():
+    times = [0.0, 1.0, 10.0]
+    assert [axes.frame_at(times, t) for t in (0, 0.6, 5.4, 5.6, 99, -1, -3)] == [0, 1, 1, 2, 2, 2, 0]
+    for wrong in (-4, -0.5, np.nan):
+        with pytest.raises(InputError, match="expected a"):
+            axes.frame_at(times, wrong)
+
+
+# ---------------------------------------------------------------------------------------------------- histories
+
+
+def test_history__data_and_units():
+    ds = made.hertz_creep()
+    force, approach, area, accuracy = plot.history(ds).axes[:4]
+    assert [ax.get_ylabel() for ax in (force, approach, area)] == [
+        "Force [mN]",
+        "Approach [µm]",
+        "Contact area [mm²]",
+    ]
+    assert accuracy.get_xlabel() == "Time [s]"
+    assert accuracy.get_xscale() == "symlog"
+    np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
+    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
+    np.testing.assert_allclose(lines(accuracy)["solver"].get_ydata(), ds["residual"])
+    np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
+    np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
+
+
+def test_history__fraction_on_the_right_agrees():
+    ds = made.hertz_creep()
+    figure = plot.history(ds)
+    figure.draw_without_rendering()
+    area = figure.axes[2]
+    right = area.child_axes[0]
+    ratio = right.get_ylim()[1] / area.get_ylim()[1]
+    np.testing.assert_allclose(ratio * 1e6 * ds["contact_area"], 100 * ds["contact_fraction"], rtol=1e-9)
+
+
+def test_history__steps_that_did_not_converge_are_crossed_out():
+    ds = made.rough_creep()
+    force = plot.history(ds).axes[0]
+    np.testing.assert_allclose(lines(force)["not converged"].get_xdata(), ds["time"][3])
+    assert "not converged" not in lines(plot.history(made.hertz_creep()).axes[0])
+
+
+def test_history__of_what_is_there():
+    ds = made.hertz_creep()[["force", "approach", "height"]].assign(time_error=("time", np.full(30, np.nan)))
+    ds.attrs = {}
+    figure = plot.history(ds)
+    assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]", "Rel. error"]
+    assert [text.get_text() for text in figure.axes[-1].texts] == ["no accuracy recorded"]
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot.history(ds[["height", "time_error"]])
+
+
+def test_hysteresis__loop_and_work():
+    ds = made.hertz_cycle(200)
+    (ax,) = plot.hysteresis(ds).axes
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), 1e6 * ds["approach"])
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), ds["force"])
+    work = np.trapezoid(ds["force"], ds["approach"])
+    assert f"{1e6 * work:.3g} µJ" in ax.lines[2].get_label()
+    assert len(ax.texts) == 5  # arrows
+
+
+def test_area_against_load__one_line_a_case_and_the_low_load_line():
+    ds = made.rough_creep(absent=False)
+    ds["force"] = ("time", np.geomspace(0.01, 10, 12))
+    figure = plot.area_against_load({"soft": ds, "hard": 2 * ds}, contact_modulus={"glassy": 4e6})
+    (ax,) = figure.axes
+    assert {"soft", "hard", "low loads, glassy"} <= set(lines(ax))
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    np.testing.assert_allclose(lines(ax)["hard"].get_ydata(), 2e6 * ds["contact_area"])
+    x, y = lines(ax)["low loads, glassy"].get_data()
+    dx, dy = (float(ds[name][1] - ds[name][0]) for name in "xy")
+    slope = np.sqrt((ds["height"].diff("x") ** 2).mean() / dx**2 + (ds["height"].diff("y") ** 2).mean() / dy**2)
+    np.testing.assert_allclose(1e-6 * y, np.sqrt(2 * np.pi) * x / (4e6 * float(slope)))
+
+
+def test_area_against_load__cases_in_many_shapes():
+    one = made.hertz_cycle(30)
+    stacked = xr.concat([one, one], dim=xr.Variable("case", ["a", "b"]))
+    assert {"a", "b"} <= set(lines(plot.area_against_load(stacked).axes[0]))
+    assert {"Sphere in cycles", "Sphere in cycles (2)"} <= set(lines(plot.area_against_load([one, one]).axes[0]))
+    hundred = plot.area_against_load([one] * 100)
+    assert len(hundred.axes[0].lines) == 100
+    assert not hundred.legends
+    with pytest.raises(InputError, match="no result given"):
+        plot.area_against_load([])
+    with pytest.raises(InputError, match="found int"):
+        plot.area_against_load(3)
+
+
+# ------------------------------------------------------------------------------------------------------- fields
+
+
+def images(figure):
+    return [image for ax in figure.axes for image in ax.images]
+
+
+def test_maps__data_scale_and_absent_cells():
+    ds = made.rough_creep()
+    figure = plot.maps(ds, times=[0.0, 1.0, -1])
+    shown = images(figure)
+    assert [image.get_gid() for image in shown] == ["pressure"] * 3 + ["gap"] * 3
+    frames = [0, 4, 11]
+    for image, frame in zip(shown[:3], frames, strict=True):
+        expected = 1e-6 * ds["pressure"].isel(time=frame).where(ds["height"].notnull()).T
+        np.testing.assert_allclose(image.get_array().filled(np.nan), expected)
+    for image, frame in zip(shown[3:], frames, strict=True):
+        np.testing.assert_allclose(image.get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
+        assert image.get_clim() == (0.0, pytest.approx(1e6 * float(ds["gap"].max())))
+    absent = ds["height"].isnull().values.T
+    for image in shown:
+        assert np.array_equal(np.ma.getmaskarray(image.get_array()), absent)
+        assert tuple(image.get_cmap().get_bad()) == to_rgba(axes.ABSENT)
+        assert image.axes.get_aspect() == 1.0
+        np.testing.assert_allclose(image.get_extent(), [0, 1.2, 0, 0.9])
+    assert len({image.get_clim() for image in shown[:3]}) == 1
+    assert [ax.get_title() for ax in figure.axes[:3]] == ["t = 10 ms", "t = 1.52 s", "t = 2.78 h"]
+    assert "Pressure [MPa]" in labels(figure)
+    assert "Gap [µm]" in labels(figure)
+
+
+def test_maps__outline_encloses_the_contact():
+    ds = made.hertz_creep()
+    (ax,) = (ax for ax in plot.maps(ds, times=-1, fields="pressure").axes if ax.images)
+    (outline,) = (artist for artist in ax.collections if artist.get_gid() == "contact outline")
+    points = np.concatenate([path.vertices for path in outline.get_paths()])
+    distance = np.hypot(points[:, 0] - 1.0, points[:, 1] - 0.75)
+    radius = np.sqrt(float(ds["approach"][-1]) * 10e-3) * 1e3
+    assert np.all(np.abs(distance - radius) < 0.06)
+
+
+@pytest.mark.parametrize("touching", [0.0, 1.0])
+def test_maps__no_outline_around_nothing_or_everything(touching):
+    ds = made.one_frame()
+    ds["pressure"][:] = touching
+    assert not any(ax.collections for ax in plot.maps(ds).axes if ax.images)
+
+
+def test_maps__load_only_the_frames_drawn():
+    seen = []
+
+    def watch(block, block_info=None):
+        seen.append(block_info[0]["chunk-location"][0])
+        return block
+
+    ds = made.hertz_creep().chunk(time=1)
+    gap = ds["gap"].data.map_blocks(watch, dtype=float, meta=np.empty((0, 0, 0)))
+    with_watch = ds.assign(gap=(("time", "x", "y"), gap))
+    plot.maps(with_watch, times=[-1], fields=["gap"])
+    assert set(seen) <= {29}
+
+
+def test_maps__choices():
+    ds = made.hertz_creep()
+    assert len(images(plot.maps(ds))) == 8
+    assert len(images(plot.maps(ds, times=ds["time"].values[:6], fields="gap"))) == 6
+    assert len(images(plot.maps(ds.drop_vars("pressure")))) == 4
+    assert images(plot.maps(ds, times=5.0, fields=["displacement"]))[0].get_gid() == "displacement"
+    with pytest.raises(InputError, match="30 times to map"):
+        plot.maps(ds, times=ds["time"].values)
+    with pytest.raises(InputError, match="field 'stress' is unknown"):
+        plot.maps(ds, fields=["stress"])
+    with pytest.raises(InputError, match="holds no 'pressure'"):
+        plot.maps(ds.drop_vars(["pressure", "gap", "displacement"]))
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_section__surfaces_touch_where_pressure_is(axis):
+    ds = made.hertz_creep()
+    figure = plot.section(ds, axis=axis)
+    top, bottom = figure.axes
+    profile, surface, contact = bottom.lines[:3]
+    index = {"x": {"y": 21}, "y": {"x": 30}}[axis]
+    last = ds.isel(time=-1, **index)
+    np.testing.assert_allclose(profile.get_ydata(), 1e6 * last["height"])
+    np.testing.assert_allclose(surface.get_ydata(), 1e6 * (last["height"] + last["gap"]), atol=1e-9)
+    assert np.array_equal(np.isfinite(contact.get_ydata()), last["pressure"] > 0)
+    np.testing.assert_allclose(top.patches[0].get_data().values, 1e-3 * last["pressure"])
+    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pressure [kPa]", "Height [µm]")
+    assert bottom.get_xlabel() == f"{axis} [mm]"
+    level = lines(bottom)["undeformed"].get_ydata()[0]
+    assert level == pytest.approx(1e6 * float(ds["height"].max() - ds["approach"][-1]))
+
+
+def test_section__states_its_exaggeration():
+    figure = plot.section(made.hertz_creep())
+    bottom = figure.axes[1]
+    (note,) = (text for text in bottom.texts if text.get_gid() == "exaggeration")
+    box, view = bottom.get_window_extent(), bottom.viewLim
+    ratio = box.height / (view.height * 1e-6) / (box.width / (view.width * 1e-3))
+    assert float(note.get_text().split("×")[1]) == pytest.approx(ratio, rel=0.05)
+
+
+def test_section__gap_and_displacement_give_the_same_surface():
+    ds = made.hertz_creep()
+    by_gap = fields.deformed_surface(ds.drop_vars("displacement"), 5)
+    for other in (ds, ds.drop_vars("gap")):
+        np.testing.assert_allclose(fields.deformed_surface(other, 5), by_gap, atol=1e-10)
+
+
+def test_section__goes_where_it_is_told():
+    ds = made.rough_creep()
+    figure = plot.section(ds, time=1.0, axis="y", at=0.3e-3)
+    assert figure.axes[0].get_title(loc="right") == "t = 1.52 s,  x = 0.306 mm"
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), 1e6 * ds["height"].isel(x=24))
+    with pytest.raises(InputError, match="axis is 'z'"):
+        plot.section(ds, axis="z")
+    with pytest.raises(InputError, match="no 'gap'"):
+        plot.section(ds.drop_vars("gap"))
+
+
+def test_section__without_pressure_says_so():
+    top, _ = plot.section(made.hertz_creep().drop_vars("pressure")).axes
+    assert [text.get_text() for text in top.texts] == ["pressure was not kept"]
+
+
+# ----------------------------------------------------------------------------------- distributions and surfaces
+
+
+def test_distributions__every_curve_encloses_one():
+    figure = plot.distributions(made.rough_creep(), bins=30)
+    assert [ax.get_xlabel() for ax in figure.axes] == ["Pressure [MPa]", "Gap [µm]"]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["Density [1/MPa]", "Density [1/µm]"]
+    for ax in figure.axes:
+        assert len(ax.patches) == 5
+        for curve in ax.patches:
+            values, limits, _ = curve.get_data()
+            assert np.sum(values * np.diff(limits)) == pytest.approx(1.0)
+
+
+def test_contact_clusters__areas_add_up_to_the_contact_area():
+    ds = made.rough_creep()
+    count, area, sizes = plot.contact_clusters(ds, times=[-1]).axes
+    number, mean = count.lines[0].get_ydata(), lines(area)["mean"].get_ydata()
+    np.testing.assert_allclose(number * mean, 1e6 * ds["contact_area"], rtol=1e-9)
+    steps = sizes.lines[0]
+    assert steps.get_ydata()[-1] == number[-1]
+    assert np.sum(steps.get_xdata()) == pytest.approx(1e6 * float(ds["contact_area"][-1]))
+
+
+def test_surface__panels_and_missing_points():
+    h = made.rough_creep()["height"]
+    figure = plot.surface(h)
+    on_map, profile, heights, spectrum = figure.axes[:4]
+    np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * h.T)
+    assert on_map.get_title(loc="right") == f"{100 * float(h.isnull().mean()):.2g} % missing (grey)"
+    np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * h.isel(y=37))
+    assert lines(heights)["normal, Sq = 1.5 µm"]
+    assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
+    assert spectrum.get_ylabel() == "Power spectral density [µm⁴]"
+
+
+def test_surface__takes_a_result_and_refuses_what_is_no_surface():
+    ds = made.hertz_creep()
+    assert len(plot.surface(ds).axes) == len(plot.surface(ds["height"].T).axes) == 5
+    flat = plot.surface(0 * ds["height"].isel(x=slice(5), y=slice(4)))
+    assert [text.get_text() for ax in flat.axes for text in ax.texts] == ["flat: one height", "too small or too flat"]
+    with pytest.raises(InputError, match="all missing"):
+        plot.surface(np.nan * ds["height"])
+    with pytest.raises(InputError, match="dimensions x and y"):
+        plot.surface(ds["force"])
+    with pytest.raises(InputError, match="holds no 'height'"):
+        plot.surface(ds[["force"]])
+
+
+def test_radial_spectrum__of_noise_gives_back_its_variance():
+    shape, steps, deviation = (160, 121), (2e-6, 3e-6), 1e-7
+    values = deviation * np.random.default_rng(1).standard_normal(shape)
+    x, y = (step * (np.arange(n) + 0.5) for n, step in zip(shape, steps, strict=True))
+    _, density = surfaces.radial_spectrum(xr.DataArray(values, {"x": x, "y": y}))
+    # white noise: C = variance * cell area, alike at every wavevector
+    np.testing.assert_allclose(np.mean(density) / (deviation**2 * steps[0] * steps[1]), 1.0, rtol=0.03)
+
+
+# --------------------------------------------------------------------------------------------- files, animation
+
+
+def test_save_figures__writes_what_the_result_allows(tmp_path):
+    ds = made.hertz_creep(shape=(21, 16))
+    written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)
+    assert [path.name for path in written] == [f"sphere-{name}.png" for name in plot.FIGURES]
+    assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == sorted(path.name for path in written)
+    for path in written:
+        with Image.open(path) as picture:
+            assert picture.format == "PNG"
+    few = plot.save_figures(ds[["force", "approach"]].isel(time=[3]), tmp_path, "few", suffix=".pdf")
+    assert [path.name for path in few] == ["few-history.pdf"]
+    with pytest.raises(InputError, match="allows no figure"):
+        plot.save_figures(ds[["residual"]], tmp_path, "none")
+
+
+@pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame, made.open_contact])
+def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
+    ds = make()
+    path = plot.animate(ds, tmp_path / "contact.gif", frames=3, dpi=40)
+    assert list(tmp_path.iterdir()) == [path]
+    with Image.open(path) as picture:
+        assert getattr(picture, "n_frames", 1) == min(3, ds.sizes["time"])
+
+
+def test_animate__map_section_and_history_move_together():
+    ds = made.rough_creep()
+    figure, pictures = animation._moving(ds, "gap", 4)
+    on_map, section, force, approach, area = (ax for ax in figure.axes if ax.get_label() != "<colorbar>")
+    assert [ax.get_ylabel() for ax in (force, approach, area)] == ["Force [N]", "Approach [µm]", "Contact area [mm²]"]
+    seen = []
+    for frame in pictures:
+        seen.append(frame)
+        np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
+        assert on_map.get_title() == axes.time_text(float(ds["time"][frame]))
+        assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
+        assert len(approach.lines[1].get_xdata()) == frame + 1
+        index = int(ds["height"].max("x").argmax("y"))
+        surface = (ds["height"] + ds["gap"].isel(time=frame)).isel(y=index)
+        np.testing.assert_allclose(section.lines[1].get_ydata(), 1e6 * surface)
+    assert seen == [0, 4, 7, 11]
+
+
+def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):
+    ds = made.one_frame()
+    with pytest.raises(InputError, match=r"ends in \.gif"):
+        plot.animate(ds, tmp_path / "contact.txt")
+    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    with pytest.raises(InputError, match="ffmpeg was not found"):
+        plot.animate(ds, tmp_path / "contact.mp4")
+    with pytest.raises(InputError, match="field is 'height'"):
+        plot.animate(ds, tmp_path / "contact.gif", field="height")
+    with pytest.raises(InputError, match="positive"):
+        plot.animate(ds, tmp_path / "contact.gif", frames=0)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not animation.FFMpegWriter.isAvailable(), reason="ffmpeg is not installed")
+def test_animate__mp4(tmp_path):
+    path = plot.animate(made.hertz_creep(), tmp_path / "contact.mp4", frames=3, dpi=40)
+    assert path.read_bytes()[4:8] == b"ftyp"
