@@ -99,7 +99,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     """
     sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
     counts = [height.sizes[axis] for axis in ("x", "y")]
-    missing = int(height.isnull().sum())
+    missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
@@ -109,6 +109,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
         ("Shape", f"{counts[0]} x {counts[1]} points"),
         ("Spacing", " x ".join(readable(d, "m") for d in sides)),
         ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
+        ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
         ("Height range", readable(float(height.max() - height.min()), "m")),
     ]
     for parameter, label in (("Sq", "Sq, levelled"), ("Sdq", "rms slope, levelled")):
