@@ -7,6 +7,7 @@ NaN, and stay so until :func:`fill`.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Literal
 
 import numpy as np
@@ -290,7 +291,9 @@ def _local_median(values: np.ndarray, window: int) -> np.ndarray:
 
 
 def _harmonic(h: xr.DataArray, missing: np.ndarray) -> np.ndarray:
-    from SurfaceTopography import Topography
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the library's imports
+        from SurfaceTopography import Topography
 
     offset = np.nanmean(h.values)
     masked = np.ma.masked_array(np.where(missing, 0.0, h.values - offset), mask=missing)

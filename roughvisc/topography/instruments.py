@@ -8,6 +8,7 @@ SurfaceTopography turns it over; of plain text, row j of the file is ``y[j]``, a
 from __future__ import annotations
 
 import os
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,6 +74,8 @@ class Opened:
         Maker and model where known.
     complaints : list of str
         What is wrong with the file and was read past, filled in by ``load``.
+    close : callable
+        Lets go of the file.
     """
 
     format: str
@@ -81,6 +84,7 @@ class Opened:
     default: int | None = None
     instrument: str = ""
     complaints: list[str] = field(default_factory=list)
+    close: Callable[[], None] = lambda: None
 
 
 def open_instrument(path: Path, format: str | None) -> Opened:
@@ -91,6 +95,8 @@ def open_instrument(path: Path, format: str | None) -> Opened:
     if format == "sdf" or (format is None and path.suffix.lower() == ".sdf"):
         return _sdf(path)
     candidates = (format,) if format else formats_of(path)
+    if candidates == ("npy",):  # SurfaceTopography does not close these
+        return _npy(path)
     failures: dict[str, Exception] = {}
     for candidate in candidates:
         try:
@@ -98,6 +104,7 @@ def open_instrument(path: Path, format: str | None) -> Opened:
         except InputError:
             raise
         except Exception as error:  # each reader has its own kinds, struct.error and KeyError among them
+            forget(error)
             failures[candidate] = error
     raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
 
@@ -132,6 +139,13 @@ def brief(error: BaseException) -> str:
     """First line of an error, not too long; its kind where it says nothing."""
     text = str(error).strip().split("\n")[0].strip()
     return (text if len(text) < 200 else text[:197] + "...") or type(error).__name__
+
+
+def forget(error: BaseException | None) -> None:
+    """Let go of what the frames of an error hold: readers that fail leave their files open."""
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__context__
 
 
 def affordable(path: Path, points: int, expansion: float) -> None:
@@ -178,6 +192,16 @@ def _sdf(path: Path) -> Opened:
     return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), 0, content.header.manufacturer_id.strip())
 
 
+def _npy(path: Path) -> Opened:
+    heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
+    areal = heights.ndim == 2 and heights.dtype.kind in "fiu"
+
+    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
+        return np.asarray(heights, dtype=float) * unit, None
+
+    return Opened("npy", (Channel(0, "array", areal, heights.shape, None),), load)
+
+
 def _detected(path: Path) -> str:
     from SurfaceTopography.IO import detect_format
 
@@ -211,7 +235,8 @@ def _surface_topography(path: Path, format: str) -> Opened:
     default = getattr(reader, "_default_channel_index", None)
     described = theirs[0].info.get("instrument", {}) if theirs else {}
     instrument = described.get("name", "") if isinstance(described, dict) else ""
-    return Opened(format, tuple(_channel(found) for found in theirs), load, default, str(instrument or ""))
+    channels = tuple(_channel(found) for found in theirs)
+    return Opened(format, channels, load, default, str(instrument or ""), close=reader.close)
 
 
 def _channel(found: Any) -> Channel:

@@ -22,7 +22,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography import gridfiles, instruments
 from roughvisc.topography.grid import checked, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.topography.instruments import Channel, Opened, brief
+from roughvisc.topography.instruments import Channel, Opened, brief, forget
 from roughvisc.units import quantity
 
 #: No scan is wider, no spacing finer, no height further from zero. [m] Scans of 150 mm exist; absolute heights too.
@@ -147,7 +147,9 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     with _reading(path):
         if _is_grid(path, format):
             return gridfiles.grid_channels(path)
-        return instruments.open_instrument(path, format).channels
+        opened = instruments.open_instrument(path, format)
+        opened.close()
+        return opened.channels
 
 
 def supported_formats() -> dict[str, tuple[str, ...]]:
@@ -171,9 +173,12 @@ def _from_instrument(
 ) -> tuple[xr.DataArray, Opened, Channel]:
     with _reading(path):
         opened = instruments.open_instrument(path, format)
-        chosen = _chosen(opened, channel)
-        _unit_known(chosen, unit)
-        heights, found = opened.load(chosen, unit)
+        try:
+            chosen = _chosen(opened, channel)
+            _unit_known(chosen, unit)
+            heights, found = opened.load(chosen, unit)
+        finally:
+            opened.close()
         if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
             raise InputError("it states no size: pass spacing=(dx, dy) [m]")
         h = labelled(heights, sides or found)
@@ -250,6 +255,7 @@ def _reading(path: Path) -> Iterator[None]:
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         except Exception as error:  # damaged files raise of every kind, MemoryError and struct.error among them
+            forget(error)
             raise InputError(
                 f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format (pass format=)"
             ) from error

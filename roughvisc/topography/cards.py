@@ -1,0 +1,229 @@
+"""Surface cards: a TOML file that says which surface, from where, and how it is conditioned.
+
+A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
+Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
+their order in the file: crop, rotate90, invert, level, outliers, fill, filter, resample, taper, mirror.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography import conditioning, synthesis
+from roughvisc.topography.readers import open_scan, sha256
+from roughvisc.units import quantity
+
+_PROVENANCE = ("title", "description", "licence", "source")
+_FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "spacing")
+#: recipe -> unit of each parameter that is a quantity; None: taken as it is
+_LATERAL: dict[str, str | None] = {"size": "m", "shape": None}
+RECIPES: dict[str, dict[str, str | None]] = {
+    "sphere": {"radius": "m", "exact": None, **_LATERAL},
+    "cone": {"slope": "1", **_LATERAL},
+    "flat_punch": {"radius": "m", **_LATERAL},
+    "wavy": {"amplitude": "m", "wavelength": "m", "waves": None, **_LATERAL},
+    "self_affine": {
+        "hurst": "1",
+        "rms_slope": "1",
+        "rms_height": "m",
+        "rolloff": "m",
+        "shortcut": "m",
+        "anisotropy": "1",
+        "seed": None,
+        **_LATERAL,
+    },
+}
+
+
+def open_card(path: Path) -> xr.DataArray:
+    """Height over (x, y) as a surface card describes it, conditioned. [m]
+
+    Parameters
+    ----------
+    path : Path
+        The card; its ``file`` is relative to the card's folder.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height, with the card's title, description, licence and source among the attributes. [m]
+
+    Raises
+    ------
+    InputError
+        If the card is no TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
+    """
+    path = Path(path)
+    try:
+        card = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: this is no surface card in TOML: {error}") from error
+    try:
+        if ("file" in card) == ("generate" in card):
+            raise InputError(
+                "found " + ("both" if "file" in card else "neither") + ": expected either file or generate"
+            )
+        steps = card.pop("conditioning", {})
+        about = {key: _text(card, key) for key in _PROVENANCE if key in card}
+        rest = {key: value for key, value in card.items() if key not in _PROVENANCE}
+        h = _scan(rest, path.parent) if "file" in rest else generate(rest)
+        h = condition(h, steps)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    instrument = {"instrument": card["instrument"]} if "instrument" in card else {}
+    return h.assign_attrs(card=path.name, **about, **instrument)
+
+
+def generate(table: Mapping[str, Any]) -> xr.DataArray:
+    """Height from a recipe and its parameters, as cards and studies write them. [m]
+
+    Parameters
+    ----------
+    table : mapping
+        ``generate`` names the recipe: sphere, cone, flat_punch, wavy or self_affine; the other keys are its
+        parameters, quantities as numbers in SI or texts with a unit.
+
+    Raises
+    ------
+    InputError
+        If the recipe or a key is unknown, a parameter is missing, or a value is wrong.
+    """
+    name = table["generate"]
+    if name not in RECIPES:
+        raise InputError(f"generate is {name!r}: expected one of {', '.join(RECIPES)}")
+    units = RECIPES[name]
+    given = {key: value for key, value in table.items() if key != "generate"}
+    _known(given, units, f"{name} takes")
+    parameters = {
+        key: value if units[key] is None else _quantities(value, units[key], key) for key, value in given.items()
+    }
+    try:
+        return getattr(synthesis, name)(**parameters)
+    except TypeError as error:  # "missing 1 required positional argument: 'radius'"
+        raise InputError(f"{name}: {str(error).partition('() ')[2] or error}") from error
+
+
+def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
+    """Height after conditioning steps, as cards and studies write them.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    steps : mapping
+        Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
+        plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
+        cut-off, or a table of cutoff, keep and periodic), ``resample`` (cells), ``taper`` (width) and ``mirror``.
+        They act in this order; false leaves a step out.
+
+    Returns
+    -------
+    xarray.DataArray
+        Conditioned height. [m]
+
+    Raises
+    ------
+    InputError
+        If a step or an option is unknown, or a value is wrong.
+    """
+    if not isinstance(steps, Mapping):
+        raise InputError(f"conditioning is {steps!r}: expected a table of steps")
+    _known(steps, _STEPS, "conditioning takes")
+    for name, step in _STEPS.items():
+        value = steps.get(name, False)
+        if value is not False:
+            h = step(h, value)
+    return h
+
+
+def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
+    _known(card, _FILE, "a card of a file takes")
+    path = folder / _text(card, "file")
+    if not path.exists():
+        raise InputError(f"file is {card['file']!r}: there is no such file")
+    found = sha256(path)
+    if "sha256" not in card:
+        raise InputError(f"sha256 is missing: expected the checksum of {path.name}, which is {found}")
+    if _text(card, "sha256").lower() != found:
+        raise InputError(
+            f"the checksum of {path.name} is {found}, sha256 says {card['sha256']}: the file was changed or damaged"
+        )
+    options = {key: card[key] for key in ("format", "channel", "unit") if key in card}
+    if "spacing" in card:
+        options["spacing"] = _quantities(card["spacing"], "m", "spacing")
+    return open_scan(path, **options)
+
+
+def _text(card: Mapping[str, Any], key: str) -> str:
+    if not isinstance(card[key], str):
+        raise InputError(f"{key} is {card[key]!r}: expected a text")
+    return card[key]
+
+
+def _known(given: Mapping[str, Any], known: Any, who: str) -> None:
+    unknown = [key for key in given if key not in known]
+    if unknown:
+        raise InputError(f"unknown key {', '.join(map(repr, unknown))}: {who} {', '.join(known)}")
+
+
+def _quantities(value: Any, unit: str | None, name: str) -> Any:
+    if unit is None:  # counts and switches
+        return value
+    if isinstance(value, list | tuple):
+        return tuple(quantity(part, unit, name) for part in value)
+    return quantity(value, unit, name)
+
+
+def _table(name: str, value: Any, known: tuple[str, ...]) -> dict[str, Any]:
+    """Options of a step that is either true or a table."""
+    if value is True:
+        return {}
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name} is {value!r}: expected true, false, or a table of {', '.join(known)}")
+    _known(value, known, f"{name} takes")
+    return dict(value)
+
+
+def _switch(name: str, step: Callable[[xr.DataArray], xr.DataArray]) -> Callable[[xr.DataArray, Any], xr.DataArray]:
+    def switched(h: xr.DataArray, value: Any) -> xr.DataArray:
+        if value is not True:
+            raise InputError(f"{name} is {value!r}: expected true or false")
+        return step(h)
+
+    return switched
+
+
+def _crop(h: xr.DataArray, value: Any) -> xr.DataArray:
+    limits = _table("crop", value, ("x", "y"))
+    return conditioning.crop(h, **{axis: _quantities(pair, "m", f"crop.{axis}") for axis, pair in limits.items()})
+
+
+def _filter(h: xr.DataArray, value: Any) -> xr.DataArray:
+    options = (
+        _table("filter", value, ("cutoff", "keep", "periodic")) if isinstance(value, Mapping) else {"cutoff": value}
+    )
+    if "cutoff" not in options:
+        raise InputError("filter.cutoff is missing: expected a wavelength [m]")
+    options["cutoff"] = quantity(options["cutoff"], "m", "filter.cutoff")
+    return conditioning.gaussian_filter(h, **options)
+
+
+#: step -> (height, value in the file) -> height; in the order in which they act
+_STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
+    "crop": _crop,
+    "rotate90": conditioning.rotate90,
+    "invert": _switch("invert", conditioning.invert),
+    "level": lambda h, value: conditioning.level(h, 1 if value is True else value),
+    "outliers": lambda h, value: conditioning.mask_outliers(h, **_table("outliers", value, ("window", "threshold"))),
+    "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
+    "filter": _filter,
+    "resample": conditioning.resample,
+    "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),
+    "mirror": _switch("mirror", conditioning.mirror),
+}

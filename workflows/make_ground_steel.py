@@ -1,0 +1,48 @@
+"""Write surfaces/ground_steel.x3p: a synthetic scan of ground steel, as an instrument might have given it.
+
+    python workflows/make_ground_steel.py [FILE]
+
+Roughness drawn out along the grinding direction x, then what a measurement adds: tilt, an offset, noise, points lost
+on steep flanks and spikes beside them. The same file comes out byte for byte, up to the version of the writer.
+"""
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import x3pio
+
+from roughvisc.topography.synthesis import self_affine
+
+SIZE, SHAPE = (1.0e-3, 0.9e-3), (256, 224)  # cells of 3.906 x 4.018 um
+
+
+def measured() -> np.ndarray:
+    """Heights over (x, y) [m] with tilt, noise, missing points and spikes."""
+    rng = np.random.default_rng(20_25)
+    # long lays and their fine structure, both periodic: pressed as one period after levelling
+    h = self_affine(SIZE, SHAPE, hurst=0.8, rms_height=0.5e-6, rolloff=60e-6, shortcut=17e-6, anisotropy=4.0, seed=rng)
+    z = h.values - 0.06e-6 * (h.values / 0.5e-6) ** 2  # grinding leaves deeper grooves than ridges
+    steep = np.hypot(*np.gradient(z, *(size / n for size, n in zip(SIZE, SHAPE, strict=True))))
+    lost = (steep > np.quantile(steep, 0.97)) & (rng.random(SHAPE) < 0.25)
+    beside = (np.roll(lost, 1, axis=0) | np.roll(lost, 1, axis=1)) & ~lost & (rng.random(SHAPE) < 0.1)
+    z += rng.normal(0, 5e-9, SHAPE) + np.where(beside, rng.choice([-1, 1], SHAPE) * rng.uniform(2e-5, 4e-5, SHAPE), 0)
+    z += 4e-3 * h.x.values[:, None] - 2.5e-3 * h.y.values + 12e-6
+    return np.where(lost, np.nan, z)
+
+
+def main(path: Path) -> None:
+    """Write the scan."""
+    metadata = x3pio.Metadata.for_software("roughvisc", "0")
+    metadata.date = datetime(2025, 1, 1, tzinfo=UTC)
+    metadata.creator = "workflows/make_ground_steel.py of roughvisc"
+    metadata.comment = "Synthetic: no surface was measured."
+    # x3p has rows along y
+    cell = [size / n for size, n in zip(SIZE, SHAPE, strict=True)]
+    x3pio.write(path, measured().T, x_scale=cell[0], y_scale=cell[1], z_type=x3pio.DataType.FLOAT32, metadata=metadata)
+
+
+if __name__ == "__main__":
+    default = Path(__file__).parents[1] / "surfaces" / "ground_steel.x3p"
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else default)
