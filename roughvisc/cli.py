@@ -6,6 +6,7 @@ are made inside the commands, so that ``--help`` is quick.
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,8 @@ class _Commands(click.Group):
         except RoughviscError as error:
             raise _Failure(str(error), 1) from error
         except OSError as error:  # a full disk, a file taken away
+            if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
+                raise
             raise _Failure(f"{error.filename or 'input or output'}: {error.strerror or error}", 1) from error
         except KeyboardInterrupt as error:
             raise _Failure("interrupted; what was finished is kept", 130) from error

@@ -93,7 +93,7 @@ class Case:
         if self.varied:
             stated["varied"] = dict(self.varied)
         if self.origin is not None:
-            stated["origin"] = str(self.origin)
+            stated["origin"] = str(self.origin.absolute())
         return json.dumps(stated)
 
     @classmethod

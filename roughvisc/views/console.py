@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from rich.console import Console
+from rich.console import Console, Group
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from roughvisc.views.axes import unit_for
 
@@ -60,7 +61,7 @@ def _at(now: float, end: float) -> str:
     return f"t = {unit(now):.3g} of {unit.text(end)}"
 
 
-def result_table(dataset: xr.Dataset) -> Table:
+def result_table(dataset: xr.Dataset) -> Group:
     """Summary of a result: what came out, how accurate it is, what it cost."""
     last = dataset.isel(time=-1)
     end = float(last["time"])
@@ -84,7 +85,7 @@ def result_table(dataset: xr.Dataset) -> Table:
     return _two_columns(rows, dataset.attrs.get("title"))
 
 
-def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Table:
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     """What is in a scan: its size, what is missing, how rough it is.
 
     Parameters
@@ -98,7 +99,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Table:
     """
     sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
     counts = [height.sizes[axis] for axis in ("x", "y")]
-    missing = int(height.isnull().sum())
+    missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
@@ -108,6 +109,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Table:
         ("Shape", f"{counts[0]} x {counts[1]} points"),
         ("Spacing", " x ".join(readable(d, "m") for d in sides)),
         ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
+        ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
         ("Height range", readable(float(height.max() - height.min()), "m")),
     ]
     for parameter, label in (("Sq", "Sq, levelled"), ("Sdq", "rms slope, levelled")):
@@ -120,10 +122,10 @@ def _number(values: xr.DataArray) -> str:
     return f"{found.max():.2g}" if found.size else "not known"
 
 
-def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Table:
-    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
+    table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for label, value in rows:
         table.add_row(label, value)
-    return table
+    return Group(Text(title or "untitled", style="bold"), table)
