@@ -131,7 +131,7 @@ def test_time_axis__chosen_by_the_data():
 def test_spread_frames__first_and_last_and_even():
     times = np.r_[0, np.geomspace(1e-3, 1e3, 499)]
     frames = axes.spread_frames(times, 4)
-    assert frames[0] == 0 and frames[-1] == 499 and len(frames) == 4
+    assert (frames[0], frames[-1], len(frames)) == (0, 499, 4)
     assert np.all(np.abs(np.diff(frames) - 500 / 3) < 10)
     assert axes.spread_frames(np.linspace(0, 1, 500), 3).tolist() == [0, 249, 499]
     assert axes.spread_frames([3.0], 4).tolist() == [0]

@@ -23,7 +23,7 @@ from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.loading import Program, Segment
 from roughvisc.mechanics.materials import Material
-from roughvisc.mechanics.memory import Memory, Rule, stiff_ratio
+from roughvisc.mechanics.memory import Memory, Rule, mean_compliance, stiff_ratio
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -36,6 +36,8 @@ _ALGEBRAIC = {"load": 0.1, "approach": 0.01}
 # A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
 # shows its pressure through one discarded short solve.
 _SOFT = 0.1
+_DISCARDED = 1e-3  # length of that solve, in steps
+_MAGNIFIED = 1e-5  # share of the solver's tolerance that a step before it gets
 _SMALLEST_STEP = 1e-6  # of the segment
 
 
@@ -251,8 +253,13 @@ def _can_jump(scene: Scene) -> bool:
 # one step
 
 
-def _attempt(scene: Scene, state: State, control: str, value: float, length: float, rule: Rule) -> _Trial:
-    """Contact state a step ahead, where the load or the approach has a given value."""
+def _attempt(
+    scene: Scene, state: State, control: str, value: float, length: float, rule: Rule, share: float = 1.0
+) -> _Trial:
+    """Contact state a step ahead, where the load or the approach has a given value.
+
+    ``share`` scales the contact solver's tolerance.
+    """
     alpha, carried = scene.memory.predict(state.memory, length, rule)
     extra = 0
     if scene.memory.acts_on == "pressure":
@@ -273,7 +280,7 @@ def _attempt(scene: Scene, state: State, control: str, value: float, length: flo
         gap,
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
-        tolerance=_ALGEBRAIC[control] * scene.tolerance,
+        tolerance=max(_ALGEBRAIC[control] * scene.tolerance * share, 1e-14),
         start=_extrapolated(state, length) * alpha,
         present=scene.present,
     )
@@ -331,18 +338,23 @@ def _step(scene: Scene, state: State, trial: _Trial | None, time_error: float) -
     contact = trial.contact if trial is not None else None
     if contact is None:
         return Step(state.now, state.now.approach, 0.0, time_error, True, state)
-    if trial is not None and trial.length > 0 and _kept(scene, state.now.time):
-        creep = scene.compliance(trial.length)
-        if scene.compliance(0.0) < _SOFT * creep:
-            # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
-            # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
-            sharp = _attempt(scene, replace(state, before=None), "load", state.now.force, 1e-3 * trial.length, "right")
-            state = _spent(state, sharp)
-            shown = replace(state.now, pressure=sharp.instant.pressure, displacement=sharp.instant.displacement)
-            assert sharp.contact is not None
-            converged = contact.converged and sharp.contact.converged
-            return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, state)
+    if trial is not None and trial.length > 0 and _kept(scene, state.now.time) and _soft(scene, trial.length):
+        # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
+        # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
+        sharp = _attempt(
+            scene, replace(state, before=None), "load", state.now.force, _DISCARDED * trial.length, "right"
+        )
+        state = _spent(state, sharp)
+        shown = replace(state.now, pressure=sharp.instant.pressure, displacement=sharp.instant.displacement)
+        assert sharp.contact is not None
+        converged = contact.converged and sharp.contact.converged
+        return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, state)
     return Step(state.now, state.now.approach, contact.bound, time_error, contact.converged, state)
+
+
+def _soft(scene: Scene, length: float) -> bool:
+    """Whether hardly any of a step's compliance is there at once."""
+    return scene.compliance(0.0) < _SOFT * scene.compliance(length)
 
 
 def _kept(scene: Scene, time: float) -> bool:
@@ -372,6 +384,7 @@ def _entered(scene: Scene, state: State) -> State:
     segments = scene.program.segments
     index = state.segment + 1
     start = 0.0
+    neighbours = {segment.control for segment in segments[index - 1 : index + 1]}
     if index < len(segments):
         start = state.now.force if segments[index].control == "load" else state.now.approach
     return replace(
@@ -382,6 +395,8 @@ def _entered(scene: Scene, state: State) -> State:
         before=None,
         suggestion=0.0,
         memory=scene.memory.restart(state.memory),
+        # a corner of the approach is a jump of the load where the material cannot follow at once
+        unresolved="approach" in neighbours and state.now.force > 0 and not _can_jump(scene),
     )
 
 
@@ -431,7 +446,10 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         length = _length(scene, state, segment, event, end)
         arrival = event if length == event - state.now.time else state.now.time + length
         rule = _rule(scene, state, length)
-        trial = _attempt(scene, state, segment.control, segment.value(arrival - state.began, state.start), length, rule)
+        value = segment.value(arrival - state.began, state.start)
+        # what a short discarded solve shows of a soft step's end is the step's own residual, magnified
+        share = _MAGNIFIED if _soft(scene, length) and _kept(scene, arrival) else 1.0
+        trial = _attempt(scene, state, segment.control, value, length, rule, share)
         trial = replace(trial, instant=replace(trial.instant, time=arrival))
         state = _spent(state, trial)
         error = _estimate(scene, state, trial, segment, event)
@@ -568,7 +586,7 @@ def _time_of_creep(scene: Scene, relative: float, span: float) -> float:
 def _rule(scene: Scene, state: State, length: float) -> Rule:
     """Piecewise-linear pressure where it does not ring, else the damped two-step rule or its start."""
     if state.before is None:
-        return "linear" if scene.compliance(0.0) >= _SOFT * scene.compliance(length) else "euler"
+        return "euler" if _soft(scene, length) else "linear"
     if stiff_ratio(scene.material, length) <= 0.5:
         return "linear"
     # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
@@ -600,7 +618,29 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
     else:
         found, now, before, scale = trial.instant.force, state.now.force, state.before.force, force
     scalar_error = abs(found - (now + ratio * (now - before))) / scale if scale > 0 else 0.0
-    return share * constant * max(pressure_error, scalar_error)
+    fading = _fading(scene, state, trial, event)
+    if segment.control == "approach":
+        scalar_error *= fading
+    return share * constant * max(fading * pressure_error, scalar_error)
+
+
+def _fading(scene: Scene, state: State, trial: _Trial, event: float) -> float:
+    """What an error in the pressure of a step counts for at the next kept time.
+
+    Where hardly any compliance is there at once, each cell that enters makes the pressure jump. What a step gets
+    wrong then counts by its share of the creep till the next kept time; not so while contact recedes, when the
+    pressure is smooth and what it was stays in the dent that it leaves.
+    """
+    if scene.times is None or not _soft(scene, trial.length) or _receding(state, trial):
+        return 1.0
+    remaining = event - trial.instant.time
+    own = mean_compliance(scene.material, trial.length)
+    return own / mean_compliance(scene.material, trial.length + remaining)
+
+
+def _receding(state: State, trial: _Trial) -> bool:
+    """Whether fewer cells are in contact after a step than before it."""
+    return np.count_nonzero(trial.instant.pressure) < np.count_nonzero(state.now.pressure)
 
 
 def _growth(state: State, segment: Segment, time: float, event: float) -> float:
