@@ -22,7 +22,8 @@ _PUBLIC = {
         "roughvisc.mechanics.materials": "Prony elastic maxwell kelvin_voigt zener from_relaxation",
         "roughvisc.mechanics.loading": "Program",
         "roughvisc.study.simulate": "simulate",
-        "roughvisc.study.case": "read_study",
+        "roughvisc.study.case": "read_study read_cases vary study_schema",
+        "roughvisc.study.store": "open_result",
         "roughvisc.study.run": "run",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
     }.items()

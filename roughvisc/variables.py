@@ -54,6 +54,7 @@ VARIABLES: dict[str, Variable] = {
     "y": Variable(("y",), "m", "position of the cell centre along y"),
     # the surface
     "height": Variable(_GRID, "m", "height of the rigid profile, peaks up", "as conditioned; missing where absent"),
+    "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
     "pressure": Variable(_FRAME, "Pa", "contact pressure", "zero outside the contact and where the profile is absent"),
     "gap": Variable(

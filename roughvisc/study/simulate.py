@@ -347,9 +347,12 @@ def _dataset(
     for counter in ("iterations", "convolutions"):
         columns[counter] = np.diff(columns[counter], prepend=0)
     stamp = columns.pop("time")
-    variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float))}
-    for name, values in columns.items():
-        variables[name] = (("time", "x", "y") if name in fields else ("time",), values)
+    variables: dict[str, Any] = {
+        name: (("time", "x", "y") if name in fields else ("time",), values) for name, values in columns.items()
+    }
+    variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float))
+    if "filled" in height.coords:
+        variables["filled"] = (("x", "y"), height["filled"].values)
     dataset = xr.Dataset(
         variables,
         coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values},
