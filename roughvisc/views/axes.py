@@ -200,14 +200,14 @@ class TimeAxis:
         ax.set_xlabel(self.unit.label("Time"))
 
 
-def spread_axis(axis: Axis, shown) -> None:
-    """Make one axis logarithmic where the values on it span a decade or more, with plain readable ticks."""
+def spread_axis(axis: Axis, shown, always: bool = False) -> None:
+    """Make one axis logarithmic where the values on it span a decade or more, or always, with readable ticks."""
     shown = np.asarray(shown, dtype=float)
     shown = shown[np.isfinite(shown) & (shown > 0)]
-    if not shown.size or shown.max() < 10 * shown.min():
+    if not shown.size or (shown.max() < 10 * shown.min() and not always):
         return
     (axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale)("log")
-    if shown.max() < 300 * shown.min():
+    if shown.max() < (30 if axis.axis_name == "x" else 300) * shown.min():
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=99))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

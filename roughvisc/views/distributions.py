@@ -183,6 +183,7 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
             if len(row) == 1:
                 ax.plot(row, [1], "o", color=colour)
     if np.isfinite(areas).any():
+        ax.locator_params(axis="x", nbins=4)
         spread_axis(ax.xaxis, unit(areas))
         spread_axis(ax.yaxis, [1, np.isfinite(areas).sum(axis=1).max()])
         if ax.get_yscale() == "log":

@@ -206,7 +206,7 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> Non
             ax.remove()
             continue
         lowest = field == fields - 1 and number + columns >= len(frames)
-        ax.locator_params(axis="x", nbins=4)
+        ax.locator_params(axis="x", nbins=4 if plane_ratio(dataset) < 2 else 1)
         ax.locator_params(axis="y", nbins=4 if plane_ratio(dataset) > 0.25 else 1)
         ax.tick_params(labelbottom=lowest, labelleft=column == 0, direction="out")
         ax.set_xlabel(plane.label("x") if lowest else "")
