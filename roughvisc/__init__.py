@@ -1,1 +1,49 @@
-"""Contact of measured rough surfaces with linear viscoelastic materials."""
+"""Contact of measured rough surfaces with linear viscoelastic materials.
+
+``import roughvisc as rv`` gives the public names below; each is imported from its module when first used, so that
+the package itself is imported in no time.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module, metadata
+from typing import Any
+
+#: public name -> module that defines it
+_PUBLIC = {
+    name: module
+    for module, names in {
+        "roughvisc.topography.readers": "open_scan from_array supported_formats list_channels",
+        "roughvisc.topography.conditioning": (
+            "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror"
+        ),
+        "roughvisc.topography.parameters": "parameters psd",
+        "roughvisc.topography.synthesis": "sphere cone flat_punch wavy self_affine",
+        "roughvisc.mechanics.materials": "Prony elastic maxwell kelvin_voigt zener from_relaxation",
+        "roughvisc.mechanics.loading": "Program",
+        "roughvisc.study.simulate": "simulate",
+        "roughvisc.study.case": "read_study",
+        "roughvisc.study.run": "run",
+        "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
+    }.items()
+    for name in names.split()
+}
+_MODULES = {"plot": "roughvisc.views.plot", "closed_forms": "roughvisc.mechanics.closed_forms"}
+
+__all__ = ["__version__", *sorted(_PUBLIC), *sorted(_MODULES)]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(_MODULES[name])
+    if name in _PUBLIC:
+        value = getattr(import_module(_PUBLIC[name]), name)
+        globals()[name] = value
+        return value
+    if name == "__version__":
+        return metadata.version("roughvisc")
+    raise AttributeError(f"module 'roughvisc' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

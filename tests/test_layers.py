@@ -14,11 +14,12 @@ PACKAGE = ROOT / "roughvisc"
 ALLOWED = {
     "errors": set(),
     "variables": set(),
+    "units": {"errors"},
     "mechanics": {"errors"},
-    "topography": {"errors", "variables"},
-    "study": {"errors", "variables", "mechanics", "topography"},
+    "topography": {"errors", "variables", "units"},
+    "study": {"errors", "variables", "units", "mechanics", "topography"},
     "views": {"errors", "variables", "study"},
-    "cli": {"errors", "variables", "mechanics", "topography", "study", "views", "__init__"},
+    "cli": {"errors", "variables", "units", "mechanics", "topography", "study", "views", "__init__"},
 }
 #: libraries that a floor may not import at all
 FORBIDDEN = {

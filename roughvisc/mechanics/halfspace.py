@@ -1,0 +1,144 @@
+"""Half-space of unit contact compliance: pressure to surface displacement, and back approximately.
+
+A :class:`HalfSpace` knows a grid and its boundary. It knows neither material, time nor contact.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.kernel import free_space_symbol, periodic_symbol
+
+Array = NDArray[np.float64]
+Boundary = Literal["free", "periodic"]
+
+# Columns transformed together: the block and its transform stay in the cache (measured at 128 to 1024 squared).
+_BLOCK = 32
+
+
+class HalfSpace:
+    """Surface of an elastic half-space of unit contact compliance, sampled by equal rectangular cells.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+    boundary : {"free", "periodic"}
+        Free space (nothing outside the grid is loaded) or one period of an endless surface.
+    workers : int
+        Threads of the transforms.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        spacing: tuple[float, float],
+        boundary: Boundary = "free",
+        workers: int = 1,
+    ) -> None:
+        if boundary not in ("free", "periodic"):
+            raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
+        self.shape = shape
+        self.spacing = spacing
+        self.boundary = boundary
+        self.workers = workers
+        if boundary == "free":
+            self._padded = tuple(2 * fft.next_fast_len(n, real=True) for n in shape)
+            symbol = free_space_symbol((self._padded[0], self._padded[1]), spacing)
+        else:
+            self._padded = shape
+            symbol = periodic_symbol(shape, spacing)
+        self._symbol = _both_signs(symbol, self._padded[0])
+
+    @property
+    def cell_area(self) -> float:
+        """Area of one cell. [m2]"""
+        return self.spacing[0] * self.spacing[1]
+
+    @cached_property
+    def largest_influence(self) -> float:
+        """Largest eigenvalue of the influence matrix, or a bound on it. [m]"""
+        return float(np.max(self._symbol)) or self.spacing[0]
+
+    @cached_property
+    def self_influence(self) -> float:
+        """Displacement of a cell under unit pressure on it alone. [m]"""
+        unit = np.zeros(self.shape)
+        unit[0, 0] = 1
+        return float(self.displacement(unit)[0, 0])
+
+    def displacement(self, pressure: Array) -> Array:
+        """Surface displacement under a pressure: one convolution.
+
+        Parameters
+        ----------
+        pressure : ndarray, shape (nx, ny)
+            Pressure over the contact modulus. [-]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            Displacement; with periodic boundaries its mean is zero. [m]
+        """
+        if self.boundary == "periodic":
+            return self._filtered(pressure, self._symbol)
+        (nx, ny), (mx, my) = self.shape, self._padded
+        # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
+        # columns go forward, are multiplied and come back while they stay in the cache.
+        rows = fft.rfft(pressure, n=my, axis=1, workers=self.workers)
+        for start in range(0, rows.shape[1], _BLOCK):
+            block = slice(start, start + _BLOCK)
+            columns = fft.fft(rows[:, block], n=mx, axis=0, workers=self.workers)
+            columns *= self._symbol[:, block]
+            rows[:, block] = fft.ifft(columns, axis=0, overwrite_x=True, workers=self.workers)[:nx]
+        return fft.irfft(rows, n=my, axis=1, overwrite_x=True, workers=self.workers)[:, :ny]
+
+    def approximate_inverse(self, displacement: Array) -> Array:
+        """Pressure that causes about this displacement: the preconditioner of the contact solver.
+
+        Parameters
+        ----------
+        displacement : ndarray, shape (nx, ny)
+            [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            Pressure over the contact modulus, good to single precision. [-]
+
+        Notes
+        -----
+        The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
+        positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
+        """
+        largest = float(np.max(np.abs(displacement))) or 1.0  # the range of single precision is small
+        pressure = self._filtered((displacement / largest).astype(np.float32), self._inverse_symbol)
+        return pressure.astype(float) * (largest / self._inverse_scale)
+
+    @cached_property
+    def _inverse_symbol(self) -> NDArray[np.float32]:
+        symbol = periodic_symbol(self.shape, self.spacing) / self._inverse_scale
+        symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or 1.0
+        return _both_signs(1 / symbol, self.shape[0]).astype(np.float32)
+
+    @property
+    def _inverse_scale(self) -> float:
+        return max(self.spacing)
+
+    def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
+        field_q = fft.rfft2(field, workers=self.workers)
+        field_q *= symbol
+        return fft.irfft2(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+
+
+def _both_signs(symbol: Array, length: int) -> Array:
+    """Symbol for all wave numbers along x, positive then negative, as ``scipy.fft`` orders them."""
+    return np.concatenate([symbol, symbol[1 : length - length // 2][::-1]])

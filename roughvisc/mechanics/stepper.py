@@ -1,0 +1,626 @@
+"""The march through time: predict, solve, accept, yield.
+
+:func:`march` presses a profile on a half-space through a loading program and yields every accepted step. It reduces
+each step to an elastic contact problem by the memory, and chooses the steps by an error estimate that costs nothing:
+the difference between a solution and the linear extrapolation it was started from.
+
+All settings are a frozen :class:`Scene`, all that changes is a :class:`State`, a plain value: a rejected step costs
+no state, and a march goes on from any state that it yielded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import EdgeContactError, InputError
+from roughvisc.mechanics.contact import ContactState, solve_contact
+from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.loading import Program, Segment
+from roughvisc.mechanics.materials import Material
+from roughvisc.mechanics.memory import Memory, Rule, stiff_ratio
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
+_SHARE = 0.4
+# The relative duality gap of each step's contact problem, in units of the tolerance (the error in pressure, L1, is
+# about the gap); under given approach the force is not fixed, and ten times less is needed.
+_ALGEBRAIC = {"load": 0.1, "approach": 0.01}
+# A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
+# shows its pressure through one discarded short solve.
+_SOFT = 0.1
+_SMALLEST_STEP = 1e-6  # of the segment
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is prescribed: nothing in it changes while the march goes on.
+
+    Attributes
+    ----------
+    halfspace : HalfSpace
+        Grid and boundary.
+    gap : ndarray, shape (nx, ny)
+        Undeformed gap at first touch, zero at the highest peak; any finite number where absent. [m]
+    material, memory : Material, Memory
+        The material and the form in which its past is kept.
+    program : Program
+        What is prescribed, when.
+    times : tuple of float or None
+        Times to step onto exactly, ascending; None: none but the program's corners. [s]
+    tolerance : float
+        On the relative error in time of pressure (L1) and approach, relative to the largest values so far.
+    time_step : float or None
+        Fixed step; None chooses steps by the tolerance. [s]
+    present : ndarray of bool or None
+        Cells where there is material; None: all.
+    accept_edge : bool
+        In free space, whether cells at the border of the grid may carry pressure.
+    """
+
+    halfspace: HalfSpace
+    gap: Array
+    material: Material
+    memory: Memory
+    program: Program
+    times: tuple[float, ...] | None = None
+    tolerance: float = 1e-3
+    time_step: float | None = None
+    present: Mask | None = None
+    accept_edge: bool = False
+
+    def lowest(self, field: Array) -> float:
+        """Least value over the present cells."""
+        return float(np.min(field if self.present is None else field[self.present]))
+
+    def compliance(self, t: float) -> float:
+        """Contact compliance. [1/Pa]"""
+        return float(self.material.contact_compliance(t))
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A state of the surfaces at one time.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    pressure, displacement : ndarray, shape (nx, ny)
+        Pressure [Pa] and total displacement of the half-space [m].
+    force, approach : float
+        [N], [m]
+    """
+
+    time: float
+    pressure: Array
+    displacement: Array
+    force: float
+    approach: float
+
+
+@dataclass(frozen=True)
+class State:
+    """All that a march needs to go on: a plain value.
+
+    Attributes
+    ----------
+    now, before : Instant
+        The present instant, and the one before if the next step may extrapolate from it.
+    memory : object
+        State of the memory at the present instant.
+    segment : int
+        Index of the segment of the program.
+    began, start : float
+        Time at which the segment began [s], and the value of what it controls then [N or m].
+    suggestion : float
+        Length of the next step; zero after an event. [s]
+    largest_force, largest_approach : float
+        So far. [N], [m]
+    contact_since : float
+        Time at which the surfaces last came into contact. [s]
+    unresolved : bool
+        Whether a jump was prescribed that the material cannot follow at once.
+    blind : bool
+        Whether the next estimate leaves the pressure out, once.
+    rejected_error : float
+        Estimate of the last attempt at this step, if it was rejected.
+    iterations, convolutions : int
+        Spent so far, rejected steps included.
+    """
+
+    now: Instant
+    memory: Any
+    before: Instant | None = None
+    segment: int = 0
+    began: float = 0.0
+    start: float = 0.0
+    suggestion: float = 0.0
+    largest_force: float = 0.0
+    largest_approach: float = 0.0
+    contact_since: float = 0.0
+    unresolved: bool = False
+    blind: bool = False
+    rejected_error: float = math.inf
+    iterations: int = 0
+    convolutions: int = 0
+
+
+@dataclass(frozen=True)
+class Step:
+    """An accepted step.
+
+    Attributes
+    ----------
+    shown : Instant
+        What to report: the state's present instant, its pressure resolved where the material cannot jump.
+    level : float
+        Rigid-body approach that belongs to ``shown.displacement``: ``gap = undeformed gap + displacement - level``. [m]
+    bound : float
+        Bound on the relative error of the pressure left by the contact solver, in the energy norm.
+    time_error : float
+        Estimated relative error in time of this step; NaN where no estimate was made.
+    converged : bool
+        Whether the contact solver reached its tolerance.
+    state : State
+        The state after the step.
+    """
+
+    shown: Instant
+    level: float
+    bound: float
+    time_error: float
+    converged: bool
+    state: State
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A step that was computed and is not yet accepted."""
+
+    instant: Instant
+    field: Array  # what the memory acts on
+    length: float
+    rule: Rule
+    contact: ContactState | None  # None while the surfaces are apart
+
+
+def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
+    """Press a profile through a loading program, step by step.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    state : State, optional
+        Where to go on from, as yielded by an earlier march through the same scene; None: from rest.
+
+    Yields
+    ------
+    Step
+        Each accepted step, in order; at a jump the right-hand state only, except where the material cannot jump:
+        then the left-hand one.
+
+    Raises
+    ------
+    InputError
+        If a jump of approach is prescribed to a material without instantaneous compliance, a load cannot be
+        carried, or an approach exceeds full contact.
+    EdgeContactError
+        If contact reached the border of a free-space grid.
+    """
+    segments = scene.program.segments
+    if state is None:
+        state = _rest(scene)
+        if segments and segments[0].duration > 0:
+            yield _step(scene, state, None, math.nan)
+    while state.segment < len(segments):
+        segment = segments[state.segment]
+        if segment.duration == 0:
+            state, trial = _jump(scene, state, segment)
+            following = segments[state.segment : state.segment + 1]
+            right_hand = _can_jump(scene) or state.now.time == 0
+            if right_hand and not (following and following[0].duration == 0):
+                yield _step(scene, state, trial, math.nan)
+        else:
+            for step in _through(scene, state, segment):
+                state = step.state
+                corner = state.segment < len(segments) and state.now.time == state.began
+                if not (corner and segments[state.segment].duration == 0 and _can_jump(scene)):
+                    yield step
+
+
+def _rest(scene: Scene) -> State:
+    shape = scene.halfspace.shape
+    now = Instant(0.0, np.zeros(shape), np.zeros(shape), 0.0, scene.lowest(scene.gap))
+    return State(now, scene.memory.start(shape))
+
+
+def _can_jump(scene: Scene) -> bool:
+    return scene.compliance(0.0) > 0
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# one step
+
+
+def _attempt(scene: Scene, state: State, control: str, value: float, length: float, rule: Rule) -> _Trial:
+    """Contact state a step ahead, where the load or the approach has a given value."""
+    alpha, carried = scene.memory.predict(state.memory, length, rule)
+    extra = 0
+    if scene.memory.acts_on == "pressure":
+        carried = scene.halfspace.displacement(carried)
+        extra = 1
+    gap = scene.gap + carried
+    time = state.now.time + length
+    apart = value == 0 if control == "load" else value <= scene.lowest(gap)
+    if apart:
+        approach = scene.lowest(gap) if control == "load" else value
+        nothing = np.zeros_like(gap)
+        return _Trial(Instant(time, nothing, carried, 0.0, approach), nothing, length, rule, None)
+    if alpha <= 0:
+        raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
+    area = scene.halfspace.cell_area
+    contact = solve_contact(
+        scene.halfspace,
+        gap,
+        load=value * alpha / area if control == "load" else None,
+        approach=value if control == "approach" else None,
+        tolerance=_ALGEBRAIC[control] * scene.tolerance,
+        start=_extrapolated(state, length) * alpha,
+        present=scene.present,
+    )
+    contact = replace(contact, convolutions=contact.convolutions + extra)
+    pressure = contact.pressure / alpha
+    instant = Instant(
+        time,
+        pressure,
+        carried + contact.displacement,
+        value if control == "load" else contact.load / alpha * area,
+        value if control == "approach" else contact.approach,
+    )
+    field = pressure if scene.memory.acts_on == "pressure" else contact.displacement / alpha
+    return _Trial(instant, field, length, rule, contact)
+
+
+def _extrapolated(state: State, length: float) -> Array:
+    """Pressure a step ahead by the last two; the last one where there is no other."""
+    if state.before is None or length == 0:
+        return state.now.pressure
+    ratio = length / (state.now.time - state.before.time)
+    return np.maximum(state.now.pressure + ratio * (state.now.pressure - state.before.pressure), 0)
+
+
+def _committed(scene: Scene, state: State, trial: _Trial) -> State:
+    """State after an accepted trial."""
+    memory = scene.memory.advance(state.memory, trial.length, trial.rule, trial.field)
+    now = trial.instant
+    touching = now.force > 0
+    return replace(
+        state,
+        now=now,
+        before=state.now if trial.length > 0 else None,
+        memory=memory,
+        largest_force=max(state.largest_force, now.force),
+        largest_approach=max(state.largest_approach, abs(now.approach)),
+        contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
+        unresolved=False,
+        blind=False,
+    )
+
+
+def _spent(state: State, trial: _Trial) -> State:
+    if trial.contact is None:
+        return state
+    return replace(
+        state,
+        iterations=state.iterations + trial.contact.iterations,
+        convolutions=state.convolutions + trial.contact.convolutions,
+    )
+
+
+def _step(scene: Scene, state: State, trial: _Trial | None, time_error: float) -> Step:
+    """What is yielded of an accepted trial."""
+    contact = trial.contact if trial is not None else None
+    if contact is None:
+        return Step(state.now, state.now.approach, 0.0, time_error, True, state)
+    if trial is not None and trial.length > 0 and _kept(scene, state.now.time):
+        creep = scene.compliance(trial.length)
+        if scene.compliance(0.0) < _SOFT * creep:
+            # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
+            # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
+            sharp = _attempt(scene, replace(state, before=None), "load", state.now.force, 1e-3 * trial.length, "right")
+            state = _spent(state, sharp)
+            shown = replace(state.now, pressure=sharp.instant.pressure, displacement=sharp.instant.displacement)
+            assert sharp.contact is not None
+            converged = contact.converged and sharp.contact.converged
+            return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, state)
+    return Step(state.now, state.now.approach, contact.bound, time_error, contact.converged, state)
+
+
+def _kept(scene: Scene, time: float) -> bool:
+    return scene.times is None or time in scene.times
+
+
+def check_edge(scene: Scene, pressure: Array, time: float) -> None:
+    """Refuse pressure at the border of a free-space grid, which would act as the edge of a punch."""
+    if scene.halfspace.boundary != "free" or scene.accept_edge:
+        return
+    border = [pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]]
+    if any(np.any(side > 0) for side in border):
+        raise EdgeContactError(
+            f"at {time:.6g} s contact reaches the border of the free-space domain of "
+            f"{scene.halfspace.shape[0]} x {scene.halfspace.shape[1]} cells: expected contact inside it; "
+            "use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or edge='accept' "
+            "to press it as a punch of that outline"
+        )
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# events: jumps, corners, contact lost and found
+
+
+def _entered(scene: Scene, state: State) -> State:
+    """State at the start of the next segment."""
+    segments = scene.program.segments
+    index = state.segment + 1
+    start = 0.0
+    if index < len(segments):
+        start = state.now.force if segments[index].control == "load" else state.now.approach
+    return replace(
+        state,
+        segment=index,
+        began=state.now.time,
+        start=start,
+        before=None,
+        suggestion=0.0,
+        memory=scene.memory.restart(state.memory),
+    )
+
+
+def _jump(scene: Scene, state: State, segment: Segment) -> tuple[State, _Trial | None]:
+    """Zero-length segment: solved with the instantaneous compliance; left for the next step if there is none."""
+    value = segment.value(0.0, state.start)
+    current = state.now.force if segment.control == "load" else state.now.approach
+    if value == current:
+        return _entered(scene, state), None
+    if not _can_jump(scene):
+        if segment.control == "approach":
+            raise InputError(
+                f"at {state.now.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
+                "compliance: expected a ramp (over > 0), or a material that can jump"
+            )
+        entered = _entered(scene, state)
+        following = scene.program.segments[entered.segment : entered.segment + 1]
+        start = value if following and following[0].control == "load" else entered.start
+        return replace(entered, unresolved=True, start=start), None
+    trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
+    check_edge(scene, trial.instant.pressure, state.now.time)
+    return _entered(scene, _committed(scene, _spent(state, trial), trial)), trial
+
+
+def next_event(scene: Scene, state: State, end: float) -> float:
+    """Next kept time or the end of the segment, whichever comes first. [s]"""
+    if scene.times is None:
+        return end
+    return min((t for t in scene.times if state.now.time < t < end), default=end)
+
+
+def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
+    """Accepted steps through a segment; the last one has entered the next segment."""
+    end = scene.program.corners[state.segment + 1]
+    held: Step | None = None  # first step after an event: provisional until the second one confirms it
+    base = state
+    while state.now.time < end:
+        event = next_event(scene, state, end)
+        fresh = state.before is None
+        if fresh and state.now.force == 0 and not state.unresolved:
+            closing = _closing_time(scene, state, segment, event)
+            if closing > state.now.time:
+                state, trial = _carry_apart(scene, state, segment, closing, end)
+                if state.now.time in (event, end):
+                    yield _step(scene, state, trial, math.nan)
+                continue
+        length = _length(scene, state, segment, event, end)
+        arrival = event if length == event - state.now.time else state.now.time + length
+        rule = _rule(scene, state, length)
+        trial = _attempt(scene, state, segment.control, segment.value(arrival - state.began, state.start), length, rule)
+        trial = replace(trial, instant=replace(trial.instant, time=arrival))
+        state = _spent(state, trial)
+        error = _estimate(scene, state, trial, segment, event)
+        limit = _SHARE * scene.tolerance * (1 if _kept(scene, arrival) else 2)
+        fixed = scene.time_step is not None
+        retry_is_vain = error > 0.93 * state.rejected_error
+        if not fixed and error > limit and length > _SMALLEST_STEP * segment.duration and not retry_is_vain:
+            shrink = min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
+            spent = (state.iterations, state.convolutions)
+            if held is not None:  # roll back both
+                length, held, state = held.state.now.time - base.now.time, None, base
+            state = replace(
+                state,
+                suggestion=shrink * length,
+                rejected_error=error,
+                iterations=spent[0],
+                convolutions=spent[1],
+            )
+            continue
+        check_edge(scene, trial.instant.pressure, arrival)
+        unresolved = state.unresolved
+        accepted = _committed(scene, state, trial)
+        accepted = replace(
+            accepted,
+            suggestion=_suggestion(scene, trial, error, state),
+            blind=retry_is_vain and error > limit,
+            rejected_error=state.rejected_error if fresh else math.inf,
+        )
+        if unresolved:  # the first short step stands for the jump
+            accepted = replace(accepted, before=None, suggestion=length, memory=scene.memory.restart(accepted.memory))
+        if arrival == end:
+            accepted = _entered(scene, accepted)
+        step = _step(scene, accepted, trial, error)
+        if held is not None:
+            yield held
+            held = None
+        if fresh and not fixed and not unresolved and arrival < end:
+            base, held = replace(state, suggestion=length), step
+        else:
+            yield step
+        state = step.state
+
+
+def _closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:
+    """Time up to which the surfaces, apart now, stay apart; the present time if they touch at once."""
+    now = state.now.time
+
+    def apart(time: float) -> bool:
+        value = segment.value(time - state.began, state.start)
+        if segment.control == "load":
+            return value == 0
+        _, carried = scene.memory.predict(state.memory, time - now, "linear")
+        if scene.memory.acts_on == "pressure":
+            carried = scene.halfspace.displacement(carried)
+        return value <= scene.lowest(scene.gap + carried)
+
+    if segment.control == "load":
+        return event if apart(event) and apart(now + (event - now) / 2) else now
+    inside = now
+    for probe in np.linspace(now, event, 17)[1:]:
+        if not apart(float(probe)):
+            outside = float(probe)
+            break
+        inside = float(probe)
+    else:
+        return event
+    while outside - inside > 1e-9 * (event - now):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if apart(middle) else (inside, middle)
+    return inside if inside - now > 1e-6 * (event - now) else now
+
+
+def _carry_apart(scene: Scene, state: State, segment: Segment, until: float, end: float) -> tuple[State, _Trial]:
+    """One exact step without contact."""
+    value = segment.value(until - state.began, state.start)
+    length = until - state.now.time
+    apart_before = not np.any(state.now.pressure)
+    trial = _attempt(scene, state, segment.control, value, length, "linear" if apart_before else "euler")
+    trial = replace(trial, instant=replace(trial.instant, time=until))
+    carried = replace(_committed(scene, state, trial), before=None, suggestion=0.0)
+    carried = replace(carried, memory=scene.memory.restart(carried.memory))
+    return (_entered(scene, carried) if until == end else carried), trial
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the choice of steps
+
+
+def _memory_share(scene: Scene) -> float:
+    """Part of the compliance that comes with time: how much a wrong past can matter."""
+    final = scene.compliance(scene.program.duration)
+    return 1 - scene.compliance(0.0) / final if final > 0 else 0.0
+
+
+def _length(scene: Scene, state: State, segment: Segment, event: float, end: float) -> float:
+    """Length of the next step, landing exactly on events and never leaving a splinter before one."""
+    distance = event - state.now.time
+    if scene.time_step is not None:
+        return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
+    length = state.suggestion or _first_length(scene, state, segment, event)
+    length = max(length, _SMALLEST_STEP * segment.duration)
+    if length >= distance * (1 - 1e-9):
+        return distance
+    return distance / 2 if length > distance / 2 else length
+
+
+def _first_length(scene: Scene, state: State, segment: Segment, event: float) -> float:
+    """Length of the first step after an event."""
+    share = _memory_share(scene)
+    if share == 0:
+        return math.inf if scene.times is not None else segment.duration / 20
+    allowed = math.sqrt(12 * _SHARE * scene.tolerance)
+    span = min(segment.duration, segment.period)
+    length = min(0.2 * span * allowed, _time_of_creep(scene, allowed, span))
+    if state.now.force == 0:
+        length = min(length, 2 * _SHARE * scene.tolerance * (event - state.now.time))
+    if state.unresolved:
+        length = min(length, _SHARE * scene.tolerance * span)
+    return length
+
+
+def _time_of_creep(scene: Scene, relative: float, span: float) -> float:
+    """Time in which the compliance grows by a part of its instantaneous value; ``span`` if longer or if none."""
+    glassy = scene.compliance(0.0)
+    if glassy == 0 or scene.compliance(span) < (1 + relative) * glassy:
+        return span
+    low, high = 1e-12 * span, span
+    while high > 1.1 * low:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if scene.compliance(middle) < (1 + relative) * glassy else (low, middle)
+    return low
+
+
+def _rule(scene: Scene, state: State, length: float) -> Rule:
+    """Piecewise-linear pressure where it does not ring, else the damped two-step rule or its start."""
+    if state.before is None:
+        return "linear" if scene.compliance(0.0) >= _SOFT * scene.compliance(length) else "euler"
+    if stiff_ratio(scene.material, length) <= 0.5:
+        return "linear"
+    # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
+    return "bdf2" if length <= 2.4 * (state.now.time - state.before.time) else "euler"
+
+
+def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event: float) -> float:
+    """Relative error in time of a step, from its difference to the extrapolation; NaN without one."""
+    if state.before is None:
+        return math.nan
+    share = _memory_share(scene)
+    if share == 0:
+        return 0.0
+    last = state.now.time - state.before.time
+    constant = trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
+    ahead = max(1.0, _growth(state, segment, trial.instant.time, event))
+    soft = 1.0
+    if segment.control == "load" and scene.compliance(0.0) < 0.01 * scene.compliance(trial.length):
+        since = state.contact_since
+        elapsed = scene.compliance(trial.instant.time - since)
+        soft = scene.compliance(max(event, trial.instant.time) - since) / elapsed if elapsed > 0 else 1.0
+    force = max(state.largest_force, trial.instant.force * ahead)
+    approach = max(state.largest_approach, abs(trial.instant.approach) * ahead * soft)
+    difference = float(np.sum(np.abs(trial.instant.pressure - _extrapolated(state, trial.length))))
+    pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
+    ratio = trial.length / last
+    if segment.control == "load":
+        found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach
+    else:
+        found, now, before, scale = trial.instant.force, state.now.force, state.before.force, force
+    scalar_error = abs(found - (now + ratio * (now - before))) / scale if scale > 0 else 0.0
+    return share * constant * max(pressure_error, scalar_error)
+
+
+def _growth(state: State, segment: Segment, time: float, event: float) -> float:
+    """What is prescribed at the next event over what is now: errors are relative to the larger."""
+    now = segment.value(time - state.began, state.start)
+    then = segment.value(event - state.began, state.start)
+    return then / now if now > 0 else 1.0
+
+
+def _suggestion(scene: Scene, trial: _Trial, error: float, state: State) -> float:
+    """Length of the next step."""
+    if math.isnan(error) or state.before is None:
+        return trial.length
+    if error == 0:
+        return 2 * trial.length
+    last = state.now.time - state.before.time
+    constant = trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
+    curvature = error / (constant * trial.length * (trial.length + last))
+    target = _SHARE * scene.tolerance / curvature
+    length = math.sqrt(4.2 * target)
+    if stiff_ratio(scene.material, length) > 0.5:
+        length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + 8.4 * target))
+    return min(max(length, 0.2 * trial.length), 2 * trial.length)

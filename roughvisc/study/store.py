@@ -1,0 +1,181 @@
+"""Results in NetCDF files: written whole or not at all, and read lazily.
+
+CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them as they are.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.variables import annotate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Variables where a value may be missing and NaN says so; any other has none, and no fill value.
+MAY_BE_MISSING = frozenset({"height", "gap", "time_error"})
+#: The longest side of a chunk: a map of 1024 x 1024 doubles is 8 MB.
+_LONGEST_CHUNK = 1024
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.
+
+    Parameters
+    ----------
+    path : path
+        The file to be. Its folder is made if need be.
+
+    Yields
+    ------
+    Path
+        A temporary name in the same folder, with the same suffix.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written to.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path.parent}: may not be written to: expected a folder with write permission")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    try:
+        yield temporary
+        _sync(temporary)
+        os.replace(temporary, path)
+        _sync(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Have the operating system put a file, or the names in a folder, on the disk."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:  # a folder, on Windows
+        if path.is_dir():
+            return
+        raise
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write a result to one NetCDF file, by a temporary file and a rename.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Declared variables only; see :mod:`roughvisc.variables`.
+    path : path
+        The file to write; one of that name is replaced.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If a variable is not declared, or its dimensions differ.
+    InputError
+        If the folder cannot be written to.
+
+    Notes
+    -----
+    One time step of a field is a chunk, a history is one chunk; zlib level 1 with shuffle, the one filter that every
+    reader has. ``_FillValue`` is declared only where a value may be missing.
+    """
+    dataset = annotate(dataset)
+    dataset.attrs = {"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs)
+    for name in dataset.variables:
+        dataset[name].attrs = plain_attributes(dataset[name].attrs)
+        dataset[name].encoding = {}
+    encoding = {str(name): _encoding(dataset[name]) for name in dataset.variables}
+    with whole_file(path) as temporary:
+        dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+    return Path(path)
+
+
+def _encoding(variable: xr.DataArray) -> dict[str, Any]:
+    encoding: dict[str, Any] = {"_FillValue": None}
+    if variable.dtype.kind == "f" and variable.name in MAY_BE_MISSING:
+        encoding["_FillValue"] = variable.dtype.type(np.nan)
+    if variable.ndim and variable.size:
+        encoding |= {"zlib": True, "complevel": 1, "shuffle": True, "chunksizes": _chunks(variable.shape)}
+    return encoding
+
+
+def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    if len(shape) < 2:
+        return shape
+    return (*(1 for _ in shape[:-2]), *(min(n, _LONGEST_CHUNK) for n in shape[-2:]))
+
+
+def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Attributes as NetCDF can hold them: no None, no booleans, no nested values."""
+    plain: dict[str, Any] = {}
+    for name, value in attributes.items():
+        if value is None:
+            continue
+        if isinstance(value, bool | np.bool_):
+            value = np.int8(value)
+        elif not isinstance(value, str | int | float | np.generic | np.ndarray | list | tuple):
+            value = str(value)
+        plain[str(name)] = value
+    return plain
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Open a result; its data are read when they are asked for.
+
+    Parameters
+    ----------
+    path : path
+        A file written by :func:`write_result`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Times are plain numbers in seconds.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, is no NetCDF file, is damaged, or holds something else.
+    """
+    import xarray as xr
+
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
+    try:
+        dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(
+            f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
+        ) from error
+    absent = [name for name in ("time", "force", "approach") if name not in dataset.variables]
+    if absent:
+        dataset.close()
+        raise InputError(f"{path}: holds no {', '.join(absent)}: expected a result of roughvisc")
+    return dataset

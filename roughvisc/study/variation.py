@@ -1,0 +1,96 @@
+"""Sweeps: which values are set in which case of a study."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from roughvisc.errors import InputError
+
+Refusal = Callable[[str, str], InputError]
+
+
+def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
+    """Changes that make each case of a sweep: dotted key -> value.
+
+    Parameters
+    ----------
+    sweep : dict or list of dict
+        ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
+        table. A value that is no list holds for its whole table.
+    refusal : callable
+        Makes the error to raise from a dotted key and what is wrong with it.
+
+    Returns
+    -------
+    list of dict
+        One empty dict without a sweep.
+
+    Examples
+    --------
+    >>> expand({"a": [1, 2], "b": [3, 4]}, ValueError)
+    [{'a': 1, 'b': 3}, {'a': 1, 'b': 4}, {'a': 2, 'b': 3}, {'a': 2, 'b': 4}]
+    >>> expand([{"a": [1, 2], "b": [3, 4]}, {"a": 5}], ValueError)
+    [{'a': 1, 'b': 3}, {'a': 2, 'b': 4}, {'a': 5}]
+    """
+    if isinstance(sweep, Mapping):
+        keys = dict(_flat(sweep))
+        for key, values in keys.items():
+            if not isinstance(values, list) or not values:
+                raise refusal(f"sweep.{key}", f"found {values!r}: expected a list of values")
+        return [dict(zip(keys, chosen, strict=True)) for chosen in itertools.product(*keys.values())]
+    if not isinstance(sweep, list) or not all(isinstance(table, Mapping) and table for table in sweep):
+        raise refusal("sweep", f"found {sweep!r}: expected a table of lists, or [[sweep]] tables")
+    return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)), refusal)]
+
+
+def _zipped(number: int, table: Mapping[str, Any], refusal: Refusal) -> list[dict[str, Any]]:
+    lengths = {key: len(values) for key, values in table.items() if isinstance(values, list)}
+    if len(set(lengths.values())) > 1 or 0 in lengths.values():
+        found = ", ".join(f"{length} for {key}" for key, length in lengths.items())
+        raise refusal(f"sweep.{number}", f"found {found}: expected lists of one length, at least 1")
+    runs = next(iter(lengths.values()), 1)
+    return [{key: v[run] if isinstance(v, list) else v for key, v in table.items()} for run in range(runs)]
+
+
+def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys of a table, whether it was written with quotes (``"a.b" = ...``) or without (``a.b = ...``)."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """A copy of nested tables with the value at a dotted key set.
+
+    Raises
+    ------
+    InputError
+        If the key leads through something that is no table, or to a segment that is not there.
+
+    Examples
+    --------
+    >>> place({"program": [{"load": 1}]}, "program.0.load", 2)
+    {'program': [{'load': 2}]}
+    """
+    changed = copy.deepcopy(dict(data))
+    here: Any = changed
+    parts: list[Any] = key.split(".")
+    for depth, part in enumerate(parts):
+        last = depth == len(parts) - 1
+        if isinstance(here, list):
+            if not part.isdecimal() or int(part) >= len(here):
+                above = ".".join(parts[:depth])
+                raise InputError(f"found {part!r}: {above} has entries 0 to {len(here) - 1}")
+            part = int(part)
+        elif not isinstance(here, dict):
+            raise InputError(f"{'.'.join(parts[:depth])} is {here!r}, which has no keys")
+        if last:
+            here[part] = value
+        else:
+            here = here.setdefault(part, {}) if isinstance(here, dict) else here[part]
+    return changed

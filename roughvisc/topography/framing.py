@@ -1,0 +1,158 @@
+"""Framing of scans: what is cut out, which way it lies, what faces what, and how its border is made to repeat."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import checked, like, noted, pair, spacing, valid_values, with_coordinates
+
+
+def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> xr.DataArray:
+    """The part of a scan whose cell centres lie within limits.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    x, y : pair of float, optional
+        Lower and upper limit of each coordinate; default: all. [m]
+
+    Returns
+    -------
+    xarray.DataArray
+        The part; its coordinates are those that it had. [m]
+
+    Raises
+    ------
+    InputError
+        If limits are no pair, or fewer than two cells lie within in a direction.
+    """
+    h = checked(h, "crop")
+    for axis, limits in (("x", x), ("y", y)):
+        if limits is None:
+            continue
+        try:
+            low, high = (float(limit) for limit in limits)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"crop: {axis} is {limits!r}: expected a pair (low, high) [m]") from error
+        inside = (h[axis].values >= low) & (h[axis].values <= high)
+        if inside.sum() < 2:
+            held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
+            raise InputError(f"crop: {axis} is {limits!r}: expected limits that hold two cells at least of {held} m")
+        h = h.isel({axis: inside})
+    return noted(h, f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {x or 'all'}, y {y or 'all'} m")
+
+
+def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
+    """The surface turned by quarter turns, counter-clockwise as seen from above (x to the right, y up).
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    turns : int, default 1
+        Number of quarter turns; negative: clockwise.
+
+    Returns
+    -------
+    xarray.DataArray
+        The turned surface; coordinates start half a cell from zero. [m]
+    """
+    h = checked(h, "rotate90")
+    if isinstance(turns, bool) or not isinstance(turns, int):
+        raise InputError(f"rotate90: turns is {turns!r}: expected a whole number of quarter turns")
+    sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
+    heights = np.rot90(h.values, turns)
+    axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
+    grid = with_coordinates(heights, *axes, h.attrs)
+    if "filled" in h.coords:
+        turned = np.rot90(h["filled"].transpose("x", "y").values, turns)
+        grid = grid.assign_coords(filled=(("x", "y"), turned, h["filled"].attrs))
+    return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise")
+
+
+def invert(h: xr.DataArray) -> xr.DataArray:
+    """The surface with valleys for peaks, as a replica has it; x and y stay as they are. [m]"""
+    h = checked(h, "invert")
+    return noted(like(h, -h.values), "inverted")
+
+
+def combine(h1: xr.DataArray, h2: xr.DataArray, flip: Literal["x", "y"] | None = None) -> xr.DataArray:
+    """One rigid profile for two scanned faces that are pressed together: the sum of their heights.
+
+    Parameters
+    ----------
+    h1, h2 : xarray.DataArray
+        Heights of the faces, each with its peaks towards the other, on one grid. [m]
+    flip : {"x", "y"}, optional
+        The axis along which the second face is reversed, as it is when a scan taken from above is turned over onto
+        the first. Default: `h2` is in the coordinates of `h1` already.
+
+    Returns
+    -------
+    xarray.DataArray
+        Sum of heights, missing where either is. [m]
+
+    Raises
+    ------
+    InputError
+        If the grids differ: resample and crop them to one first, nothing is aligned silently.
+    """
+    h1, h2 = checked(h1, "combine"), checked(h2, "combine")
+    same = h1.shape == h2.shape and all(
+        np.abs(h1[axis].values - h2[axis].values).max() <= 1e-6 * d
+        for axis, d in zip(("x", "y"), spacing(h1), strict=True)
+    )
+    if not same:
+        described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
+        raise InputError(f"combine: found {described[0]} and {described[1]}: expected one grid (see resample and crop)")
+    if flip not in (None, "x", "y"):
+        raise InputError(f"combine: flip is {flip!r}: expected 'x', 'y' or None")
+    second = h2.values if flip is None else np.flip(h2.values, "xy".index(flip))
+    line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (
+        f", reversed along {flip}" if flip else ""
+    )
+    return noted(like(h1, h1.values + second), line)
+
+
+def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
+    """Height that runs out to its mean towards the border, so that it repeats without a step.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    width : float or pair of float
+        Width of the margin along each border, at most half a side. [m]
+
+    Returns
+    -------
+    xarray.DataArray
+        Mean plus the deviation times a raised cosine, which is zero on the border and one inside the margin. [m]
+    """
+    h = checked(h, "taper")
+    widths = pair("width", width)
+    mean = valid_values(h, "taper").mean()
+    weight = np.ones(h.shape)
+    for axis, (w, d, n) in enumerate(zip(widths, spacing(h), h.shape, strict=True)):
+        if w > n * d / 2 * (1 + 1e-9):
+            raise InputError(f"taper: width is {w!r}: expected at most half a side, {n * d / 2:.6g} [m]")
+        from_border = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5) * d
+        profile = np.sin(np.pi / 2 * np.minimum(from_border / w, 1)) ** 2
+        weight = weight * (profile[:, None] if axis == 0 else profile)
+    return noted(like(h, mean + (h.values - mean) * weight), f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
+
+
+def mirror(h: xr.DataArray) -> xr.DataArray:
+    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse. [m]"""
+    h = checked(h, "mirror")
+    nx, ny = h.shape
+    doubled = h.isel(x=np.r_[0:nx, nx - 1 : -1 : -1], y=np.r_[0:ny, ny - 1 : -1 : -1])
+    axes = {}
+    for axis, d in zip(("x", "y"), spacing(h), strict=True):
+        axes[axis] = (axis, float(h[axis][0]) + np.arange(doubled.sizes[axis]) * d, h[axis].attrs)
+    return noted(doubled.assign_coords(axes), "mirrored along x and y")

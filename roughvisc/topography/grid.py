@@ -1,0 +1,137 @@
+"""The labelled grid that every reader, recipe and conditioning step gives: height over (x, y).
+
+Coordinates are those of the cell centres, in metres; the grid covers ``n`` cells of one size in each direction, so
+that the spacing is size over n. Missing points are NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.variables import VARIABLES
+
+
+def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] | None = None) -> xr.DataArray:
+    """Height over cell-centre coordinates that start half a cell from zero.
+
+    Parameters
+    ----------
+    heights : array_like, shape (nx, ny)
+        Heights, peaks up; NaN where missing. [m]
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+    attrs : dict, optional
+        Attributes beside units and names.
+    """
+    values = np.asarray(heights, dtype=float)
+    x, y = ((np.arange(n) + 0.5) * d for n, d in zip(values.shape, spacing, strict=True))
+    return with_coordinates(values, x, y, attrs)
+
+
+def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] | None = None) -> xr.DataArray:
+    """Height over the given coordinates of the cell centres [m], with the declared attributes."""
+    declared = VARIABLES["height"].attributes()
+    return xr.DataArray(
+        values,
+        coords={"x": ("x", x, VARIABLES["x"].attributes()), "y": ("y", y, VARIABLES["y"].attributes())},
+        dims=("x", "y"),
+        name="height",
+        attrs={**declared, **(attrs or {})},
+    )
+
+
+def checked(h: Any, step: str) -> xr.DataArray:
+    """The grid as float64 over ``("x", "y")``, after a check that it is one.
+
+    Raises
+    ------
+    InputError
+        If `h` is no DataArray over exactly the dimensions x and y, has fewer than two points in a direction, no
+        numeric coordinates, or unequal steps; the message names the `step` that asked.
+    """
+    if not isinstance(h, xr.DataArray):
+        raise InputError(f"{step}: found {type(h).__name__}: expected an xarray.DataArray of heights (see from_array)")
+    if set(h.dims) != {"x", "y"} or h.dtype.kind not in "fiu":
+        raise InputError(
+            f"{step}: found dimensions {tuple(map(str, h.dims))} of {h.dtype}: expected numbers over ('x', 'y')"
+        )
+    h = h.transpose("x", "y").astype(float, copy=False)
+    spacing(h, step)
+    return h
+
+
+def spacing(h: xr.DataArray, step: str = "spacing") -> tuple[float, float]:
+    """Cell sides (dx, dy) of a grid [m]; an :class:`InputError` if the steps along a coordinate are not equal."""
+    return axis_step(h, "x", step), axis_step(h, "y", step)
+
+
+def axis_step(h: xr.DataArray, axis: str, step: str) -> float:
+    """The equal step along one coordinate [m], ascending."""
+    if axis not in h.coords:
+        raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
+    at = np.asarray(h[axis].values)
+    if at.dtype.kind not in "fiu" or at.size < 2 or not np.isfinite(at).all():
+        raise InputError(f"{step}: coordinate {axis!r} has {at.size} point(s): expected at least 2 finite numbers")
+    d = float(at[-1] - at[0]) / (at.size - 1)
+    if not d > 0 or np.abs(np.diff(at) - d).max() > 1e-4 * d:
+        steps = np.diff(at)
+        raise InputError(
+            f"{step}: coordinate {axis!r} has steps from {steps.min():.6g} to {steps.max():.6g} m: "
+            "expected a uniform, ascending grid"
+        )
+    return float(f"{d:.15g}")
+
+
+def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
+    """The same grid with one more line in its history, and further attributes."""
+    history = h.attrs.get("history")
+    h = h.copy(deep=False)
+    h.attrs = {**h.attrs, **attrs, "history": f"{history}\n{line}" if history else line}
+    return h
+
+
+def like(h: xr.DataArray, values: np.ndarray) -> xr.DataArray:
+    """New heights on the grid of `h`, with its attributes and coordinates."""
+    return h.copy(deep=False, data=values)
+
+
+def valid_values(h: xr.DataArray, step: str) -> np.ndarray:
+    """The heights that are present [m], one-dimensional; an :class:`InputError` if there are none."""
+    values = h.values[np.isfinite(h.values)]
+    if not values.size:
+        raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
+    return values
+
+
+def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf, strict: bool = True) -> float:
+    """A finite number above `low` (or at it, unless `strict`) and not above `high`."""
+    right = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    if not right or value < low or (strict and value == low) or value > high:
+        above = f"above {low:g}" if strict else f"of at least {low:g}"
+        below = f" and at most {high:g}" if math.isfinite(high) else ""
+        raise InputError(f"{name} is {value!r}: expected a finite number {above}{below} [{unit}]")
+    return float(value)
+
+
+def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:
+    """Two positive numbers, or one for both."""
+    both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
+    if len(both) != 2:
+        raise InputError(f"{name} is {value!r}: expected one number or a pair (x, y) [{unit}]")
+    return number(name, both[0], unit), number(name, both[1], unit)
+
+
+def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
+    """Two whole numbers of cells, or one for both."""
+    both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
+    whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
+    if not whole:
+        raise InputError(f"{name} is {value!r}: expected a whole number of cells of at least {low}, or a pair of them")
+    return int(both[0]), int(both[1])

@@ -1,0 +1,83 @@
+"""Grids in NetCDF and Zarr, through xarray: heights over coordinates x and y with units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import with_coordinates
+from roughvisc.topography.instruments import Channel
+from roughvisc.units import quantity
+
+#: Names that heights go by, in order of preference.
+_NAMES = ("height", "heights", "z", "h")
+
+
+def grid_channels(path: Path) -> tuple[Channel, ...]:
+    """The variables of a grid file that span two dimensions or more."""
+    with _open(path) as dataset:
+        return _channels(dataset)
+
+
+def open_grid(path: Path, channel: Channel, unit: float | None, spacing: tuple[float, float] | None) -> xr.DataArray:
+    """One variable as a labelled grid in metres, with the attributes and coordinates that it has.
+
+    Coordinates keep their origin; where they descend, the grid is turned round with them.
+    """
+    with _open(path) as dataset:
+        h = dataset[channel.name].load()
+    extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
+    h = h.transpose("x", "y")
+    metres = _metres(h.attrs.get("units"), unit, channel.name)
+    axes = []
+    for axis, given in zip(("x", "y"), spacing or (None, None), strict=True):
+        if given is not None:
+            axes.append((np.arange(h.sizes[axis]) + 0.5) * given)
+        elif axis not in h.coords:
+            raise InputError(f"there is no coordinate {axis!r}: pass spacing= [m]")
+        else:
+            axes.append(h[axis].values.astype(float) * _metres(h[axis].attrs.get("units"), unit, axis))
+    attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
+    grid = with_coordinates(h.values.astype(float) * metres, *axes, attrs)
+    grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
+    for axis in ("x", "y"):
+        if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
+            grid = grid.isel({axis: slice(None, None, -1)})
+    return grid
+
+
+def _open(path: Path) -> xr.Dataset:
+    engine = "zarr" if path.suffix == ".zarr" else None
+    return xr.open_dataset(path, engine=engine, decode_times=False)
+
+
+def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:
+    found = [name for name, variable in dataset.data_vars.items() if variable.ndim >= 2]
+    found.sort(key=lambda name: _NAMES.index(name) if name in _NAMES else len(_NAMES))
+    return tuple(_channel(i, str(name), dataset[name]) for i, name in enumerate(found))
+
+
+def _channel(index: int, name: str, variable: xr.DataArray) -> Channel:
+    units = [variable.attrs.get("units"), *(variable[a].attrs.get("units") for a in "xy" if a in variable.coords)]
+    gridded = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
+    shape = tuple(variable.sizes[d] for d in ("x", "y")) if gridded else variable.shape
+    return Channel(index, name, gridded and _is_length(units[0]), shape, None if None in units else str(units[0]))
+
+
+def _is_length(unit: Any) -> bool:
+    try:
+        return unit is None or quantity(f"1 {unit}", "m") > 0
+    except InputError:
+        return False
+
+
+def _metres(stated: Any, unit: float | None, name: str) -> float:
+    if stated is not None:
+        return quantity(f"1 {stated}", "m", f"the unit of {name}")
+    if unit is None:
+        raise InputError(f"{name} has no attribute 'units': pass unit= (such as unit='um')")
+    return unit

@@ -1,0 +1,226 @@
+"""Instrument files through the libraries that parse them: x3pio, sdfio and SurfaceTopography.
+
+Orientation, checked against each other in the tests: x3pio and sdfio give rows along y, ascending, so that
+``height(x, y)`` is the transpose; SurfaceTopography gives (x, y) already. Where a format stores its top line first,
+SurfaceTopography turns it over; of plain text, row j of the file is ``y[j]``, as it stands there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roughvisc.errors import InputError
+
+#: Formats that other libraries than SurfaceTopography read here.
+OWN_SUFFIXES = {"x3p": ("x3p",), "sdf": ("sdf",), "nc": ("nc", "nc4", "cdf", "zarr"), "card": ("toml",)}
+_TEXT = ("xyz", "asc")
+#: Where suffixes are shared by formats: those to try, in this order.
+_SHARED = {"txt": _TEXT, "asc": _TEXT, "csv": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
+#: Formats without compression: a point takes a byte at least.
+_PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metropro", "mi", "nms", "npy", "opd", "os3d"}
+_PLAIN |= {"plu", "tmd", "wsxm", "xyz"}
+#: No deflated stream expands further than this.
+_EXPANSION = 1040
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What one channel of a file holds.
+
+    Parameters
+    ----------
+    index : int
+        Its number in the file, from 0.
+    name : str
+        Its name, as ``channel=`` of :func:`~roughvisc.topography.readers.open_scan` takes it.
+    is_height : bool
+        Whether it is an areal grid of heights; False for phases, voltages, profiles and the like.
+    shape : tuple of int
+        Points along x and y; one number for a profile.
+    unit : str or None
+        Unit of length in the file; None if the file states none.
+    """
+
+    index: int
+    name: str
+    is_height: bool
+    shape: tuple[int, ...]
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A file whose header is read: its channels, and how to load one.
+
+    Parameters
+    ----------
+    format : str
+        Name of the format.
+    channels : tuple of Channel
+        All channels of the file.
+    load : callable
+        ``load(channel, unit)`` with the metres in one unit of the file where it states none, gives heights over
+        (x, y) and the cell sides, or None for these. [m]
+    default : int or None
+        Index of the channel that the library takes.
+    instrument : str
+        Maker and model where known.
+    complaints : list of str
+        What is wrong with the file and was read past, filled in by ``load``.
+    """
+
+    format: str
+    channels: tuple[Channel, ...]
+    load: Callable[[Channel, float | None], tuple[np.ndarray, tuple[float, float] | None]]
+    default: int | None = None
+    instrument: str = ""
+    complaints: list[str] = field(default_factory=list)
+
+
+def open_instrument(path: Path, format: str | None) -> Opened:
+    """Header of an instrument file, by the format's name, ``"auto"``, or the suffix (None)."""
+    format = _detected(path) if format == "auto" else format
+    if format == "x3p" or (format is None and path.suffix.lower() == ".x3p"):
+        return _x3p(path)
+    if format == "sdf" or (format is None and path.suffix.lower() == ".sdf"):
+        return _sdf(path)
+    candidates = (format,) if format else formats_of(path)
+    failures: dict[str, Exception] = {}
+    for candidate in candidates:
+        try:
+            return _surface_topography(path, candidate)
+        except InputError:
+            raise
+        except Exception as error:  # each reader has its own kinds, struct.error and KeyError among them
+            failures[candidate] = error
+    raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
+
+
+def suffixes() -> dict[str, tuple[str, ...]]:
+    """Format -> suffixes without the dot, of everything that can be opened."""
+    from SurfaceTopography.IO import readers
+
+    theirs = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
+    theirs["di"] = (*theirs["di"], "di", "000 to 999")
+    return {**theirs, **OWN_SUFFIXES}
+
+
+def formats_of(path: Path) -> tuple[str, ...]:
+    """Formats of SurfaceTopography to try for a file name, in order."""
+    suffix = path.suffix.lower().removeprefix(".")
+    if suffix in _SHARED:
+        return _SHARED[suffix]
+    if len(suffix) == 3 and suffix.isdigit():
+        return ("di",)
+    found = tuple(name for name, theirs in suffixes().items() if suffix and suffix in theirs)
+    if not found:
+        known = sorted({s for theirs in suffixes().values() for s in theirs})
+        raise InputError(
+            f"the suffix {path.suffix!r} is not known: pass format= (see supported_formats()), or format='auto' to "
+            f"have it guessed; known are {', '.join(known)}"
+        )
+    return found
+
+
+def brief(error: BaseException) -> str:
+    """First line of an error, not too long; its kind where it says nothing."""
+    text = str(error).strip().split("\n")[0].strip()
+    return (text if len(text) < 200 else text[:197] + "...") or type(error).__name__
+
+
+def affordable(path: Path, points: int, expansion: float) -> None:
+    """Refuse a header that claims more points than the file can hold, before they are allocated."""
+    held = os.path.getsize(path)
+    if points > max(held * expansion, 1024):
+        raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
+
+
+def _x3p(path: Path) -> Opened:
+    import x3pio
+
+    info = x3pio.info(path, verify=False)
+    surface = info.feature_type == x3pio.FeatureType.SURFACE and len(info.shape) == 2
+    affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)), _EXPANSION)
+    channels = tuple(
+        Channel(i, f"layer {i}", surface, tuple(reversed(info.shape)), "m") for i in range(info.layer_count)
+    )
+    complaints: list[str] = []
+
+    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
+        try:
+            content = x3pio.read(path)
+        except x3pio.X3pChecksumError as error:
+            complaints.append(f"its checksum is wrong ({brief(error)}): it was changed or damaged after it was written")
+            content = x3pio.read(path, verify=False)
+        layer = content.layers[channel.index]
+        if not layer.is_regular_grid:
+            raise InputError("its points lie on no regular grid (absolute axes): expected equal steps in x and y")
+        return layer.z.T, (layer.header.x.increment, layer.header.y.increment)
+
+    maker = info.metadata.instrument if info.metadata else None
+    instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
+    return Opened("x3p", channels, load, 0, instrument, complaints)
+
+
+def _sdf(path: Path) -> Opened:
+    import sdfio
+
+    content = sdfio.read(path)
+    rows, columns = content.data.shape
+    channel = Channel(0, "height", rows > 1, (columns, rows), "m")
+    cell = (content.header.x_scale, content.header.y_scale)
+    return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), 0, content.header.manufacturer_id.strip())
+
+
+def _detected(path: Path) -> str:
+    from SurfaceTopography.IO import detect_format
+
+    return detect_format(str(path))
+
+
+def _surface_topography(path: Path, format: str) -> Opened:
+    from SurfaceTopography.IO import lookup_reader_by_format
+    from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
+
+    if format not in lookup_reader_by_format:
+        known = sorted({*lookup_reader_by_format, *OWN_SUFFIXES})
+        raise InputError(f"format is {format!r}: expected one of {', '.join(known)}, or 'auto'")
+    reader = lookup_reader_by_format[format](str(path))
+    theirs = list(reader.channels)
+
+    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
+        found = theirs[channel.index]
+        affordable(path, int(np.prod(channel.shape, dtype=object)), 1 if format in _PLAIN else _EXPANSION)
+        if found.is_uniform is False:
+            raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
+        sized = found.physical_sizes is not None
+        topography = found.topography() if sized else found.topography(physical_sizes=channel.shape)
+        metres = unit if channel.unit is None else float(get_unit_conversion_factor(channel.unit, "m"))
+        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * metres
+        if not sized:
+            return heights, None
+        sides = zip(topography.physical_sizes, heights.shape, strict=True)
+        return heights, tuple(float(f"{float(size) * metres:.15g}") / n for size, n in sides)
+
+    default = getattr(reader, "_default_channel_index", None)
+    described = theirs[0].info.get("instrument", {}) if theirs else {}
+    instrument = described.get("name", "") if isinstance(described, dict) else ""
+    return Opened(format, tuple(_channel(found) for found in theirs), load, default, str(instrument or ""))
+
+
+def _channel(found: Any) -> Channel:
+    from SurfaceTopography.Support.UnitConversion import is_length_unit
+
+    shape = tuple(int(n) for n in found.nb_grid_pts or ())
+    # a reader may take an odd unit for a length: phases of Bruker files come as heights in ('µm', None)
+    units = [u for u in (found.unit, found.data_unit) if u is not None]
+    is_height = (
+        found.is_height_channel and found.dim == 2 and all(isinstance(u, str) and is_length_unit(u) for u in units)
+    )
+    return Channel(found.index, str(found.channel_id), bool(is_height), shape, found.unit if is_height else None)

@@ -1,0 +1,279 @@
+"""Scans in: an instrument file, a grid file or a surface card becomes a labelled grid of heights.
+
+The libraries parse; here is dispatch, labelling and checking. Whatever goes wrong is one
+:class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography import gridfiles, instruments
+from roughvisc.topography.grid import checked, labelled, noted, pair
+from roughvisc.topography.grid import spacing as cell_sides
+from roughvisc.topography.instruments import Channel, Opened, brief
+from roughvisc.units import quantity
+
+#: No scan is wider, no spacing finer, no height further from zero. [m] Scans of 150 mm exist; absolute heights too.
+WIDEST, FINEST, FARTHEST = 1.0, 1e-11, 1e3
+
+
+def open_scan(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    spacing: float | tuple[float, float] | None = None,
+) -> xr.DataArray:
+    """Heights of a scanned surface, from an instrument file, a grid file or a surface card.
+
+    Parameters
+    ----------
+    path : path
+        X3P, SDF, NetCDF, a surface card (``.toml``), or any format that SurfaceTopography reads.
+    format : str, optional
+        A key of :func:`supported_formats`; ``"auto"`` has the format guessed from the content. Default: by the suffix.
+    channel : int or str, optional
+        Number or name of the channel, see :func:`list_channels`. Default: the height channel, or the one that the
+        library prefers where there are several; the others are then listed in the attribute ``other_channels``.
+    unit : str, optional
+        Unit of length in a file that states none, as ``"um"``.
+    spacing : float or pair of float, optional
+        Cell sides (dx, dy), in place of what the file says. [m]
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
+        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel
+        and ``history``.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, of unknown format, no areal height scan, without unit or size, or implausible:
+        wider than 1 m, finer than 10 pm, heights beyond 1 km.
+
+    Warns
+    -----
+    UserWarning
+        If the checksum in an X3P file is wrong.
+    """
+    path = _existing(path)
+    if format == "card" or (format is None and path.suffix.lower() == ".toml"):
+        from roughvisc.topography.cards import open_card  # which opens scans in turn
+
+        return open_card(path)
+    metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
+    sides = None if spacing is None else pair("spacing", spacing)
+    if _is_grid(path, format):
+        h, opened, chosen = _from_grid(path, channel, metres, sides)
+    else:
+        h, opened, chosen = _from_instrument(path, format, channel, metres, sides)
+    _plausible(h, path)
+    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
+    others = [other.name for other in opened.channels if other.index != chosen.index]
+    attrs |= {"instrument": opened.instrument} if opened.instrument else {}
+    attrs |= {"other_channels": ", ".join(others)} if others else {}
+    how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
+    how += f", unit {unit} as given" if unit else ""
+    return noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
+
+
+def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArray:
+    """Plain array as a labelled grid.
+
+    Parameters
+    ----------
+    heights : array_like, shape (nx, ny)
+        Heights over (x, y), peaks up, NaN where missing. [m]
+    spacing : float or pair of float
+        Cell sides (dx, dy). [m]
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), coordinates at the cell centres. [m]
+
+    Raises
+    ------
+    InputError
+        If the array is not two-dimensional with at least two points each way, or holds no or infinite heights.
+    """
+    try:
+        values = np.array(np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"heights is {type(heights).__name__}: expected numbers of shape (nx, ny)") from error
+    if values.ndim != 2 or min(values.shape) < 2:
+        raise InputError(f"heights has shape {values.shape}: expected (nx, ny) of at least 2 x 2")
+    h = labelled(values, pair("spacing", spacing))
+    _finite(h, "heights")
+    return noted(h, "from an array")
+
+
+def list_channels(path: str | os.PathLike[str], *, format: str | None = None) -> tuple[Channel, ...]:
+    """What a scan file holds, without loading it.
+
+    Parameters
+    ----------
+    path : path
+        Instrument or grid file.
+    format : str, optional
+        As for :func:`open_scan`.
+
+    Returns
+    -------
+    tuple of Channel
+        Index, name, whether it is a height, shape (nx, ny) and unit of each channel.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged or of unknown format.
+    """
+    path = _existing(path)
+    with _reading(path):
+        if _is_grid(path, format):
+            return gridfiles.grid_channels(path)
+        return instruments.open_instrument(path, format).channels
+
+
+def supported_formats() -> dict[str, tuple[str, ...]]:
+    """Names of all formats, as ``format=`` takes them, with their usual suffixes."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the library's imports
+        return dict(sorted(instruments.suffixes().items()))
+
+
+def sha256(path: Path) -> str:
+    """Checksum of a file's content; of a folder's files in order of their names."""
+    if path.is_dir():
+        parts = (f"{p.relative_to(path)} {sha256(p)}" for p in sorted(path.rglob("*")) if p.is_file())
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _from_instrument(
+    path: Path, format: str | None, channel: Any, unit: float | None, sides: tuple[float, float] | None
+) -> tuple[xr.DataArray, Opened, Channel]:
+    with _reading(path):
+        opened = instruments.open_instrument(path, format)
+        chosen = _chosen(opened, channel)
+        _unit_known(chosen, unit)
+        heights, found = opened.load(chosen, unit)
+        if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
+            raise InputError("it states no size: pass spacing=(dx, dy) [m]")
+        h = labelled(heights, sides or found)
+    for complaint in opened.complaints:
+        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=3)
+    return h, opened, chosen
+
+
+def _from_grid(
+    path: Path, channel: Any, unit: float | None, sides: tuple[float, float] | None
+) -> tuple[xr.DataArray, Opened, Channel]:
+    with _reading(path):
+        opened = Opened("nc", gridfiles.grid_channels(path), load=lambda *_: None)
+        chosen = _chosen(opened, channel)
+        _unit_known(chosen, unit)
+        h = gridfiles.open_grid(path, chosen, unit, sides)
+        return checked(h, "grid"), opened, chosen
+
+
+def _chosen(opened: Opened, channel: int | str | None) -> Channel:
+    listed = ", ".join(f"{c.index}: {c.name!r}{'' if c.is_height else ' (no areal height)'}" for c in opened.channels)
+    if channel is None:
+        heights = [c for c in opened.channels if c.is_height]
+        preferred = [c for c in heights if c.index == opened.default] + heights
+        if not preferred:
+            profiles = [c for c in opened.channels if len(c.shape) == 1 or 1 in c.shape]
+            kind = "a profile, which is no areal scan" if profiles else "no areal height"
+            raise InputError(f"it holds {kind} (channels {listed or 'none'}): expected heights over x and y")
+        return preferred[0]
+    for c in opened.channels:
+        if channel == c.name or (isinstance(channel, int) and channel == c.index):
+            if not c.is_height:
+                raise InputError(f"channel {channel!r} is no areal height: expected another of {listed}")
+            return c
+    raise InputError(f"channel is {channel!r}: expected one of {listed}")
+
+
+def _unit_known(chosen: Channel, unit: float | None) -> None:
+    if chosen.unit is None and unit is None:
+        raise InputError("it states no unit of length: pass unit= (such as unit='um')")
+    if chosen.unit is not None and unit is not None:
+        stated = quantity(f"1 {chosen.unit}", "m", "the unit in the file")
+        if not math.isclose(stated, unit):
+            raise InputError(f"it states its unit as {chosen.unit!r}: leave unit= out, or scale the heights afterwards")
+
+
+def _existing(path: Any) -> Path:
+    try:
+        path = Path(path)
+    except TypeError as error:
+        raise InputError(f"path is {type(path).__name__}: expected the name of a file") from error
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file")
+    if path.is_dir() and path.suffix != ".zarr":
+        raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
+    return path
+
+
+def _is_grid(path: Path, format: str | None) -> bool:
+    return format == "nc" or (
+        format is None and path.suffix.lower().removeprefix(".") in instruments.OWN_SUFFIXES["nc"]
+    )
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Name the file in every error, and keep the libraries' warnings to ourselves."""
+    if path.is_file() and not path.stat().st_size:
+        raise InputError(f"{path}: the file is empty")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        except Exception as error:  # damaged files raise of every kind, MemoryError and struct.error among them
+            raise InputError(
+                f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format (pass format=)"
+            ) from error
+
+
+def _plausible(h: xr.DataArray, path: Path) -> None:
+    if min(h.shape) < 2:
+        raise InputError(f"{path}: it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
+    for axis, d, n in zip(("x", "y"), cell_sides(h, str(path)), h.shape, strict=True):
+        if n * d > WIDEST or d < FINEST:
+            raise InputError(
+                f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
+                f"(at most {WIDEST:g} m, at least {FINEST:g} m): pass spacing=(dx, dy) [m]"
+            )
+    _finite(h, str(path))
+
+
+def _finite(h: xr.DataArray, source: str) -> None:
+    values = h.values
+    if np.isnan(values).all():
+        raise InputError(f"{source}: all {h.size} points are missing: expected heights")
+    beyond = np.abs(values) > FARTHEST
+    if beyond.any():
+        raise InputError(
+            f"{source}: {beyond.sum()} heights are like {values[beyond][0]:.6g} m: expected none beyond {FARTHEST:g} m "
+            "(where they mark missing points, put NaN in their place and use from_array)"
+        )

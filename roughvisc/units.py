@@ -1,0 +1,95 @@
+"""The door for quantities: a number in SI, or a string with a unit, becomes a float in SI.
+
+Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from numbers import Real
+from typing import Any
+
+from roughvisc.errors import InputError
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
+# A grammar of our own in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would never come back.
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
+# pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
+_ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradian"}
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def quantity(value: str | float, unit: str, name: str = "") -> float:
+    """Value of a quantity in a given unit.
+
+    Parameters
+    ----------
+    value : str or float
+        A number, taken to be in `unit` already, or a string of a number and a unit, such as ``"10 um"``,
+        ``"0.1 MPa s"`` or ``"3 N/m^2"``.
+    unit : str
+        The unit expected, as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
+    name : str, optional
+        What the quantity is, for the message: a key of a study file, or a parameter.
+
+    Returns
+    -------
+    float
+        The value in `unit`, finite. Strings are rounded to 15 significant digits, since conversions leave
+        noise in the last one (``"10 um"`` would be 9.999999999999999e-06 m).
+
+    Raises
+    ------
+    InputError
+        If the value is no finite number or no quantity, its unit is unknown, or it is of another dimension.
+
+    Examples
+    --------
+    >>> quantity("10 um", "m"), quantity("0.1 MPa s", "Pa s"), quantity(2, "N")
+    (1e-05, 100000.0, 2.0)
+    """
+    label = f"{name} is {value!r}" if name else f"found {value!r}"
+    wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
+    if isinstance(value, str):
+        result = _parsed(value, unit, label, wanted)
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        result = float(value)
+    else:
+        raise InputError(f"{label}: expected {wanted}")
+    if not math.isfinite(result):
+        raise InputError(f"{label}: expected {wanted}, finite")
+    return result
+
+
+def _parsed(text: str, unit: str, label: str, wanted: str) -> float:
+    matched = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
+    if matched is None:
+        raise InputError(f"{label}, which is no quantity: expected {wanted}")
+    number, found = float(matched[1]), matched[2]
+    dimensionless = unit in ("", "1")
+    if found is None:
+        if dimensionless:
+            return number
+        raise InputError(f"{label}, a text without a unit: expected {wanted} (such as {f'{matched[1]} {unit}'!r})")
+    try:
+        given = _registry().Unit("percent" if found == "%" else found.replace("·", "*"))
+        expected = _registry().Unit("" if dimensionless else unit)
+    except Exception as error:  # pint raises half a dozen kinds, AssertionError and tokenizer errors among them
+        raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
+    angle = expected.dimensionless and any(part in _ANGLES for part in given._units)
+    if given.dimensionality != expected.dimensionality or (angle and str(expected) not in _ANGLES):
+        raise InputError(f"{label}, which is in {given}: expected {wanted}")
+    try:
+        converted = float(_registry().Quantity(number, given).to(expected).magnitude)
+    except Exception as error:  # offset and logarithmic units: decibels, degrees Celsius
+        raise InputError(f"{label}, which does not convert: expected {wanted}") from error
+    return float(f"{converted:.15g}")

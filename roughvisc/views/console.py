@@ -1,0 +1,129 @@
+"""What the command line shows: progress, and tables of what was found and what it cost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from roughvisc.views.axes import unit_for
+
+_PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
+
+
+def readable(value: float, unit: str) -> str:
+    """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
+    return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
+
+
+@contextmanager
+def progress(console: Console, label: str) -> Iterator[Callable[[float, float], None]]:
+    """A function to call with the time reached and the time at the end [s].
+
+    It draws a bar, or writes a line every few seconds where there is no terminal.
+    """
+    if console.is_terminal and not console.quiet:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[at]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=console, transient=True) as bar:
+            task = bar.add_task(label, total=1.0, at="")
+            yield lambda now, end: bar.update(task, completed=now / end if end else 1.0, at=_at(now, end))
+    else:
+        yield _lines(console, label)
+
+
+def _lines(console: Console, label: str) -> Callable[[float, float], None]:
+    began = last = time.monotonic()
+
+    def report(now: float, end: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _PLAIN_EVERY:
+            last = time.monotonic()
+            console.print(f"{label}: {_at(now, end)}, {last - began:.0f} s", highlight=False)
+
+    return report
+
+
+def _at(now: float, end: float) -> str:
+    unit = unit_for(end, "s")
+    return f"t = {unit(now):.3g} of {unit.text(end)}"
+
+
+def result_table(dataset: xr.Dataset) -> Table:
+    """Summary of a result: what came out, how accurate it is, what it cost."""
+    last = dataset.isel(time=-1)
+    end = float(last["time"])
+    steps = dataset.sizes["time"]
+    rows = [
+        ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
+        ("Kept times", f"{steps}, up to t = {readable(end, 's')}"),
+        ("Force at the end", readable(float(last["force"]), "N")),
+        ("Approach at the end", readable(float(last["approach"]), "m")),
+        (
+            "Contact area at the end",
+            f"{readable(float(last['contact_area_corrected']), 'm2')}"
+            f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
+        ),
+        ("Accuracy: worst residual", _number(dataset["residual"])),
+        ("Accuracy: worst time error", _number(dataset["time_error"])),
+        ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
+        ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
+        ("Cost: wall time", readable(float(last["wall_time"]), "s")),
+    ]
+    return _two_columns(rows, dataset.attrs.get("title"))
+
+
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Table:
+    """What is in a scan: its size, what is missing, how rough it is.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Heights over (x, y). [m]
+    measures : xarray.Dataset
+        Of :func:`roughvisc.parameters`.
+    name : str
+        Of the file.
+    """
+    sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
+    counts = [height.sizes[axis] for axis in ("x", "y")]
+    missing = int(height.isnull().sum())
+    rows = [
+        ("Format", str(height.attrs.get("format", "surface card"))),
+        ("Instrument", str(height.attrs.get("instrument", ""))),
+        ("Channel", str(height.attrs.get("channel", ""))),
+        ("Other channels", str(height.attrs.get("other_channels", ""))),
+        ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
+        ("Shape", f"{counts[0]} x {counts[1]} points"),
+        ("Spacing", " x ".join(readable(d, "m") for d in sides)),
+        ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
+        ("Height range", readable(float(height.max() - height.min()), "m")),
+    ]
+    for parameter, label in (("Sq", "Sq, levelled"), ("Sdq", "rms slope, levelled")):
+        rows.append((label, readable(float(measures[parameter]), str(measures[parameter].attrs["units"]))))
+    return _two_columns([row for row in rows if row[1]], name)
+
+
+def _number(values: xr.DataArray) -> str:
+    found = values.values[np.isfinite(values.values)]
+    return f"{found.max():.2g}" if found.size else "not known"
+
+
+def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Table:
+    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, value in rows:
+        table.add_row(label, value)
+    return table

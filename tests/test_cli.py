@@ -1,0 +1,192 @@
+"""The command line: what it writes, what it says, and how it ends."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from test_run import BALL
+
+import roughvisc as rv
+from roughvisc.cli import main
+from roughvisc.study import run as run_module
+from roughvisc.study.store import write_result
+
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    """Runs a command in an empty folder; gives its status and what it wrote to either stream."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        done = CliRunner().invoke(main, [str(a) for a in arguments])
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+        return done.exit_code, done.stdout, done.stderr
+
+    return run
+
+
+def write_study(text=BALL, *replacements):
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    with open("ball.toml", "w") as stream:
+        stream.write(text)
+    return "ball.toml"
+
+
+def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path):
+    status, out, err = invoke("run", write_study())
+    assert (status, err) == (0, "")
+    (result,) = (tmp_path / "results" / "ball").glob("*.nc")
+    figures = {p.name.rpartition("-")[2] for p in result.parent.glob(f"{result.stem}-*.png")}
+    assert {"history.png", "maps.png", "section.png"} <= figures
+    assert f"Result: results/ball/{result.name}\n" in out
+    for words in ("24 x 21 cells, free", "3, up to t = 200 ms", "5 mN", "worst residual", "convolutions", "wall time"):
+        assert words in out
+
+
+def test_run__quiet_says_nothing(invoke, tmp_path):
+    assert invoke("run", write_study(), "--out", "there", "--no-plots", "-q") == (0, "", "")
+    assert [p.suffix for p in (tmp_path / "there").iterdir()] == [".nc"]
+
+
+def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
+    sweep = '[sweep]\n"program.0.load" = ["5 mN", "50 N", "6 mN"]'
+    status, out, err = invoke("run", write_study(BALL + sweep), "--no-plots")
+    assert status == 1
+    assert len(list((tmp_path / "results" / "ball").iterdir())) == 2
+    assert "roughvisc: case 2 of 3: ball.toml: " in err
+    assert err.endswith("roughvisc: 1 of 3 cases failed\n")
+    assert out.count("Result: ") == 2
+
+
+def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, monkeypatch):
+    def stubborn(*args, **settings):
+        ds = rv.simulate(*args, **settings)
+        ds["status"][1] = 1
+        return ds
+
+    monkeypatch.setattr(run_module, "simulate", stubborn)
+    status, out, err = invoke("run", write_study(), "--no-plots")
+    assert status == 1
+    assert "1 of 3 kept times did not converge" in err
+    assert "Result: " in out
+    assert len(list((tmp_path / "results" / "ball").iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"5 mN"', '"5 mm"', "program.0.load: found '5 mm', which is in millimeter: expected a number in N"),
+        ('radius = "10 mm"', 'radios = "10 mm"', "surface.radios: unknown key; did you mean 'radius'?"),
+        ('"3 MPa"', '"-3 MPa"', "material.shear_modulus: found '-3 MPa': expected a number in Pa"),
+        ('"0.1 MPa s"', '"0.1 MPa s"\npoisson = 0.51', "material.poisson: found 0.51: expected a number above -1"),
+        ("[24, 21]", "[0, 21]", "surface.shape.0: found 0: expected a whole number at least 2"),
+        ('"5 mN"', "nan", "program.0.load: found nan: expected a number"),
+        ('"5 mN"', '"50 N"', "boundary"),
+    ],
+)
+def test_run__bad_input_is_status_2_and_one_message(invoke, tmp_path, old, new, words):
+    status, out, err = invoke("run", write_study(BALL, (old, new)), "-q")
+    assert (status, out) == (2, "")
+    assert err.startswith("roughvisc: ball.toml: ")
+    assert words in err
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is half-written"
+
+
+def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
+    def interrupted(*args, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_module, "simulate", interrupted)
+    status, _, err = invoke("run", write_study())
+    assert status == 130
+    assert err == "roughvisc: interrupted; what was finished is kept\n"
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"]
+
+
+def test_run__disk_full_is_status_1(invoke, monkeypatch):
+    def full(*args, **settings):
+        raise OSError(28, "No space left on device", "result.nc")
+
+    monkeypatch.setattr(run_module, "write_result", full)
+    status, _, err = invoke("run", write_study())
+    assert (status, err) == (1, "roughvisc: result.nc: No space left on device\n")
+
+
+@pytest.fixture
+def scan_file(tmp_path):
+    """A tilted scan with missing points, as a grid file."""
+    h = rv.self_affine((40e-6, 30e-6), (40, 30), hurst=0.8, rms_height=1e-7, seed=2)
+    h = h + 1e-2 * h.x
+    h.values[3:6, 7] = np.nan
+    h.attrs["units"] = "m"
+    path = tmp_path / "tilted.nc"
+    h.rename("height").to_netcdf(path)
+    return path
+
+
+def test_scan__says_what_is_there_and_draws_it(invoke, tmp_path, scan_file):
+    status, out, err = invoke("scan", scan_file)
+    assert (status, err) == (0, "")
+    for words in ("40 µm x 30 µm", "40 x 30 points", "1 µm x 1 µm", "3 (0.25 %)", "Sq, levelled", "rms slope"):
+        assert words in out
+    assert "Picture: tilted.png" in out
+    assert (tmp_path / "tilted.png").stat().st_size > 10_000
+    assert invoke("scan", scan_file, "--plot", "a/b.pdf", "--spacing", "2um,3 um")[0] == 0
+    assert (tmp_path / "a" / "b.pdf").exists()
+
+
+def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
+    for arguments, words in (
+        (["gone.sur"], "gone.sur"),
+        ([scan_file, "--plot", "x.docx"], "x.docx: is no kind of picture"),
+        ([scan_file, "--spacing", "2 N"], "--spacing is '2 N', which is in newton: expected a number in m"),
+        ([scan_file, "--spacing", "1,2,3"], "--spacing: found '1,2,3': expected one length, or two"),
+        ([scan_file, "--channel", "7"], "channel is 7"),
+    ):
+        status, _, err = invoke("scan", *arguments)
+        assert status == 2
+        assert words in err
+    assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
+
+
+def test_plot__draws_a_file_or_a_folder(invoke, tmp_path):
+    from sample_results import rough_creep
+
+    path = write_result(rough_creep(shape=(24, 20), frames=4), tmp_path / "out" / "case.nc")
+    for target in (path, path.parent):
+        status, out, err = invoke("plot", target, "--out", "figures")
+        assert (status, err) == (0, "")
+        assert "Figure: figures/case-history.png" in out
+    assert (tmp_path / "figures" / "case-maps.png").exists()
+    (tmp_path / "empty").mkdir()
+    assert invoke("plot", "empty")[0] == 2
+    status, _, err = invoke("plot", "gone.nc")
+    assert (status, err) == (2, "roughvisc: gone.nc: does not exist: expected a result of roughvisc (.nc)\n")
+
+
+def test_help__has_an_example_for_every_command(invoke):
+    assert invoke("--version") == (0, f"roughvisc {rv.__version__}\n", "")
+    assert "run STUDY" not in invoke("--help")[2]
+    for command in main.commands:
+        status, out, _ = invoke(command, "--help")
+        assert status == 0
+        assert f"roughvisc {command} " in out.split("Example:")[1]
+
+
+def test_process__ends_with_its_status(tmp_path):
+    """A real process: exit status, streams, and no heavy import for the help."""
+    (tmp_path / "bad.toml").write_text("title = 3")
+    command = [sys.executable, "-W", "error", "-m", "roughvisc.cli"]
+    bad = subprocess.run([*command, "run", "bad.toml"], cwd=tmp_path, capture_output=True, text=True)
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("roughvisc: bad.toml: 4 problems\n  title: found 3: expected a text\n")
+    code = (
+        "import sys; from roughvisc.cli import main; main(['--help'], standalone_mode=False); "
+        "print(sorted({'numpy', 'xarray', 'pydantic', 'pint', 'rich', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("[]\n")

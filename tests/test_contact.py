@@ -1,0 +1,209 @@
+"""The instantaneous contact problem: optimality, oracles, an independent program, degenerate cases."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import optimize
+from test_halfspace import direct
+
+from roughvisc.mechanics import closed_forms, contact
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace import HalfSpace
+
+
+def rough_gap(shape, seed=0, slope=1.0):
+    """Gap under a random surface with a fixed spectrum; cells are one long."""
+    rng = np.random.default_rng(seed)
+    qx, qy = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :]
+    amplitude = np.maximum(np.hypot(qx, qy), 4 / max(shape)) ** -1.8
+    amplitude[np.hypot(qx, qy) > 0.2] = 0
+    amplitude[0, 0] = 0
+    height = np.fft.irfft2(amplitude * np.fft.rfft2(rng.standard_normal(shape)), s=shape)
+    height *= slope / np.sqrt(np.mean(np.gradient(height, axis=0) ** 2 + np.gradient(height, axis=1) ** 2))
+    return height.max() - height
+
+
+def check_optimal(halfspace, gap, state, precision, present=None):
+    """Complementarity: no tension, no penetration, pressure only where the gap is closed."""
+    present = np.ones(gap.shape, bool) if present is None else present
+    opening = gap + halfspace.displacement(state.pressure) - state.approach
+    scale = np.abs(gap[present]).max()
+    assert state.converged
+    assert (state.pressure >= 0).all()
+    assert (state.pressure[~present] == 0).all()
+    assert opening[present].min() > -precision * scale
+    assert np.abs(opening[state.pressure > 0]).max() < precision * scale
+
+
+def dense_solution(gap, spacing, load):
+    """Active-set solution of the same quadratic programme with a dense matrix, independent of the solver."""
+    cells = np.eye(gap.size).reshape(gap.size, *gap.shape)
+    matrix = np.array([direct(cell, spacing).ravel() for cell in cells])
+    active = np.ones(gap.size, bool)
+    while True:  # remove tension; cells that would penetrate are checked by the caller
+        m = int(active.sum())
+        system = np.zeros((m + 1, m + 1))
+        system[:m, :m] = matrix[np.ix_(active, active)]
+        system[:m, m], system[m, :m] = -1, 1
+        solution = np.linalg.solve(system, np.append(-gap.ravel()[active], load))
+        if (solution[:m] >= 0).all():
+            break
+        active[np.flatnonzero(active)[solution[:m] < 0]] = False
+    pressure = np.zeros(gap.size)
+    pressure[active] = solution[:m]
+    return pressure.reshape(gap.shape), solution[m]
+
+
+def test_given_load__agrees_with_dense_linear_algebra():
+    shape, spacing = (11, 9), (1.0, 0.8)
+    x, y = np.indices(shape)
+    gap = ((x - 4.7) ** 2 + (0.8 * (y - 4.2)) ** 2) / 30
+    expected, approach = dense_solution(gap, spacing, 12.0)
+    state = solve_contact(HalfSpace(shape, spacing), gap, load=12.0, tolerance=1e-14)
+    assert state.pressure == pytest.approx(expected, abs=1e-6 * expected.max())
+    assert state.approach == pytest.approx(approach, rel=1e-10)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("mean", [1e-3, 0.05, 0.4])
+def test_given_load__is_optimal_on_rough_surfaces(boundary, mean):
+    halfspace = HalfSpace((63, 48), (1.0, 1.0), boundary)
+    gap = rough_gap(halfspace.shape)
+    state = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-12)
+    check_optimal(halfspace, gap, state, 1e-5)
+    assert np.sum(state.pressure) == pytest.approx(mean * gap.size, rel=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("mean", [1e-3, 0.1, 0.6])
+def test_given_approach__returns_to_the_load(boundary, mean):
+    halfspace = HalfSpace((45, 54), (1.0, 1.0), boundary)
+    gap = rough_gap(halfspace.shape, seed=2)
+    under_load = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-12)
+    state = solve_contact(halfspace, gap, approach=under_load.approach, tolerance=1e-12)
+    check_optimal(halfspace, gap, state, 1e-5)
+    assert state.load == pytest.approx(under_load.load, rel=1e-6)
+
+
+def test_bound__bounds_the_error_in_the_energy_norm():
+    halfspace = HalfSpace((47, 50), (1.0, 1.0))
+    gap = rough_gap(halfspace.shape, seed=5)
+    exact = solve_contact(halfspace, gap, load=100.0, tolerance=1e-14)
+    for control in ({"load": 100.0}, {"approach": exact.approach}):
+        for tolerance in (1e-2, 1e-4, 1e-6):
+            state = solve_contact(halfspace, gap, **control, tolerance=tolerance)
+            error = state.pressure - exact.pressure
+            energy = np.sum(error * halfspace.displacement(error))
+            total = np.sum(state.pressure * halfspace.displacement(state.pressure))
+            assert np.sqrt(energy / total) <= state.bound * (1 + 1e-6)
+
+
+def test_warm_start__saves_iterations():
+    halfspace = HalfSpace((63, 64), (1.0, 1.0), "periodic")
+    gap = rough_gap(halfspace.shape)
+    cold = solve_contact(halfspace, gap, load=300.0)
+    warm = solve_contact(halfspace, gap, load=303.0, start=cold.pressure)
+    assert warm.iterations < 0.7 * cold.iterations
+
+
+@given(exponent=st.integers(-290, 12), boundary=st.sampled_from(["free", "periodic"]))
+@settings(max_examples=30, deadline=None)
+def test_loads__of_any_size_are_balanced(exponent, boundary):
+    gap = rough_gap((15, 17))
+    load = 10.0**exponent
+    state = solve_contact(HalfSpace(gap.shape, (1.0, 1.0), boundary), gap, load=load)
+    assert np.isfinite(state.pressure).all()
+    assert np.sum(state.pressure) == pytest.approx(load, rel=1e-12)
+    assert state.converged
+
+
+@given(scale=st.floats(1e-12, 1e6))
+@settings(max_examples=20, deadline=None)
+def test_lengths__are_neutral(scale):
+    gap = rough_gap((21, 16))
+    unit = solve_contact(HalfSpace(gap.shape, (1.0, 0.5)), gap, load=5.0, tolerance=1e-12)
+    scaled = solve_contact(HalfSpace(gap.shape, (scale, 0.5 * scale)), gap * scale, load=5.0, tolerance=1e-12)
+    assert scaled.approach == pytest.approx(scale * unit.approach, rel=1e-9)
+    assert scaled.pressure == pytest.approx(unit.pressure, abs=1e-9 * unit.pressure.max())
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 23), (2, 2), (16, 15)])
+def test_flat_surface__is_in_full_contact(shape, boundary):
+    state = solve_contact(HalfSpace(shape, (1.0, 2.0), boundary), np.zeros(shape), load=3.0)
+    assert state.converged
+    assert (state.pressure > 0).all()
+    if boundary == "periodic":
+        assert state.pressure == pytest.approx(3.0 / np.prod(shape))
+
+
+def test_absent_cells__carry_nothing():
+    shape = (41, 40)
+    x, y = np.indices(shape)
+    present = np.hypot(x - 20, y - 19.5) < 12
+    halfspace = HalfSpace(shape, (0.5, 0.5))
+    gap = np.where(present, 0.0, 7.0)
+    by_load = solve_contact(halfspace, gap, load=20.0, present=present, tolerance=1e-12)
+    check_optimal(halfspace, np.zeros(shape) + 1e-300, by_load, np.inf, present)
+    opening = halfspace.displacement(by_load.pressure) - by_load.approach
+    assert np.abs(opening[present]).max() < 1e-5 * by_load.approach
+    by_approach = solve_contact(halfspace, gap, approach=by_load.approach, present=present, tolerance=1e-12)
+    assert by_approach.load == pytest.approx(20.0, rel=1e-6)
+
+
+def test_spacer_steps__converge_alone(monkeypatch):
+    """With a useless preconditioner the projected-gradient safeguard still reaches the solution."""
+    halfspace = HalfSpace((15, 12), (1.0, 1.0))
+    gap = rough_gap(halfspace.shape, seed=3)
+    expected = solve_contact(halfspace, gap, load=40.0, tolerance=1e-10)
+    monkeypatch.setattr(HalfSpace, "approximate_inverse", lambda self, r: np.roll(-r, 3, axis=0))
+    state = solve_contact(halfspace, gap, load=40.0, tolerance=1e-6, max_iterations=20_000)
+    assert state.converged
+    assert state.approach == pytest.approx(expected.approach, rel=1e-5)
+
+
+def test_not_converged__says_so():
+    halfspace = HalfSpace((33, 30), (1.0, 1.0))
+    state = solve_contact(halfspace, rough_gap(halfspace.shape), load=10.0, tolerance=1e-12, max_iterations=3)
+    assert not state.converged
+    assert state.bound > 1e-6
+
+
+def test_simplex_projection__keeps_the_sum_and_is_nearest():
+    values = np.random.default_rng(0).standard_normal((4, 5))
+    found = contact._onto_simplex(values, 1.5)
+    expected = optimize.minimize(
+        lambda p: np.sum((p - values.ravel()) ** 2),
+        np.full(20, 1.5 / 20),
+        bounds=[(0, None)] * 20,
+        constraints={"type": "eq", "fun": lambda p: np.sum(p) - 1.5},
+        tol=1e-12,
+    )
+    assert np.sum(found) == pytest.approx(1.5)
+    assert found.ravel() == pytest.approx(expected.x, abs=1e-5)
+
+
+def hertz_errors(n, ny):
+    """Relative errors of approach and L1 pressure on a grid with the sphere at an arbitrary place in a cell."""
+    radius, modulus, force, size = 2.0, 3.0, 0.05, 1.0
+    spacing = (size / n, size / ny)
+    x = (np.arange(n) + 0.5) * spacing[0] - 0.5037 * size
+    y = (np.arange(ny) + 0.5) * spacing[1] - 0.4951 * size
+    squared = x[:, None] ** 2 + y[None, :] ** 2
+    exact = closed_forms.hertz(radius, modulus, force)
+    area = spacing[0] * spacing[1]
+    halfspace = HalfSpace((n, ny), spacing)
+    state = solve_contact(halfspace, squared / (2 * radius), load=force / modulus / area, tolerance=1e-13)
+    l1 = np.sum(np.abs(modulus * state.pressure - exact.pressure(np.sqrt(squared)))) * area / force
+    return abs(state.approach / exact.approach - 1), l1
+
+
+def test_hertz__converges_at_order_two_in_approach_and_three_halves_in_pressure():
+    grids = [(31, 34), (61, 68), (123, 134), (245, 270)]
+    errors = np.array([hertz_errors(*grid) for grid in grids])
+    orders = -np.polyfit(np.log([g[0] for g in grids]), np.log(errors), 1)[0]
+    assert 1.8 < orders[0] < 2.4, f"approach: {orders[0]:.2f}, errors {errors[:, 0]}"
+    assert 1.35 < orders[1] < 1.8, f"L1 pressure: {orders[1]:.2f}, errors {errors[:, 1]}"
+    assert errors[-1, 0] < 1e-4
+    assert errors[-1, 1] < 2e-3

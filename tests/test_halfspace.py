@@ -1,0 +1,75 @@
+"""Displacement by transforms against direct sums and closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.kernel import love_kernel
+
+GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
+
+
+def direct(pressure, spacing):
+    """Superposition of cells, one by one."""
+    nx, ny = pressure.shape
+    kernel = love_kernel(pressure.shape, spacing)
+    i, j = np.arange(nx), np.arange(ny)
+    influence = kernel[np.abs(i[:, None] - i)[:, None, :, None], np.abs(j[:, None] - j)[None, :, None, :]]
+    return np.einsum("ijkl,kl->ij", influence, pressure)
+
+
+@pytest.mark.parametrize("shape", GRIDS)
+def test_free_displacement__is_the_sum_over_cells(shape):
+    pressure = np.random.default_rng(1).random(shape)
+    found = HalfSpace(shape, (1.3, 0.7)).displacement(pressure)
+    expected = direct(pressure, (1.3, 0.7))
+    assert np.abs(found - expected).max() < 1e-14 * expected.max()
+
+
+@pytest.mark.parametrize(
+    ("shape", "waves"), [((9, 8), (0, 3)), ((9, 8), (2, 1)), ((12, 15), (3, 2)), ((12, 15), (0, 3)), ((1, 21), (0, 3))]
+)
+def test_periodic_displacement__of_a_wave(shape, waves):
+    spacing = (0.4, 0.9)
+    phase = sum(2 * np.pi * k * index / n for k, index, n in zip(waves, np.indices(shape), shape, strict=True))
+    wave_number = np.hypot(*(2 * np.pi * k / (n * d) for k, n, d in zip(waves, shape, spacing, strict=True)))
+    found = HalfSpace(shape, spacing, "periodic").displacement(np.cos(phase))
+    assert found == pytest.approx(2 / wave_number * np.cos(phase), abs=1e-13)
+
+
+@given(
+    shape=st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    boundary=st.sampled_from(["free", "periodic"]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=40, deadline=None)
+def test_operators__are_symmetric_and_positive(shape, boundary, seed):
+    halfspace = HalfSpace(shape, (1.0, 0.6), boundary)
+    a, b = np.random.default_rng(seed).standard_normal((2, *shape))
+    for operator, precision in ((halfspace.displacement, 1e-12), (halfspace.approximate_inverse, 1e-5)):
+        scale = np.linalg.norm(operator(a)) * np.linalg.norm(b) + 1e-300
+        assert np.sum(operator(a) * b) == pytest.approx(np.sum(a * operator(b)), abs=precision * scale)
+        assert np.sum(operator(a) * a) >= -precision * scale
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_approximate_inverse__inverts_what_is_far_from_the_border(boundary):
+    x, y = np.indices((45, 64))
+    pressure = np.cos(2 * np.pi * 9 * x / 45) * np.exp(-(((x - 22) / 6.0) ** 2) - ((y - 32) / 6.0) ** 2)
+    halfspace = HalfSpace((45, 64), (1.0, 1.0), boundary)
+    back = halfspace.approximate_inverse(halfspace.displacement(pressure))
+    assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
+
+
+def test_displacement__does_not_depend_on_threads():
+    pressure = np.random.default_rng(4).random((65, 70))
+    one, two = (HalfSpace((65, 70), (1.0, 1.0), workers=w).displacement(pressure) for w in (1, 2))
+    assert np.array_equal(one, two)
+
+
+def test_boundary__is_named_when_unknown():
+    with pytest.raises(InputError, match=r"boundary is 'open': expected 'free' or 'periodic'"):
+        HalfSpace((4, 4), (1.0, 1.0), "open")

@@ -1,0 +1,151 @@
+"""Numbers of a surface."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.parameters import PARAMETERS, parameters, psd
+from roughvisc.topography.readers import from_array
+from roughvisc.topography.synthesis import self_affine, wavy
+
+SIZE, SHAPE = (3e-4, 2e-4), (61, 48)
+ROUGH = self_affine(SIZE, SHAPE, hurst=0.8, rms_slope=0.2, rolloff=1e-4, shortcut=2e-5, seed=4)
+
+
+def theirs(h, periodic):
+    """The same surface in SurfaceTopography."""
+    topography = pytest.importorskip("SurfaceTopography").Topography
+    size = tuple(n * d for n, d in zip(h.shape, spacing(h), strict=True))
+    return topography(np.ma.masked_invalid(h.values), size, periodic=periodic)
+
+
+def test_parameters__are_declared_with_units():
+    found = parameters(ROUGH)
+    assert set(found) == set(PARAMETERS)
+    assert all(found[name].dims == () and found[name].attrs["long_name"] for name in found)
+    assert (found["Sq"].attrs["units"], found["rms_curvature"].attrs["units"]) == ("m", "m-1")
+    found.to_netcdf()
+
+
+@pytest.mark.parametrize("waves", [1, 2])
+def test_parameters__of_waves_are_the_closed_forms(waves):
+    amplitude, wavelength = 2e-6, 1e-4
+    q = 2 * np.pi / wavelength
+    h = wavy(amplitude, wavelength, SIZE, (601, 400), waves=waves)
+    found = parameters(h, periodic=True)
+    assert float(found["Sq"]) == pytest.approx(amplitude / np.sqrt(2) ** waves, rel=1e-10)
+    assert float(found["Sa"]) == pytest.approx(amplitude * (2 / np.pi) ** waves, rel=1e-3)
+    assert float(found["Sku"]) == pytest.approx(1.5**waves, rel=1e-10)
+    assert abs(float(found["Ssk"])) < 1e-10
+    assert float(found["Sz"]) == pytest.approx(2 * amplitude, rel=1e-3)
+    slope = amplitude * q / np.sqrt(2)
+    assert float(found["rms_slope"]) == pytest.approx(slope, rel=1e-3)
+    assert float(found["rms_slope_y"]) == pytest.approx(0 if waves == 1 else slope / np.sqrt(2), rel=1e-3, abs=1e-12)
+    assert float(found["rms_curvature"]) == pytest.approx(
+        amplitude * q**2 / 2 * (0.5**0.5 if waves == 1 else 1), rel=1e-3
+    )
+    assert float(found["Sdr"]) == pytest.approx(slope**2 / 2, rel=0.01)  # small slopes
+
+
+@pytest.mark.parametrize("order", ["slope", "curvature"])
+def test_parameters__differences_converge_at_second_order(order):
+    q = 2 * np.pi / 1e-4
+    exact = {"rms_slope": 1e-6 * q / np.sqrt(2), "rms_curvature": 1e-6 * q**2 / 2}[f"rms_{order}"]
+    errors = [
+        abs(float(parameters(wavy(1e-6, 1e-4, SIZE, (3 * n, 2 * n + 2)), periodic=True)[f"rms_{order}"]) / exact - 1)
+        for n in (25, 51)
+    ]
+    assert np.log(errors[0] / errors[1]) / np.log(51 / 25) == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_parameters__agree_with_surface_topography(periodic):
+    found, their = parameters(ROUGH, periodic=periodic), theirs(ROUGH, periodic)
+    assert float(found["Sq"]) == pytest.approx(their.Sq(), rel=1e-12)
+    assert float(found["rms_slope"]) == pytest.approx(their.rms_gradient(), rel=1e-12)
+    assert float(found["rms_curvature"]) == pytest.approx(their.rms_laplacian() / 2, rel=1e-12)
+    if periodic:
+        assert float(found["rms_slope_x"]) == pytest.approx(their.Rdq(), rel=1e-12)
+
+
+def test_parameters__leave_missing_points_out():
+    h = ROUGH.where(np.random.default_rng(0).random(SHAPE) > 0.1)
+    found, z = parameters(h), h.values[np.isfinite(h.values)]
+    assert float(found["Sq"]) == pytest.approx(z.std(), rel=1e-12)
+    assert float(found["missing_fraction"]) == pytest.approx(1 - z.size / h.size)
+    assert float(found["Sq"]) == pytest.approx(theirs(h, False).Sq(), rel=1e-12)
+    slopes = []
+    for i, j in np.ndindex(SHAPE[0] - 1, SHAPE[1] - 1):
+        a, b, c = h.values[i, j], h.values[i + 1, j], h.values[i, j + 1]
+        if np.isfinite(a + b + c):
+            slopes.append(((b - a) / (SIZE[0] / 61)) ** 2 + ((c - a) / (SIZE[1] / 48)) ** 2)
+    assert float(found["Sdq"]) == pytest.approx(np.sqrt(np.mean(slopes)), rel=1e-10)
+    assert float(found["Sdr"]) == pytest.approx(np.mean(np.sqrt(1 + np.array(slopes)) - 1), rel=1e-6)
+    checkerboard = h.where((np.arange(61)[:, None] + np.arange(48)) % 2 == 0)
+    assert np.isnan(parameters(checkerboard)["Sdq"])
+    with pytest.raises(InputError, match="all 2928 points are missing"):
+        parameters(h * np.nan)
+
+
+def test_parameters__are_the_same_in_nanometres_and_at_a_large_offset():
+    small = (ROUGH * 1e-3).assign_coords(x=ROUGH.x * 1e-3, y=ROUGH.y * 1e-3)
+    found, tiny, lifted = parameters(ROUGH), parameters(small), parameters(ROUGH + 7e-2)
+    for name in found:
+        scale = {"m": 1e-3, "m-1": 1e3}.get(found[name].attrs["units"], 1)
+        assert float(tiny[name]) == pytest.approx(scale * float(found[name]), rel=1e-9), name
+        assert float(lifted[name]) == pytest.approx(float(found[name]), rel=1e-6), name
+
+
+@pytest.mark.parametrize("shape", [(61, 48), (48, 61), (2, 9), (30, 2)])
+def test_psd__sums_to_the_variance(shape):
+    h = from_array(np.random.default_rng(1).normal(size=shape), (2e-6, 3e-6))
+    spectrum = psd(h)
+    total = float((spectrum["psd"] * spectrum["modes"]).sum()) / spectrum.attrs["area"]
+    assert total == pytest.approx(float(h.var()), rel=1e-12)
+    assert int(spectrum["modes"].sum()) == h.size - 1
+    assert (np.diff(spectrum["wavevector"]) > 0).all()
+    assert spectrum.attrs["area"] == pytest.approx(h.size * 6e-12)
+
+
+def test_psd__is_the_two_dimensional_density():
+    """A single wave a cos(qx) is two modes of density a^2 A / 4 each."""
+    h = wavy(1e-6, 1e-4, SIZE, SHAPE, waves=1)
+    spectrum = psd(h)
+    ring = spectrum.sel(wavevector=2 * np.pi / 1e-4, method="nearest")
+    assert float(ring["psd"] * ring["modes"]) == pytest.approx(2 * 1e-12 / 4 * np.prod(SIZE), rel=1e-10)
+    assert float((spectrum["psd"] * spectrum["modes"]).sum() / (ring["psd"] * ring["modes"])) == pytest.approx(
+        1, rel=1e-9
+    )
+
+
+def test_psd__has_the_slope_of_the_hurst_exponent():
+    h = self_affine(1e-3, (128, 127), hurst=0.6, rms_slope=0.1, seed=0)
+    spectrum = psd(h).sel(wavevector=slice(3e4, 3e5))
+    fitted = np.polyfit(np.log(spectrum["wavevector"]), np.log(spectrum["psd"]), 1)
+    assert fitted[0] == pytest.approx(-2 - 2 * 0.6, abs=0.05)
+
+
+def test_psd__agrees_with_surface_topography():
+    spectrum = psd(ROUGH)
+    step = 2 * np.pi / min(SIZE)
+    edges = (np.arange(1, 12) + 0.5) * step
+    _, expected = theirs(ROUGH, True).power_spectrum_from_area(collocation=edges)
+    np.testing.assert_allclose(spectrum["psd"][1:11], expected, rtol=1e-9, atol=1e-40)
+
+
+def test_psd__window_keeps_the_level_of_noise_and_stops_leakage():
+    noise = from_array(np.random.default_rng(1).normal(size=(128, 125)), 1e-6)
+    variances = [float((s["psd"] * s["modes"])[5:].sum()) for s in (psd(noise, "hann"), psd(noise))]
+    assert variances[0] / variances[1] == pytest.approx(1, abs=0.05)
+    tilted = ROUGH * 0 + xr.DataArray(np.sin(2 * np.pi * 2.5 * ROUGH.x / SIZE[0]), dims="x")
+    far = {"wavevector": slice(4e5, None)}
+    assert float(psd(tilted, "hann")["psd"].sel(far).max()) < 1e-2 * float(psd(tilted)["psd"].sel(far).max())
+
+
+def test_psd__refuses():
+    with pytest.raises(InputError, match="points are missing"):
+        psd(ROUGH.where(ROUGH.x > 1e-5))
+    with pytest.raises(InputError, match="window is 'box'"):
+        psd(ROUGH, window="box")

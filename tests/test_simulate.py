@@ -1,0 +1,169 @@
+"""The labelled result: what is in it, what is refused, the two validations of the seed paper."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc import closed_forms
+from roughvisc.study.simulate import kept_times
+from roughvisc.variables import FIELDS, VARIABLES, annotate
+
+BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
+PRESS = rv.Program().load(2e-3, over=0).hold(1.0)
+ZENER = rv.zener(1e6, 1e6, 1e6)
+
+
+def simulate(height=BALL, material=ZENER, program=PRESS, **settings):
+    return rv.simulate(height, material, program, **{"progress": False, "times": 3, "tolerance": 1e-2, **settings})
+
+
+def test_result__holds_declared_variables_with_units():
+    ds = simulate(fields=FIELDS)
+    assert dict(ds.sizes) == {"time": 3, "x": 31, "y": 34}
+    assert set(ds.variables) <= set(VARIABLES)
+    for name in ds.variables:
+        assert ds[name].attrs.get("units", "") == VARIABLES[name].units
+        assert "long_name" in ds[name].attrs
+        assert "axis" not in ds[name].attrs
+    assert ds.attrs["Conventions"] == "CF-1.11"
+    assert ds["status"].attrs["flag_meanings"].split()[int(ds["status"][0])] == "converged"
+    assert ds["time"].values.tolist() == [0.0, 0.5, 1.0]
+
+
+def test_result__is_a_contact_state():
+    ds = simulate(fields=FIELDS, tolerance=1e-5)
+    area = float(ds.x[1] - ds.x[0]) * float(ds.y[1] - ds.y[0])
+    assert (ds.pressure >= 0).all()
+    assert (ds.gap >= 0).all()
+    assert not ((ds.pressure > 0) & (ds.gap > 0)).any()
+    assert (ds.pressure.sum(("x", "y")) * area).values == pytest.approx(ds.force.values, rel=1e-12)
+    undeformed = float(BALL.max()) - BALL
+    opening = undeformed + ds.displacement - ds.approach
+    assert (ds.gap - opening).where(ds.pressure == 0, 0.0).values == pytest.approx(0, abs=1e-4 * float(ds.approach[0]))
+    counted = (ds.pressure > 0).sum(("x", "y")) * area
+    assert ds.contact_area.values == pytest.approx(counted.values)
+    assert ds.mean_gap.values == pytest.approx(ds.gap.mean(("x", "y")).values)
+
+
+def test_fields__not_asked_for_are_not_there():
+    ds = simulate(fields=())
+    assert not set(FIELDS) & set(ds.variables)
+
+
+@pytest.mark.parametrize(
+    ("material", "duration"),
+    [(rv.maxwell(1e6, 1e6), 2.0), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
+    ids=["maxwell", "zener"],
+)
+def test_seed_papers_validations__at_the_default_tolerance(material, duration):
+    """128 x 128, free space, step load: L1 pressure 5e-3, approach 1e-3, force 1e-8 at every kept time."""
+    radius, load = 1e-3, 8e-2
+    exact = closed_forms.lee_radok_step(radius, material, load)
+    size = 2.4 * float(exact.radius(duration))
+    height = rv.sphere(radius, size, 128)
+    times = np.linspace(0, duration, 9)
+    ds = rv.simulate(
+        height, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=1e-3, progress=False
+    )
+    distance = np.hypot(ds.x - size / 2, ds.y - size / 2).values
+    for i, t in enumerate(times):
+        error = np.abs(ds.pressure[i].values - exact.pressure(distance, t)).sum() * (size / 128) ** 2 / load
+        assert error < 5e-3
+    assert ds.approach.values == pytest.approx(exact.approach(times), rel=1e-3)
+    assert ds.force.values == pytest.approx(load, rel=1e-8)
+    assert float(ds.time_error.max()) < 1e-3
+    radii = np.sqrt(ds.contact_area_corrected.values / np.pi)
+    assert radii == pytest.approx(exact.radius(times), rel=5e-3)
+
+
+def test_flat_punch__is_absent_outside_and_displaces_evenly():
+    radius, load = 1e-4, 1e-2
+    ds = simulate(rv.flat_punch(radius, size=3e-4, shape=(63, 64)), rv.elastic(1e6), rv.Program().load(load, over=0))
+    exact = closed_forms.flat_punch(radius, 4e6, load)
+    assert float(ds.approach[0]) == pytest.approx(exact.approach, rel=2e-2)
+    assert np.isnan(ds.gap.values[0, 0, 0])
+    assert ds.pressure.values[0, 0, 0] == 0
+
+
+def test_westergaard__wavy_surface_under_periodic_boundaries():
+    amplitude, wavelength, modulus = 1e-7, 1e-4, 4e6
+    surface = rv.wavy(amplitude, wavelength, size=(wavelength, 2e-6), shape=(257, 3), waves=1)
+    mean = 0.3 * np.pi * modulus * amplitude / wavelength
+    area = wavelength * 2e-6
+    ds = simulate(surface, rv.elastic(1e6), rv.Program().load(mean * area, over=0), boundary="periodic", tolerance=1e-6)
+    exact = closed_forms.westergaard(amplitude, wavelength, modulus, mean)
+    assert float(ds.contact_fraction[0]) == pytest.approx(exact.contact_fraction, abs=1.5 / 257)
+    expected = exact.pressure(ds.x.values)  # a crest is at x = 0
+    assert np.abs(ds.pressure.values[0, :, 1] - expected).sum() < 5e-3 * expected.sum()
+
+
+def test_zero_load__is_open():
+    ds = simulate(program=rv.Program().load(2e-3, over=0).hold(0.5).load(0, over=0).hold(0.5), times=[0.25, 0.75])
+    assert [ds.status.attrs["flag_meanings"].split()[i] for i in ds.status.values] == ["converged", "open"]
+    assert np.isfinite(ds.approach.values).all()
+    assert np.isfinite(ds.gap.values).all()
+
+
+def test_seed_method__gives_the_same_dataset():
+    fast, seed = (simulate(method=m, time_step=0.02) for m in ("fast", "seed"))
+    assert set(fast.variables) == set(seed.variables)
+    assert float(abs(fast.pressure - seed.pressure).sum() / fast.pressure.sum()) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"), [(None, None), (1, (2.0,)), (3, (0.0, 1.0, 2.0)), ([0.5 + 1e-14, 2.0], (0.5, 2.0))]
+)
+def test_kept_times__are_counted_listed_or_snapped(times, expected):
+    assert kept_times(rv.Program().load(1.0, over=0.5).hold(1.5), times) == expected
+
+
+def with_value(value):
+    height = BALL.copy()
+    height[3, 4] = value
+    return height
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: simulate(height=with_value(np.nan)), r"missing at 1 of 1054 points, the first at cell \(3, 4\)"),
+        (lambda: simulate(height=with_value(np.inf)), "infinite values"),
+        (lambda: simulate(height=BALL * np.nan), "missing everywhere"),
+        (lambda: simulate(height=BALL.values), r"height is ndarray: expected a DataArray"),
+        (lambda: simulate(height=BALL.T), r"height is \('y', 'x'\)"),
+        (lambda: simulate(height=BALL[[0, 1, 5]]), "not evenly spaced"),
+        (lambda: simulate(boundary="open"), "boundary is 'open'"),
+        (lambda: simulate(tolerance=0), "tolerance is 0"),
+        (lambda: simulate(time_step=-1.0), r"time_step is -1\.0"),
+        (lambda: simulate(program=rv.Program()), "program is empty"),
+        (lambda: simulate(fields=("stress",)), "fields holds 'stress': expected some of pressure, gap, displacement"),
+        (lambda: simulate(method="slow"), "method is 'slow'"),
+        (lambda: simulate(times=[2.0]), "times holds 2 s: expected times from 0 to the program's end at 1 s"),
+        (lambda: simulate(times=0), "times is 0"),
+        (lambda: simulate(missing="ignore"), "missing is 'ignore'"),
+        (lambda: simulate(program=rv.Program().load(10.0, over=0)), "contact reaches the border"),
+        (
+            lambda: simulate(boundary="periodic", program=rv.Program().approach(1e-3, over=1)),
+            "with periodic boundaries contact is full",
+        ),
+    ],
+)
+def test_bad_input__is_one_readable_message(call, message):
+    with pytest.raises(rv.InputError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_progress__is_reported_to_a_function():
+    seen = []
+    simulate(progress=lambda now, end: seen.append((now, end)))
+    assert seen[-1] == (1.0, 1.0)
+    assert seen == sorted(seen)
+
+
+def test_annotate__refuses_what_is_not_declared():
+    with pytest.raises(KeyError, match="stress"):
+        annotate(xr.Dataset({"stress": ("time", [1.0])}))
+    with pytest.raises(ValueError, match="declared are"):
+        annotate(xr.Dataset({"force": ("x", [1.0])}))

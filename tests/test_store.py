@@ -1,0 +1,98 @@
+"""Files of results: whole or absent, plain to every reader, lazy to ours."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from sample_results import hertz_creep, rough_creep
+
+from roughvisc.errors import InputError
+from roughvisc.study.store import open_result, whole_file, write_result
+
+
+def test_write_result__gives_the_same_numbers_back(tmp_path):
+    written = rough_creep(shape=(21, 34), frames=5)
+    path = write_result(written, tmp_path / "new" / "result.nc")
+    assert [p.name for p in path.parent.iterdir()] == ["result.nc"]
+    with open_result(path) as read:
+        assert read["pressure"].encoding["chunksizes"] == (1, 21, 34)
+        assert not read["pressure"]._in_memory
+        xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
+        assert read.attrs["title"] == written.attrs["title"]
+        assert read["wall_time"].dtype.kind == "f", "seconds stay numbers"
+
+
+def test_write_result__follows_the_conventions(tmp_path):
+    path = write_result(rough_creep(shape=(8, 9), frames=4).assign_attrs(flag=True, nothing=None), tmp_path / "r.nc")
+    with netCDF4.Dataset(path) as raw:
+        assert raw.Conventions == "CF-1.11"
+        assert raw.flag == 1
+        assert "nothing" not in raw.ncattrs()
+        assert raw["status"].flag_meanings.split()[1] == "not_converged"
+        assert raw["status"].flag_values.dtype == raw["status"].dtype
+        assert list(raw["force"].chunking()) == [4]
+        assert {n for n, v in raw.variables.items() if "_FillValue" in v.ncattrs()} == {"height", "gap", "time_error"}
+        for name, variable in raw.variables.items():
+            assert variable.filters()["zlib"], name
+            assert variable.filters()["complevel"] == 1
+            assert variable.long_name
+            assert name == "status" or variable.units
+            assert "axis" not in variable.ncattrs()
+
+
+def test_write_result__refuses_what_is_not_declared(tmp_path):
+    with pytest.raises(KeyError, match="'colour' is not declared"):
+        write_result(hertz_creep((5, 6), 2).assign(colour=3.0), tmp_path / "r.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_write_result__leaves_nothing_behind_when_it_fails(tmp_path, monkeypatch):
+    path = write_result(hertz_creep((5, 6), 2), tmp_path / "r.nc")
+    before = path.read_bytes()
+
+    def fails(self, target, **_):
+        with open(target, "wb") as stream:
+            stream.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", fails)
+    with pytest.raises(OSError, match="No space left"):
+        write_result(hertz_creep((5, 6), 3), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_whole_file__appears_at_the_end_only(tmp_path):
+    with whole_file(tmp_path / "a" / "x.png") as temporary:
+        temporary.write_text("new")
+        assert temporary.suffix == ".png"
+        assert not (tmp_path / "a" / "x.png").exists()
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
+
+    def interrupted():
+        with whole_file(tmp_path / "a" / "y.png") as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
+    with pytest.raises(InputError, match="cannot be made"), whole_file(tmp_path / "a" / "x.png" / "z.nc"):
+        pass
+
+
+def test_open_result__refuses_what_is_none(tmp_path):
+    with pytest.raises(InputError, match="does not exist: expected a result"):
+        open_result(tmp_path / "none.nc")
+    with pytest.raises(InputError, match="is a folder"):
+        open_result(tmp_path)
+    (tmp_path / "text.nc").write_text("hello")
+    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+        open_result(tmp_path / "text.nc")
+    whole = write_result(hertz_creep((30, 40), 4), tmp_path / "whole.nc").read_bytes()
+    (tmp_path / "torn.nc").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+        open_result(tmp_path / "torn.nc")
+    xr.Dataset({"rain": ("time", np.arange(3.0))}).to_netcdf(tmp_path / "weather.nc")
+    with pytest.raises(InputError, match="holds no time, force, approach: expected a result of roughvisc"):
+        open_result(tmp_path / "weather.nc")

@@ -1,0 +1,231 @@
+"""Surfaces from recipes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.topography.synthesis import cone, flat_punch, grown, self_affine, sphere, wavy
+
+SIZE, SHAPE = (3e-3, 2e-3), (31, 24)
+
+
+def spectral(h):
+    """Wavevectors [1/m] and amplitudes [m] of all modes of a periodic grid, by the full complex transform."""
+    steps = [float(h[axis][1] - h[axis][0]) for axis in ("x", "y")]
+    q = np.meshgrid(*(2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip(h.shape, steps, strict=True)), indexing="ij")
+    return q[0], q[1], np.fft.fft2(h.values) / h.size
+
+
+@pytest.mark.parametrize(
+    "h",
+    [
+        sphere(1e-2, SIZE, SHAPE),
+        cone(0.1, SIZE, SHAPE),
+        flat_punch(5e-4, SIZE, SHAPE),
+        wavy(1e-6, 1e-3, SIZE, SHAPE),
+        self_affine(SIZE, SHAPE, hurst=0.8, rms_slope=0.1, seed=1),
+    ],
+    ids=["sphere", "cone", "flat_punch", "wavy", "self_affine"],
+)
+def test_recipe__gives_a_labelled_grid_at_cell_centres(h):
+    assert isinstance(h, xr.DataArray)
+    assert (h.name, h.dims, h.shape, h.dtype) == ("height", ("x", "y"), SHAPE, np.float64)
+    np.testing.assert_allclose(h.x, (np.arange(31) + 0.5) * 3e-3 / 31, rtol=1e-14)
+    np.testing.assert_allclose(h.y, (np.arange(24) + 0.5) * 2e-3 / 24, rtol=1e-14)
+    assert h.attrs["units"] == h.x.attrs["units"] == h.y.attrs["units"] == "m"
+    assert "axis" not in h.x.attrs
+    assert json.loads(h.attrs["recipe"])["shape"] == list(SHAPE)
+
+
+def test_sphere__is_the_paraboloid_about_the_centre():
+    h = sphere(0.02, SIZE, SHAPE)
+    r2 = (h.x - 1.5e-3) ** 2 + (h.y - 1e-3) ** 2
+    np.testing.assert_allclose(h, -r2 / 0.04, rtol=1e-12)
+    assert h.sel(x=1.5e-3, method="nearest").max() == pytest.approx(-((1e-3 / 24) ** 2) / 0.04)  # y: between two cells
+
+
+def test_sphere__exact_cap_satisfies_the_equation_of_the_sphere_and_ends_at_the_equator():
+    h = sphere(8e-4, SIZE, SHAPE, exact=True)
+    r2 = (h.x - 1.5e-3) ** 2 + (h.y - 1e-3) ** 2
+    assert bool((np.isnan(h) == (r2 > 8e-4**2)).all())
+    np.testing.assert_allclose((r2 + (h + 8e-4) ** 2).values[~np.isnan(h)], 8e-4**2, rtol=1e-12)
+    assert h.attrs["missing"] == "absent"
+    assert "missing" not in sphere(1.0, SIZE, SHAPE, exact=True).attrs
+
+
+def test_sphere__cap_keeps_its_digits_where_it_is_shallow():
+    cap, paraboloid = (sphere(1e3, 1e-6, 5, exact=e).values for e in (True, False))
+    np.testing.assert_allclose(cap, paraboloid, rtol=1e-13)
+
+
+def test_cone__has_the_slope_given():
+    h = cone(0.2, 1.0, 101)
+    along = h.isel(y=50)
+    np.testing.assert_allclose(np.abs(along.differentiate("x").values[[10, -10]]), 0.2, rtol=1e-12)
+    assert float(h.max()) == h.values[50, 50] == 0.0
+
+
+def test_flat_punch__is_absent_outside_its_radius():
+    h = flat_punch(0.3, (1.0, 1.2), (201, 240))
+    assert h.attrs["missing"] == "absent"
+    assert set(np.unique(h.values[~np.isnan(h.values)])) == {0.0}
+    area = float((~np.isnan(h)).sum()) * (1.0 / 201) * (1.2 / 240)
+    assert area == pytest.approx(math.pi * 0.09, rel=5e-3)
+
+
+@pytest.mark.parametrize(("waves", "modes"), [(1, 2), (2, 4)])
+def test_wavy__holds_the_modes_of_its_wavelength_alone(waves, modes):
+    h = wavy(2e-6, 1e-3, SIZE, SHAPE, waves=waves)
+    q_x, q_y, h_q = spectral(h)
+    large = np.abs(h_q) > 1e-12 * 2e-6
+    assert large.sum() == modes
+    np.testing.assert_allclose(np.abs(h_q[large]), 2e-6 / modes, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(q_x[large]), 2 * np.pi / 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(q_y[large]), 0 if waves == 1 else 2 * np.pi / 1e-3, rtol=1e-12)
+    fine = wavy(2e-6, 1e-3, SIZE, (301, 241), waves=waves)
+    assert float(fine[0, 0]) == pytest.approx(2e-6, rel=1e-2)  # a crest at the corner
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    shape=st.tuples(st.integers(8, 41), st.integers(8, 41)),
+    hurst=st.floats(0.1, 1.0),
+    anisotropy=st.floats(0.5, 2.0),
+    seed=st.integers(0, 2**32),
+)
+def test_self_affine__meets_slope_and_height_exactly(shape, hurst, anisotropy, seed):
+    options = {"hurst": hurst, "anisotropy": anisotropy, "seed": seed}
+    h = self_affine(SIZE, shape, rms_height=3e-7, **options)
+    assert float(np.sqrt((h**2).mean())) == pytest.approx(3e-7, rel=1e-10)
+    assert abs(float(h.mean())) < 1e-20
+    h = self_affine(SIZE, shape, rms_slope=0.1, **options)
+    q_x, q_y, h_q = spectral(h)
+    assert np.sqrt(((q_x**2 + q_y**2) * np.abs(h_q) ** 2).sum()) == pytest.approx(0.1, rel=1e-10)
+
+
+def test_self_affine__spectrum_follows_the_power_law_between_rolloff_and_shortcut():
+    rolloff, shortcut, hurst = 8e-4, 2.2e-4, 0.7
+    h = self_affine(SIZE, (63, 48), hurst=hurst, rms_slope=0.1, rolloff=rolloff, shortcut=shortcut, seed=3)
+    q_x, q_y, h_q = spectral(h)
+    q, power = np.hypot(q_x, q_y), np.abs(h_q) ** 2
+    law = np.maximum(q, 2 * np.pi / rolloff) ** (-2 - 2 * hurst) * (q > 0) * (q < 2 * np.pi / shortcut)
+    np.testing.assert_allclose(power / power.max(), law / law.max(), atol=1e-12)
+    assert ((law > 0) & (q < 2 * np.pi / rolloff)).sum() > 4
+    assert (law > 0).sum() > 50
+
+
+def test_self_affine__phases_are_random_and_the_seed_decides():
+    first, again, other = (self_affine(1.0, (45, 32), hurst=0.5, rms_slope=1.0, seed=s) for s in (5, 5, 6))
+    assert first.equals(again)
+    assert abs(float(xr.corr(first, other))) < 0.6
+    generator = np.random.default_rng(5)
+    assert first.equals(self_affine(1.0, (45, 32), hurst=0.5, rms_slope=1.0, seed=generator))
+    phases = np.angle(np.fft.rfft2(first.values)[1:20, 1:10]).ravel()
+    assert abs(np.exp(1j * phases).mean()) < 0.25
+
+
+def test_self_affine__anisotropy_stretches_the_texture_along_x():
+    h = self_affine(1.0, (96, 85), hurst=0.8, rms_height=1.0, rolloff=0.2, anisotropy=4.0, seed=2)
+    q_x, q_y, h_q = spectral(h)
+    slopes = [np.sqrt((q**2 * np.abs(h_q) ** 2).sum()) for q in (q_x, q_y)]
+    assert slopes[1] / slopes[0] == pytest.approx(4.0, rel=0.1)
+
+
+def test_self_affine__is_the_same_in_nanometres():
+    metres = self_affine((3.0, 2.0), SHAPE, hurst=0.8, rms_slope=0.1, rolloff=1.0, seed=1)
+    nano = self_affine((3e-9, 2e-9), SHAPE, hurst=0.8, rms_slope=0.1, rolloff=1e-9, seed=1)
+    np.testing.assert_allclose(nano * 1e9, metres.values, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "h",
+    [
+        sphere(1e-2, SIZE, SHAPE),
+        sphere(1e-3, SIZE, SHAPE, exact=True),
+        cone(0.1, SIZE, SHAPE),
+        flat_punch(5e-4, SIZE, SHAPE),
+    ],
+)
+@pytest.mark.parametrize("factor", [1.001, 1.5, 3])
+def test_grown__keeps_the_cells_that_exist_and_adds_the_same_profile(h, factor):
+    larger = grown(h, factor)
+    assert all(big >= factor * small for big, small in zip(larger.shape, h.shape, strict=True))
+    inner = larger.sel(x=h.x, y=h.y)
+    xr.testing.assert_identical(inner.drop_attrs(), h.drop_attrs())
+    np.testing.assert_allclose(np.diff(larger.x), 3e-3 / 31, rtol=1e-9)
+    mirrored = larger.values[::-1, ::-1]  # still about the same centre
+    np.testing.assert_allclose(larger.values, mirrored, rtol=1e-9, atol=1e-18)
+    assert grown(larger, 2).shape[0] >= 2 * larger.shape[0]
+
+
+def test_grown__equals_the_recipe_on_the_larger_domain():
+    larger = grown(sphere(1e-2, SIZE, SHAPE), 35 / 31)
+    assert larger.shape == (35, 28)
+    direct = sphere(1e-2, (35 * 3e-3 / 31, 28 * 2e-3 / 24), (35, 28))
+    np.testing.assert_allclose(larger.values, direct.values, rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda h: -h,
+        lambda h: h + 1e-9,
+        lambda h: h.where(h.x > 1e-4),
+        lambda h: h.assign_coords(x=h.x + 1e-3),
+        lambda h: h.assign_coords(x=h.x * 2),
+        lambda h: h.assign_attrs(recipe="{"),
+        lambda h: h.assign_attrs(recipe='{"name": "sphere", "parameters": {}, "size": [1, 1], "shape": [0, 0]}'),
+        lambda h: h.assign_attrs(recipe='{"name": "wavy"}'),
+        lambda h: h.drop_attrs(),
+    ],
+)
+def test_grown__gives_none_where_the_recipe_does_not_reproduce_the_heights(changed):
+    h = sphere(1e-2, SIZE, SHAPE)
+    assert grown(h) is not None
+    with xr.set_options(keep_attrs=True):
+        assert grown(changed(h)) is None
+
+
+def test_grown__accepts_what_leaves_the_profile_alone():
+    h = sphere(1e-2, SIZE, SHAPE)
+    assert grown(h.transpose("y", "x")).dims == ("x", "y")
+    part = grown(h.isel(x=slice(3, 20)))
+    np.testing.assert_allclose(part.sel(x=h.x[5], y=h.y), h.isel(x=5))
+    assert grown(wavy(1e-6, 1e-3, SIZE, SHAPE)) is None
+
+
+@pytest.mark.parametrize(
+    ("call", "fragments"),
+    [
+        (lambda: sphere(0.0, 1.0, 5), ("radius is 0.0", "[m]")),
+        (lambda: sphere("1 mm", 1.0, 5), ("radius is '1 mm'",)),
+        (lambda: sphere(1.0, (1.0, math.nan), 5), ("size is nan",)),
+        (lambda: sphere(1.0, (1.0, 1.0, 1.0), 5), ("size is (1.0, 1.0, 1.0)", "pair")),
+        (lambda: sphere(1.0, 1.0, 5.0), ("shape is 5.0", "whole")),
+        (lambda: sphere(1.0, 1.0, (5, 0)), ("shape is (5, 0)",)),
+        (lambda: sphere(1.0, 1.0, True), ("shape is True",)),
+        (lambda: cone(-0.1, 1.0, 5), ("slope is -0.1",)),
+        (lambda: flat_punch(0.01, 1.0, 4), ("radius is 0.01", "cell")),
+        (lambda: wavy(1.0, 0.3, 1.0, 9), ("3.33333 wavelengths", "whole")),
+        (lambda: wavy(1.0, 3.0, 1.0, 9), ("wavelengths",)),
+        (lambda: wavy(1.0, 0.5, 1.0, 9, waves=3), ("waves is 3",)),
+        (lambda: self_affine(1.0, 9, hurst=0.5, seed=0), ("exactly one",)),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rms_height=1.0, seed=0), ("exactly one",)),
+        (lambda: self_affine(1.0, 9, hurst=1.5, rms_slope=1.0, seed=0), ("hurst is 1.5", "at most 1")),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=0.1, seed=0), ("shortcut is 0.1", "two cells")),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rolloff=0.1, seed=0), ("rolloff is 0.1",)),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=2.0, seed=0), ("no wave",)),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, seed="x"), ("seed is 'x'",)),
+    ],
+)
+def test_recipe__refuses_with_parameter_found_and_expected(call, fragments):
+    with pytest.raises(InputError) as refused:
+        call()
+    assert all(fragment in str(refused.value) for fragment in fragments), refused.value
+    assert "expected" in str(refused.value)

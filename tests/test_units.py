@@ -1,0 +1,105 @@
+"""Quantities at the door."""
+
+import contextlib
+import math
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.units import quantity
+
+PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("10 um", "m", 1e-5),
+        ("10um", "m", 1e-5),
+        ("10 µm", "m", 1e-5),
+        ("10 μm", "m", 1e-5),  # the other Greek mu
+        ("-3.5 nm", "m", -3.5e-9),
+        ("0.1 MPa s", "Pa s", 1e5),
+        ("0.1 MPa*s", "Pa s", 1e5),
+        ("3 N/m^2", "Pa", 3.0),
+        ("3 N / m**2", "Pa", 3.0),
+        ("3 N/m²", "Pa", 3.0),
+        ("2 kg m/s^2", "N", 2.0),
+        ("50 ms", "s", 0.05),
+        ("2 min", "s", 120.0),
+        ("1 inch", "m", 0.0254),
+        ("0.3", "1", 0.3),
+        ("50 %", "1", 0.5),
+        ("5 MPa/MPa", "1", 5.0),
+        ("1e3 Hz", "1/s", 1e3),
+        ("180 degree", "rad", math.pi),
+        ("20 degC", "K", 293.15),
+    ],
+)
+def test_quantity__reads_number_and_unit(text, unit, expected):
+    assert quantity(text, unit) == pytest.approx(expected, rel=2e-15)
+
+
+@given(
+    st.decimals(min_value="0.001", max_value="9999", places=3),
+    st.sampled_from(sorted(PREFIXES)),
+)
+def test_quantity__is_the_float_that_a_person_would_write(number, unit):
+    assert quantity(f"{number} {unit}", "m") == float(f"{number}{PREFIXES[unit]}")
+
+
+@pytest.mark.parametrize("number", [3, 3.0, np.float64(3), np.int32(3)])
+def test_quantity__takes_plain_numbers_as_they_are(number):
+    assert quantity(number, "m") == 3.0
+    assert type(quantity(number, "m")) is float
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "fragments"),
+    [
+        ("3 s", "m", ("'3 s'", "second", " m,")),
+        ("3 Pa", "Pa s", ("pascal", "Pa s")),
+        ("3 bananas", "m", ("bananas", "not known")),
+        ("3", "m", ("without a unit", "'3 m'")),
+        ("um", "m", ("no quantity",)),
+        ("", "m", ("no quantity",)),
+        ("3 + 4 m", "m", ("no quantity",)),
+        ("45 degree", "1", ("degree", "a number")),
+        (True, "m", ("True",)),
+        (None, "m", ("None",)),
+        ([1], "m", ("[1]",)),
+        (math.nan, "m", ("finite",)),
+        (math.inf, "m", ("finite",)),
+        ("1e999 m", "m", ("finite",)),
+        ("nan m", "m", ("no quantity",)),
+    ],
+)
+def test_quantity__refuses_with_what_was_found_and_expected(value, unit, fragments):
+    with pytest.raises(InputError) as refused:
+        quantity(value, unit, "radius")
+    message = str(refused.value)
+    assert message.startswith("radius is ")
+    assert all(fragment in message for fragment in fragments), message
+    assert "expected" in message
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["9**9**9**9 m", "1 m**9**9**9", "1 " + "m " * 40_000, "1 m^99999999", "1 " + "a" * 90, "1 " + "a" * 90 + "!"],
+)
+def test_quantity__does_not_hang_on_hostile_text(text):
+    quantity("1 m", "m")
+    start = time.perf_counter()
+    with pytest.raises(InputError):
+        quantity(text, "m")
+    assert time.perf_counter() - start < 1
+
+
+@given(st.text(max_size=40))
+def test_quantity__any_text_gives_a_number_or_an_input_error(text):
+    with contextlib.suppress(InputError):
+        assert math.isfinite(quantity(text, "m"))

@@ -1,0 +1,57 @@
+"""The seed paper's first validation: a sphere on a Maxwell half-space under a suddenly applied load.
+
+Pressure profiles at several times against the closed form (Lee and Radok), in the paper's dimensionless axes:
+pressure over the Hertz peak pressure at time zero, against radius over the Hertz contact radius at time zero.
+
+    python workflows/maxwell_step.py [CELLS] [FIGURE]
+"""
+
+import sys
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import roughvisc as rv
+from roughvisc import closed_forms
+
+RADIUS, LOAD = 10e-3, 1.0  # m, N
+RELAXATION_TIME = 1.0  # s
+
+
+def main(cells=128, figure="maxwell_step.png"):
+    rubber = rv.maxwell(shear_modulus=1e6, viscosity=1e6 * RELAXATION_TIME)
+    times = RELAXATION_TIME * np.array([0.0, 0.5, 1.0, 2.0])
+    fig = Figure(figsize=(5.2, 3.6), layout="constrained")
+    axes = fig.add_subplot()
+    compare(axes, rubber, times, cells, RELAXATION_TIME)
+    axes.set_title("Maxwell half-space, load applied at $t = 0$")
+    fig.savefig(figure, dpi=200)
+    return fig
+
+
+def compare(axes, rubber, times, cells, unit_of_time):
+    """Draw computed and exact profiles; returns the largest relative L1 error of the pressure."""
+    exact = closed_forms.lee_radok_step(RADIUS, rubber, LOAD)
+    hertz = closed_forms.hertz(RADIUS, 1 / float(rubber.contact_compliance(0.0)), LOAD)
+    size = 2.3 * float(exact.radius(times[-1]))
+    ball = rv.sphere(RADIUS, size, cells)
+    program = rv.Program().load(LOAD, over=0).hold(times[-1])
+    ds = rv.simulate(ball, rubber, program, times=times, tolerance=1e-3, progress=False)
+    distance = np.hypot(ds.x - size / 2, ds.y - size / 2)
+    errors = []
+    for i, (t, colour) in enumerate(zip(times, ("#000000", "#0072B2", "#D55E00", "#009E73"), strict=True)):
+        r = np.linspace(0, 1.1 * float(exact.radius(t)), 400)
+        axes.plot(r / hertz.radius, exact.pressure(r, t) / hertz.peak_pressure, color=colour, lw=1.2)
+        middle = ds.pressure[i, :, cells // 2]
+        axes.plot(distance[:, cells // 2] / hertz.radius, middle / hertz.peak_pressure, "o", ms=2.8, mfc="none",
+                  color=colour, label=f"$t = {t / unit_of_time:g}\\,\\tau$")  # fmt: skip
+        error = np.abs(ds.pressure[i].values - exact.pressure(distance.values, t)).sum()
+        errors.append(float(error / ds.pressure[i].sum()))
+    axes.set(xlabel="radius over Hertz radius, $r / a_H$", ylabel="pressure over Hertz peak, $p / p_H$")
+    axes.set(xlim=(0, None), ylim=(0, None))
+    axes.legend(title="computed; lines: closed form", frameon=False)
+    return max(errors)
+
+
+if __name__ == "__main__":
+    main(*(int(a) if a.isdigit() else a for a in sys.argv[1:]))
