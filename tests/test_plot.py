@@ -157,6 +157,20 @@ def test_spread_frames__first_and_last_and_even():
     assert axes.spread_frames([1.0, 2.0], 1).tolist() == [1]
 
 
+def test_telling_frames__show_contact_and_its_largest_extent():
+    time = np.linspace(0.0, 1.0, 21)
+    area = np.where((time > 0.1) & (time < 0.8), 1.0, 0.0)
+    area[13] = 2.0
+    area[-1] = 1e-4
+    ds = xr.Dataset({"contact_area": ("time", area)}, {"time": time})
+    frames = axes.telling_frames(ds, 4)
+    assert frames == [3, 7, 13, 15]
+    assert axes.fullest_frame(ds) == 13
+    assert axes.telling_frames(0 * ds, 3) == [0, 10, 20]
+    assert axes.telling_frames(ds.drop_vars("contact_area"), 3) == [0, 10, 20]
+    assert axes.fullest_frame(ds.drop_vars("contact_area")) == axes.fullest_frame(0 * ds) == 20
+
+
 def test_frame_at__nearest_time_or_counted_from_the_end():
     times = [0.0, 1.0, 10.0]
     assert [axes.frame_at(times, t) for t in (0, 0.6, 5.4, 5.6, 99, -1, -3)] == [0, 1, 1, 2, 2, 2, 0]
@@ -180,7 +194,7 @@ def test_history__data_and_units():
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
     np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
-    np.testing.assert_allclose(lines(accuracy)["solver"].get_ydata(), ds["residual"])
+    np.testing.assert_allclose(lines(accuracy)["solver (energy bound)"].get_ydata(), ds["residual"])
     np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
     np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
 
@@ -371,6 +385,18 @@ def test_section__goes_where_it_is_told():
         plot.section(ds.drop_vars("gap"))
 
 
+def test_section__of_a_flat_face_in_full_contact_has_the_scale_of_the_approach():
+    ds = made.one_frame()
+    ds["height"][:] = ds["gap"][:] = 0.0
+    ds["pressure"][:] = 1.0
+    ds = ds.drop_vars("displacement")
+    bottom = plot.section(ds).axes[1]
+    assert bottom.get_ylabel() == "Height [µm]"
+    assert lines(bottom)["undeformed"].get_ydata()[0] == pytest.approx(-1e6 * float(ds["approach"][0]))
+    bar = plot.maps(ds, fields="gap").axes[-1]
+    assert bar.get_yticks().tolist() == [0.0]
+
+
 def test_section__without_pressure_says_so():
     top, _ = plot.section(made.hertz_creep().drop_vars("pressure")).axes
     assert [text.get_text() for text in top.texts] == ["pressure was not kept"]
@@ -472,7 +498,7 @@ def test_animate__map_section_and_history_move_together():
         assert figure.get_suptitle() == axes.time_text(float(ds["time"][frame]))
         assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
         assert len(approach.lines[1].get_xdata()) == frame + 1
-        index = int(ds["height"].max("x").argmax("y"))
+        index = int(ds["pressure"][-1].sum("x").argmax("y"))
         surface = (ds["height"] + ds["gap"].isel(time=frame)).isel(y=index)
         np.testing.assert_allclose(section.lines[1].get_ydata(), 1e6 * surface)
     assert seen == [0, 4, 7, 11]

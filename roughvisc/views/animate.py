@@ -19,6 +19,7 @@ from roughvisc.views.axes import (
     VERMILION,
     TimeAxis,
     edges,
+    fullest_frame,
     letter_panels,
     new_figure,
     require,
@@ -29,6 +30,7 @@ from roughvisc.views.axes import (
 )
 from roughvisc.views.fields import (
     NAMES,
+    cut_position,
     deformed_surface,
     draw_map,
     draw_outline,
@@ -170,12 +172,12 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
 
 
 def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
-    """Profile and deformed surface along x, through the highest peak, or the field's name where they are unknown."""
+    """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
     if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
         ax.set_axis_off()
         ax.text(0.5, 0.5, "no height or gap kept: no section", transform=ax.transAxes, ha="center", color="0.4")
         return lambda frame: None
-    index = int(dataset["height"].max("x").argmax("y"))
+    index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
     surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
     known = np.concatenate([height, *surfaces])

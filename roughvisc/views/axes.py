@@ -234,6 +234,33 @@ def spread_frames(times, count: int) -> np.ndarray:
     return np.unique(nearest)
 
 
+def telling_frames(dataset: xr.Dataset, count: int) -> list[int]:
+    """Indices of at most ``count`` frames: even in time while there is contact, that of the largest area among them.
+
+    Frames whose contact is below a thousandth of the largest show nothing; they are drawn only if there are no others.
+    """
+    frames = np.arange(dataset.sizes["time"])
+    if "contact_area" in dataset:
+        area = np.nan_to_num(dataset["contact_area"].values)
+        if area.max() > 0:
+            frames = frames[area > 1e-3 * area.max()]
+    chosen = frames[spread_frames(dataset["time"].values[frames], count)]
+    if "contact_area" in dataset and len(chosen) > 2 and len(chosen) < len(frames):
+        largest = frames[area[frames].argmax()]
+        if area[chosen].max() < 0.999 * area[largest]:
+            inner = np.abs(chosen[1:-1] - largest).argmin() + 1
+            chosen = np.sort(np.append(np.delete(chosen, inner), largest))
+    return [int(frame) for frame in np.unique(chosen)]
+
+
+def fullest_frame(dataset: xr.Dataset) -> int:
+    """Index of the last frame whose contact area is the largest, or of the last frame where areas are unknown."""
+    if "contact_area" not in dataset:
+        return dataset.sizes["time"] - 1
+    area = np.nan_to_num(dataset["contact_area"].values)
+    return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
+
+
 def frame_at(times, time: float) -> int:
     """Index of the kept time nearest to ``time`` [s]; a negative whole number counts frames from the end."""
     times = np.asarray(times, dtype=float)
