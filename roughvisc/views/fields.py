@@ -346,4 +346,5 @@ def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
     box, limits = ax.get_window_extent(), ax.viewLim
     ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
     text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
-    ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})
