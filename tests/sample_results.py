@@ -96,7 +96,7 @@ def rough_creep(shape=(96, 75), frames=12, absent=True, seed=5):
         coords={"time": times, "x": x, "y": y},
     )
     made = _histories(fields, np.full(frames, 2.0), np.nanmax(height) - level)
-    made["status"][3] = 1
+    made["status"][min(3, frames - 1)] = 1
     return _attributes(made, "Ground steel on a power-law rubber", "periodic")
 
 

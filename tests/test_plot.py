@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
@@ -26,7 +27,17 @@ SAMPLES = {
     "strip": lambda: made.rough_creep((150, 21)).assign_coords(y=(np.arange(21) + 0.5) * 8e-6),
     "pillar": lambda: made.rough_creep((21, 150)).assign_coords(x=(np.arange(21) + 0.5) * 8e-6),
 }
-FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()} | {"area_against_load": plot.area_against_load}
+
+
+def first_picture(dataset):
+    """The figure of an animation, as its first picture."""
+    figure, pictures = animation._moving(dataset, None, 3)
+    next(pictures)
+    return figure
+
+
+FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()}
+FIGURES |= {"area_against_load": plot.area_against_load, "animate": first_picture}
 
 
 def labels(figure):
@@ -39,8 +50,8 @@ def lines(ax):
 
 def text_boxes(figure):
     """Boxes of all texts that are seen, inset by a pixel."""
+    renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
     found = []
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
@@ -49,18 +60,25 @@ def text_boxes(figure):
             low, high = sorted(axis.get_view_interval())
             slack = 1e-9 * (high - low)
             ticks = [t for t in axis.get_major_ticks() if low - slack <= t.get_loc() <= high + slack]
+            ticks += [t for t in axis.get_minor_ticks() if low - slack <= t.get_loc() <= high + slack]
             found += [tick.label1 for tick in ticks if tick.label1.get_visible()]
             found += [tick.label2 for tick in ticks if tick.label2.get_visible()]
             found += [axis.label, axis.offsetText]
         found += [ax.title, ax._left_title, ax._right_title]
         found += ax.get_legend().get_texts() if ax.get_legend() else []
+    found += [figure._suptitle] if figure._suptitle else []
     for legend in figure.legends:
         found += legend.get_texts()
     return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]
 
 
-@pytest.mark.parametrize("sample", SAMPLES)
-@pytest.mark.parametrize("name", FIGURES)
+#: figures whose layout depends on the proportions of the map
+OF_THE_PLANE = ("maps", "section", "surface", "animate")
+DRAWN = [(name, sample) for name in FIGURES for sample in SAMPLES]
+DRAWN = [(name, sample) for name, sample in DRAWN if name in OF_THE_PLANE or sample not in ("strip", "pillar")]
+
+
+@pytest.mark.parametrize(("name", "sample"), DRAWN)
 def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
     figure = FIGURES[name](SAMPLES[sample]())
     assert isinstance(figure, Figure)
@@ -131,11 +149,26 @@ def test_time_axis__chosen_by_the_data():
 def test_spread_frames__first_and_last_and_even():
     times = np.r_[0, np.geomspace(1e-3, 1e3, 499)]
     frames = axes.spread_frames(times, 4)
-    assert (frames[0], frames[-1], len(frames)) == (0, 499, 4)
-    assert np.all(np.abs(np.diff(frames) - 500 / 3) < 10)
-    assert axes.spread_frames(np.linspace(0, 1, 500), 3).tolist() == [0, 249, 499]
+    assert frames[[0, -1]].tolist() == [0, 499]
+    assert len(frames) == 4
+    assert np.all(np.abs(np.diff(frames) - 500 / 3) < 20)
+    assert axes.spread_frames(np.linspace(0, 1, 501), 3).tolist() == [0, 250, 500]
     assert axes.spread_frames([3.0], 4).tolist() == [0]
     assert axes.spread_frames([1.0, 2.0], 1).tolist() == [1]
+
+
+def test_telling_frames__show_contact_and_its_largest_extent():
+    time = np.linspace(0.0, 1.0, 21)
+    area = np.where((time > 0.1) & (time < 0.8), 1.0, 0.0)
+    area[13] = 2.0
+    area[-1] = 1e-4
+    ds = xr.Dataset({"contact_area": ("time", area)}, {"time": time})
+    frames = axes.telling_frames(ds, 4)
+    assert frames == [3, 7, 13, 15]
+    assert axes.fullest_frame(ds) == 13
+    assert axes.telling_frames(0 * ds, 3) == [0, 10, 20]
+    assert axes.telling_frames(ds.drop_vars("contact_area"), 3) == [0, 10, 20]
+    assert axes.fullest_frame(ds.drop_vars("contact_area")) == axes.fullest_frame(0 * ds) == 20
 
 
 def test_frame_at__nearest_time_or_counted_from_the_end():
@@ -161,7 +194,7 @@ def test_history__data_and_units():
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
     np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
-    np.testing.assert_allclose(lines(accuracy)["solver"].get_ydata(), ds["residual"])
+    np.testing.assert_allclose(lines(accuracy)["solver (energy bound)"].get_ydata(), ds["residual"])
     np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
     np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
 
@@ -343,13 +376,25 @@ def test_section__gap_and_displacement_give_the_same_surface():
 
 def test_section__goes_where_it_is_told():
     ds = made.rough_creep()
-    figure = plot.section(ds, time=1.0, axis="y", at=0.3e-3)
+    figure = plot.section(ds, time=1.0, axis="y", at=0.31e-3)
     assert figure.axes[0].get_title(loc="right") == "t = 1.52 s,  x = 0.306 mm"
     np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), 1e6 * ds["height"].isel(x=24))
     with pytest.raises(InputError, match="axis is 'z'"):
         plot.section(ds, axis="z")
     with pytest.raises(InputError, match="no 'gap'"):
         plot.section(ds.drop_vars("gap"))
+
+
+def test_section__of_a_flat_face_in_full_contact_has_the_scale_of_the_approach():
+    ds = made.one_frame()
+    ds["height"][:] = ds["gap"][:] = 0.0
+    ds["pressure"][:] = 1.0
+    ds = ds.drop_vars("displacement")
+    bottom = plot.section(ds).axes[1]
+    assert bottom.get_ylabel() == "Height [µm]"
+    assert lines(bottom)["undeformed"].get_ydata()[0] == pytest.approx(-1e6 * float(ds["approach"][0]))
+    bar = plot.maps(ds, fields="gap").axes[-1]
+    assert bar.get_yticks().tolist() == [0.0]
 
 
 def test_section__without_pressure_says_so():
@@ -386,7 +431,7 @@ def test_surface__panels_and_missing_points():
     figure = plot.surface(h)
     on_map, profile, heights, spectrum = figure.axes[:4]
     np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * h.T)
-    assert on_map.get_title(loc="right") == f"{100 * float(h.isnull().mean()):.2g} % missing (grey)"
+    assert figure.get_suptitle() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (grey)"
     np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * h.isel(y=37))
     assert lines(heights)["normal, Sq = 1.5 µm"]
     assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
@@ -450,13 +495,21 @@ def test_animate__map_section_and_history_move_together():
     for frame in pictures:
         seen.append(frame)
         np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
-        assert on_map.get_title() == axes.time_text(float(ds["time"][frame]))
+        assert figure.get_suptitle() == axes.time_text(float(ds["time"][frame]))
         assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
         assert len(approach.lines[1].get_xdata()) == frame + 1
-        index = int(ds["height"].max("x").argmax("y"))
+        index = int(ds["pressure"][-1].sum("x").argmax("y"))
         surface = (ds["height"] + ds["gap"].isel(time=frame)).isel(y=index)
         np.testing.assert_allclose(section.lines[1].get_ydata(), 1e6 * surface)
     assert seen == [0, 4, 7, 11]
+
+
+def test_animate__without_histories_or_heights(tmp_path):
+    bare = made.rough_creep()[["pressure"]]
+    figure, pictures = animation._moving(bare, None, 2)
+    assert list(pictures) == [0, 11]
+    assert len(figure.axes) == 3
+    assert figure.axes[1].texts[0].get_text() == "no height or gap kept: no section"
 
 
 def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):

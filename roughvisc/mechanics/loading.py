@@ -61,7 +61,7 @@ class Segment:
             return mean + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
         if self.end is None:
             return start
-        if elapsed >= self.duration:
+        if elapsed >= self.duration * (1 - 1e-12):  # times are sums of durations, rounded
             return self.end
         return start + (self.end - start) * (elapsed / self.duration)
 

@@ -19,6 +19,7 @@ from roughvisc.views.axes import (
     VERMILION,
     TimeAxis,
     edges,
+    fullest_frame,
     letter_panels,
     new_figure,
     require,
@@ -27,7 +28,17 @@ from roughvisc.views.axes import (
     time_text,
     unit_for,
 )
-from roughvisc.views.fields import NAMES, deformed_surface, draw_map, draw_outline, outline_colour, plane_unit, present
+from roughvisc.views.fields import (
+    NAMES,
+    cut_position,
+    deformed_surface,
+    draw_map,
+    draw_outline,
+    outline_colour,
+    plane_ratio,
+    plane_unit,
+    present,
+)
 from roughvisc.views.observables import contact
 
 _LONG_NAMES = {"force": "Force", "approach": "Approach", "contact_area": "Contact area"}
@@ -63,7 +74,7 @@ def animate(
     rate : float
         Frames per second. [1/s]
     dpi : float
-        Resolution of the 7.6 x 4 inch pictures.
+        Resolution of the pictures of 7.6 x 4.2 inch. [1/inch]
 
     Returns
     -------
@@ -100,11 +111,11 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
         raise InputError(f"field is {field!r}: expected 'pressure', 'gap' or 'displacement'")
     require(dataset, field)
     chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
-    figure = new_figure(7.6, 4.0)
-    grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1])
+    figure = new_figure(7.6, 4.2)
     histories = [name for name in _LONG_NAMES if name in dataset]
-    upper, lower = figure.add_subplot(grid[:2, 0]), figure.add_subplot(grid[2, 0])
-    right = [figure.add_subplot(grid[row, 1]) for row in range(len(histories))]
+    columns = figure.add_gridspec(1, 2 if histories else 1, width_ratios=[1.15, 1] if histories else [1])
+    upper, lower = columns[0].subgridspec(2, 1, height_ratios=[2, 1]).subplots()
+    right = list(columns[1].subgridspec(len(histories), 1).subplots(squeeze=False)[:, 0]) if histories else []
     movers = [
         _moving_map(figure, upper, dataset, field, chosen),
         _moving_section(lower, dataset, chosen),
@@ -112,7 +123,7 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
     ]
     letter_panels((upper, lower, *right))
     figure.align_ylabels(right)
-    title = upper.set_title("")
+    title = figure.suptitle("", fontsize=9)
 
     def pictures():
         for frame in chosen:
@@ -139,10 +150,13 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
         low = min(float(unit(present(dataset, field, frame).min())) for frame in chosen)
     first = present(dataset, field, chosen[0])
     image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
-    figure.colorbar(image, ax=ax, pad=0.02, aspect=18).set_label(unit.label(NAMES[field]))
+    side = "right" if plane_ratio(dataset) > 0.4 else "top"
+    figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(NAMES[field]))
     ax.set_xlabel(plane.label("x"))
     ax.set_ylabel(plane.label("y"))
     ax.tick_params(direction="out")
+    ax.locator_params(axis="x", nbins=5 if plane_ratio(dataset) < 2 else 1)
+    ax.locator_params(axis="y", nbins=5 if plane_ratio(dataset) > 0.25 else 1)
     outline = [None]
 
     def move(frame):
@@ -158,12 +172,12 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
 
 
 def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
-    """Profile and deformed surface along x, through the highest peak, or the field's name where they are unknown."""
+    """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
     if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
         ax.set_axis_off()
         ax.text(0.5, 0.5, "no height or gap kept: no section", transform=ax.transAxes, ha="center", color="0.4")
         return lambda frame: None
-    index = int(dataset["height"].max("x").argmax("y"))
+    index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
     surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
     known = np.concatenate([height, *surfaces])

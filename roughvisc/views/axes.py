@@ -200,14 +200,14 @@ class TimeAxis:
         ax.set_xlabel(self.unit.label("Time"))
 
 
-def spread_axis(axis: Axis, shown) -> None:
-    """Make one axis logarithmic where the values on it span a decade or more, with plain readable ticks."""
+def spread_axis(axis: Axis, shown, always: bool = False) -> None:
+    """Make one axis logarithmic where the values on it span a decade or more, or always, with readable ticks."""
     shown = np.asarray(shown, dtype=float)
     shown = shown[np.isfinite(shown) & (shown > 0)]
-    if not shown.size or shown.max() < 10 * shown.min():
+    if not shown.size or (shown.max() < 10 * shown.min() and not always):
         return
     (axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale)("log")
-    if shown.max() < 300 * shown.min():
+    if shown.max() < (30 if axis.axis_name == "x" else 300) * shown.min():
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=99))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -232,6 +232,33 @@ def spread_frames(times, count: int) -> np.ndarray:
     wanted = np.linspace(place[0], place[-1], count)
     nearest = np.abs(place[:, None] - wanted).argmin(axis=0)
     return np.unique(nearest)
+
+
+def telling_frames(dataset: xr.Dataset, count: int) -> list[int]:
+    """Indices of at most ``count`` frames: even in time while there is contact, that of the largest area among them.
+
+    Frames whose contact is below a thousandth of the largest show nothing; they are drawn only if there are no others.
+    """
+    frames = np.arange(dataset.sizes["time"])
+    if "contact_area" in dataset:
+        area = np.nan_to_num(dataset["contact_area"].values)
+        if area.max() > 0:
+            frames = frames[area > 1e-3 * area.max()]
+    chosen = frames[spread_frames(dataset["time"].values[frames], count)]
+    if "contact_area" in dataset and len(chosen) > 2 and len(chosen) < len(frames):
+        largest = frames[area[frames].argmax()]
+        if area[chosen].max() < 0.999 * area[largest]:
+            inner = np.abs(chosen[1:-1] - largest).argmin() + 1
+            chosen = np.sort(np.append(np.delete(chosen, inner), largest))
+    return [int(frame) for frame in np.unique(chosen)]
+
+
+def fullest_frame(dataset: xr.Dataset) -> int:
+    """Index of the last frame whose contact area is the largest, or of the last frame where areas are unknown."""
+    if "contact_area" not in dataset:
+        return dataset.sizes["time"] - 1
+    area = np.nan_to_num(dataset["contact_area"].values)
+    return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
 
 
 def frame_at(times, time: float) -> int:

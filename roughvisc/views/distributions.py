@@ -22,6 +22,7 @@ from roughvisc.views.axes import (
     spread_axis,
     spread_frames,
     styled,
+    telling_frames,
     time_text,
     unit_for,
 )
@@ -32,7 +33,7 @@ _MOST_LINES = 24
 
 def _frames(dataset: xr.Dataset, times, count: int) -> list[int]:
     if times is None:
-        return list(spread_frames(dataset["time"], count))
+        return telling_frames(dataset, count)
     chosen = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
     if not 0 < chosen.size <= _MOST_LINES:
         raise InputError(f"{chosen.size} times to draw: choose 1 to {_MOST_LINES}")
@@ -54,7 +55,7 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
         One case's result with ``pressure`` or ``gap``.
     times : float or list of float, optional
         The nearest kept times are drawn; negative whole numbers count frames from the end. By default up to five over
-        the whole history. [s]
+        the time in contact. [s]
     bins : int, optional
         Number of bins from zero to the largest value drawn; by default as the number of cells suits.
 
@@ -134,7 +135,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
         One case's result with ``pressure`` or ``gap``.
     times : float or list of float, optional
         Where the distribution is drawn; negative whole numbers count frames from the end. By default up to four over
-        the whole history. [s]
+        the time in contact. [s]
 
     Returns
     -------
@@ -143,7 +144,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     require(dataset, "time", "x", "y")
     followed = dataset.isel(time=spread_frames(dataset["time"], 100))
     found = clusters(followed).compute()
-    figure = new_figure(7.2, 2.5)
+    figure = new_figure(7.2, 2.7)
     count, area, sizes = figure.subplots(1, 3)
     axis = TimeAxis.of(dataset["time"])
     times_shown = axis.unit(followed["time"])
@@ -180,9 +181,9 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
         row = unit(row[np.isfinite(row)])
         if len(row):
             ax.plot(row, np.arange(1, len(row) + 1), color=colour, drawstyle="steps-post", label=time_text(float(time)))
-            if len(row) == 1:
-                ax.plot(row, [1], "o", color=colour)
+            ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
     if np.isfinite(areas).any():
+        ax.locator_params(axis="x", nbins=4)
         spread_axis(ax.xaxis, unit(areas))
         spread_axis(ax.yaxis, [1, np.isfinite(areas).sum(axis=1).max()])
         if ax.get_yscale() == "log":
@@ -190,7 +191,8 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
         else:
             ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-        ax.legend(fontsize=6.5, handlelength=1.0)
+        lines = ax.get_legend_handles_labels()
+        ax.figure.legend(*lines, loc="outside upper right", ncols=4, handlelength=1.0)
     else:
         _no_contact(ax)
     ax.set_xlabel(unit.label("Cluster area"))

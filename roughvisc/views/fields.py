@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.variables import FIELDS, VARIABLES
@@ -25,8 +25,8 @@ from roughvisc.views.axes import (
     letter_panels,
     new_figure,
     require,
-    spread_frames,
     styled,
+    telling_frames,
     time_text,
     unit_for,
 )
@@ -116,7 +116,7 @@ def present(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
 
 def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
     if times is None:
-        return list(spread_frames(dataset["time"], 4))
+        return telling_frames(dataset, 4)
     chosen = np.atleast_1d(np.asarray(times, dtype=float))
     if not 0 < chosen.size <= _MOST_MAPS:
         raise InputError(f"{chosen.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
@@ -133,7 +133,7 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
         One case's result; with fields on Dask only the frames drawn are loaded.
     times : float or list of float, optional
         The nearest kept times are drawn; negative whole numbers count frames from the end, -1 the last.
-        By default up to four over the whole history. [s]
+        By default up to four over the time in contact, that of the largest contact area among them. [s]
     fields : sequence of str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out.
 
@@ -192,7 +192,9 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
             draw_outline(ax, touching, plane, outline_colour(name))
     bar = figure.colorbar(image, ax=list(axes.ravel()), pad=0.02, aspect=max(15, 15 * len(axes)), fraction=0.06)
     bar.set_label(unit.label(NAMES[name]))
-    bar.locator = MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10])
+    bar.locator = (
+        MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
+    )
     bar.outline.set_linewidth(0.6)
 
 
@@ -206,8 +208,8 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> Non
             ax.remove()
             continue
         lowest = field == fields - 1 and number + columns >= len(frames)
-        ax.locator_params(axis="x", nbins=4)
-        ax.locator_params(axis="y", nbins=4 if plane_ratio(dataset) > 0.25 else 1)
+        ax.xaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) < 2 else 1, steps=[1, 2, 5, 10]))
+        ax.yaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) > 0.25 else 1, steps=[1, 2, 5, 10]))
         ax.tick_params(labelbottom=lowest, labelleft=column == 0, direction="out")
         ax.set_xlabel(plane.label("x") if lowest else "")
         ax.set_ylabel(plane.label("y") if column == 0 else "")
@@ -218,18 +220,15 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> Non
 # ------------------------------------------------------------------------------------------------------ section
 
 
-def _cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
-    """Index of the cut: through the highest pressure or, without contact, the highest peak, or the middle."""
+def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
+    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak."""
     along = "x" if across == "y" else "y"
-    for field in (
-        present(dataset, "pressure", frame) if "pressure" in dataset else None,
-        dataset.get("height"),
-    ):
-        if field is not None and float(field.max()) != 0.0:
-            return int(field.max(along).argmax(across))
-    if "height" in dataset and dataset["height"].notnull().any():
-        return int(dataset["height"].max(along).argmax(across))
-    return dataset.sizes[across] // 2
+    if "pressure" in dataset:
+        carried = dataset["pressure"].isel(time=frame).sum(along).values
+        if carried.max() > 0:
+            return int(carried.argmax())
+    peaks = dataset["height"].max(along).values
+    return int(np.nanargmax(peaks)) if np.isfinite(peaks).any() else len(peaks) // 2
 
 
 def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
@@ -262,7 +261,7 @@ def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | 
     axis : {"x", "y"}
         Direction of the cut.
     at : float, optional
-        Coordinate of the cut along the other axis; by default through the highest pressure. [m]
+        Coordinate of the cut along the other axis; by default the line that carries most. [m]
 
     Returns
     -------
@@ -273,7 +272,7 @@ def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | 
         raise InputError(f"axis is {axis!r}: expected 'x' or 'y'")
     across = "y" if axis == "x" else "x"
     frame = frame_at(dataset["time"], time)
-    index = _cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
+    index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
     figure = new_figure(4.8, 3.6)
     top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
     unit = draw_section(top, bottom, dataset, frame, axis, index)
@@ -317,8 +316,11 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     height = dataset["height"].isel({across: index}).values
     surface = deformed_surface(dataset, frame).isel({across: index}).values
     x = (limits[1:] + limits[:-1]) / 2
+    level = float(dataset["height"].max()) - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
     known = np.concatenate([height, surface])
     known = known[np.isfinite(known)]
+    if np.isfinite(level) and not (known.size and np.ptp(known)):
+        known = np.append(known, level)  # a flat face in full contact
     unit = unit_for(np.ptp(known) if known.size else 0.0, "m")
     h, s = unit(height), unit(surface)
     low, high = (float(unit(known.min())), float(unit(known.max()))) if known.size else (0.0, 1.0)
@@ -332,10 +334,8 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     touching = contact(dataset.isel(time=frame)).isel({across: index}).values
     marked = np.where(touching, h, np.nan)
     ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
-    if "approach" in dataset:
-        level = float(dataset["height"].max()) - float(dataset["approach"][frame])
-        if low - margin < unit(level) < high + 2 * margin:
-            ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
+    if low - margin < unit(level) < high + 2 * margin:
+        ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
     ax.set_ylabel(unit.label("Height"))
     return unit
 
@@ -346,4 +346,5 @@ def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
     box, limits = ax.get_window_extent(), ax.viewLim
     ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
     text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
-    ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})

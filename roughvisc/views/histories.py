@@ -90,7 +90,7 @@ def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
     axis = TimeAxis.of(dataset["time"])
     times = axis.unit(dataset["time"])
     floor, ceiling = math.inf, 0.0
-    for name, label, colour in (("residual", "solver", PURPLE), ("time_error", "time steps", ORANGE)):
+    for name, label, colour in (("residual", "solver (energy bound)", PURPLE), ("time_error", "time steps", ORANGE)):
         if name not in dataset:
             continue
         values = dataset[name].values.astype(float)

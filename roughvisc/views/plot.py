@@ -13,7 +13,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.views.animate import animate
-from roughvisc.views.axes import require
+from roughvisc.views.axes import fullest_frame, require
 from roughvisc.views.distributions import contact_clusters, distributions
 from roughvisc.views.fields import maps, section
 from roughvisc.views.histories import area_against_load, history, hysteresis
@@ -47,6 +47,8 @@ FIGURES = {
 def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
+    The section is drawn at the last time of the largest contact area.
+
     Parameters
     ----------
     dataset : xarray.Dataset
@@ -79,10 +81,11 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
             continue
         if name == "hysteresis" and dataset.sizes["time"] < 3:
             continue  # two states are no loop
+        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
         path = folder / f"{stem}-{name}{suffix}"
         unfinished = path.with_name(f".{path.stem}.part{suffix}")
         try:
-            draw(dataset).savefig(unfinished, dpi=dpi)
+            draw(dataset, **options).savefig(unfinished, dpi=dpi)
             os.replace(unfinished, path)
         finally:
             unfinished.unlink(missing_ok=True)

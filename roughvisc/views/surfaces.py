@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.views.axes import BLUE, VERMILION, Unit, edges, letter_panels, new_figure, styled, unit_for
+from roughvisc.views.axes import BLUE, VERMILION, Unit, edges, letter_panels, new_figure, spread_axis, styled, unit_for
 from roughvisc.views.fields import draw_map, plane_ratio, plane_unit
 
 
@@ -63,7 +63,7 @@ def surface(height: xr.DataArray) -> Figure:
     on_map.locator_params(axis="y", nbins=2 if flat else 5)
     missing = float(height.isnull().mean())
     if missing:
-        on_map.set_title(f"{100 * missing:.2g} % missing (grey)", loc="right")
+        figure.suptitle(f"{100 * missing:.2g} % of the points are missing (grey)", fontsize=8.5)
     _draw_profile(panels["profile"], on_map, height, unit, plane)
     _draw_heights(panels["heights"], height, unit)
     _draw_spectrum(panels["spectrum"], height)
@@ -169,7 +169,10 @@ def _draw_spectrum(ax: Axes, height: xr.DataArray) -> None:
         symbol = "nm" if wavevector[-1] > 1e8 else symbol
         shown = density > 0
         if shown.any():
-            ax.loglog(wavevector[shown] * scale[symbol], density[shown] / scale[symbol] ** 4, color=BLUE, lw=1)
+            x, y = wavevector[shown] * scale[symbol], density[shown] / scale[symbol] ** 4
+            ax.plot(x, y, color=BLUE, lw=1)
+            spread_axis(ax.xaxis, x, always=True)
+            spread_axis(ax.yaxis, y, always=True)
             ax.set_xlabel(f"Wavevector [rad/{symbol}]")
             ax.set_ylabel(f"Power spectral density [{symbol}⁴]")
             ax.grid(color="0.9", lw=0.5)
