@@ -1,5 +1,6 @@
 """Every study that ships runs, and ends with an honest result."""
 
+import importlib
 import pathlib
 
 import numpy as np
@@ -20,3 +21,18 @@ def test_study__runs(path, tmp_path):
         assert (np.diff(ds.contact_area) >= 0).all(), "under a load that is held, the contact grows"
         assert float(ds.time_error.max()) <= case.settings.solve.tolerance
         assert 0.01 < float(ds.contact_fraction[-1]) < 0.6
+
+
+@pytest.mark.parametrize("name", ["maxwell_step", "zener_step"])
+def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    figure = importlib.import_module(name).main(cells=41, figure=tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    for axes in figure.axes:
+        exact, computed = axes.lines[::2], axes.lines[1::2]
+        assert len(exact) == len(computed) == 4
+        assert "p / p_H" in axes.get_ylabel()
+        for line, points in zip(exact, computed, strict=True):
+            r, p = points.get_data()
+            inside = r < 0.8 * line.get_xdata()[np.flatnonzero(line.get_ydata())[-1]]
+            assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
