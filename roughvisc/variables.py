@@ -78,6 +78,13 @@ VARIABLES: dict[str, Variable] = {
         "free space: against the undeformed plane; periodic: mean undeformed gap minus mean gap; "
         "while the contact is open: the value at which it would just close",
     ),
+    "work": Variable(
+        _SERIES,
+        "J",
+        "work of the force on the approach since the start",
+        "over every accepted step, kept or not; the work done so far, not what is dissipated; a jump counts as its mean "
+        "force times its jump of approach; with periodic boundaries without the uniform displacement",
+    ),
     "contact_area": Variable(_SERIES, "m2", "real contact area", "cells that carry pressure, counted"),
     "contact_area_corrected": Variable(
         _SERIES,

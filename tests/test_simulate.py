@@ -6,7 +6,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.study.simulate import kept_times
+from roughvisc.study.scene import kept_times
 from roughvisc.variables import FIELDS, VARIABLES, annotate
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))

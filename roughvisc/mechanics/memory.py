@@ -37,6 +37,11 @@ class Memory(Protocol):
         """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa]."""
         ...
 
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """The rules that it knows."""
+        ...
+
     def start(self, shape: tuple[int, int]) -> Any:
         """State at rest."""
         ...
@@ -51,6 +56,10 @@ class Memory(Protocol):
 
     def restart(self, state: Any) -> Any:
         """State in which no step reaches behind the present instant: after a jump or a corner."""
+        ...
+
+    def enlarged(self, state: Any, shape: tuple[int, int], offset: tuple[int, int]) -> Any:
+        """State on a larger grid, in which the present one begins at ``offset``; of pressures only."""
         ...
 
 
@@ -90,6 +99,7 @@ class Modes:
 
     material: Prony
     acts_on: ActsOn = "displacement"
+    rules: tuple[Rule, ...] = ("linear", "bdf2", "euler", "right")
 
     def start(self, shape: tuple[int, int]) -> ModesState:
         """State at rest."""
@@ -126,6 +136,13 @@ class Modes:
     def restart(self, state: ModesState) -> ModesState:
         """State whose next step does not reach behind the present instant."""
         return ModesState(state.modes, state.field)
+
+    def enlarged(self, state: ModesState, shape: tuple[int, int], offset: tuple[int, int]) -> ModesState:
+        """State on a larger grid: pressure is zero in what is new."""
+        if self.acts_on != "pressure":
+            raise ValueError("displacements reach beyond the grid: only a memory of pressures can be enlarged")
+        earlier = None if state.earlier is None else padded(state.earlier, shape, offset)
+        return ModesState(padded(state.modes, shape, offset), padded(state.field, shape, offset), earlier, state.step)
 
     @property
     def _factor(self) -> float:
@@ -181,6 +198,14 @@ def _two_step(step: float, last: float) -> tuple[float, float, float]:
     """Variable-step BDF2: ``z_n = own z_(n-1) + earlier z_(n-2) + beta step z_n'``."""
     ratio = step / last
     return (1 + ratio) ** 2 / (1 + 2 * ratio), -(ratio**2) / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio)
+
+
+def padded(fields: Array, shape: tuple[int, int], offset: tuple[int, int]) -> Array:
+    """Fields on a larger grid, zero in what is new; the last two axes are the grid's."""
+    larger = np.zeros((*fields.shape[:-2], *shape))
+    nx, ny = fields.shape[-2:]
+    larger[..., offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = fields
+    return larger
 
 
 def mean_compliance(material: Material, step: float) -> float:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.materials import Prony
-from roughvisc.mechanics.stepper import Instant, Scene, State, Step, check_edge, next_event
+from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event
 
 Array = NDArray[np.float64]
 
@@ -191,13 +191,15 @@ def _advance(
         solution = SeedSolution(np.zeros_like(gap), np.zeros_like(gap), float(np.min(gap)), 0, 0, True)
     else:
         solution = conjugate_gradients(halfspace, gap, glassy, load, epsilon=1e-2 * scene.tolerance)
-    check_edge(scene, solution.pressure, time)
+    if at_edge(scene, solution.pressure):
+        raise edge_error(scene, time)
     increments.append((time, solution.pressure - state.now.pressure))
     now = Instant(time, solution.pressure, past + solution.displacement, load, solution.level)
     state = replace(
         state,
         now=now,
+        work=state.work + 0.5 * (state.now.force + load) * (now.approach - state.now.approach),
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),
     )
-    return state, Step(now, solution.level, math.nan, math.nan, solution.stagnated, state)
+    return state, Step(now, solution.level, math.nan, math.nan, solution.stagnated, scene, state)

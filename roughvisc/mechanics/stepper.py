@@ -11,7 +11,7 @@ no state, and a march goes on from any state that it yielded.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.loading import Program, Segment
 from roughvisc.mechanics.materials import Material
-from roughvisc.mechanics.memory import Memory, Rule, mean_compliance, stiff_ratio
+from roughvisc.mechanics.memory import Memory, Rule, mean_compliance, padded, stiff_ratio
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -65,6 +65,9 @@ class Scene:
         Cells where there is material; None: all.
     accept_edge : bool
         In free space, whether cells at the border of the grid may carry pressure.
+    enlarge : callable or None
+        Where contact reaches the border: gives this scene on a larger grid and the cell of it at which the present
+        grid begins, or None if the profile is not known farther out. The memory must be one of pressures.
     """
 
     halfspace: HalfSpace
@@ -77,6 +80,7 @@ class Scene:
     time_step: float | None = None
     present: Mask | None = None
     accept_edge: bool = False
+    enlarge: Callable[[Scene], tuple[Scene, tuple[int, int]] | None] | None = None
 
     def lowest(self, field: Array) -> float:
         """Least value over the present cells."""
@@ -99,6 +103,8 @@ class Instant:
         Pressure [Pa] and total displacement of the half-space [m].
     force, approach : float
         [N], [m]
+    effective : ndarray or None
+        Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
     """
 
     time: float
@@ -106,6 +112,7 @@ class Instant:
     displacement: Array
     force: float
     approach: float
+    effective: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -128,6 +135,8 @@ class State:
         So far. [N], [m]
     contact_since : float
         Time at which the surfaces last came into contact. [s]
+    work : float
+        Work of the force on the approach since the start; jumps count as quasi-static. [J]
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
     blind : bool
@@ -148,6 +157,7 @@ class State:
     largest_force: float = 0.0
     largest_approach: float = 0.0
     contact_since: float = 0.0
+    work: float = 0.0
     unresolved: bool = False
     blind: bool = False
     rejected_error: float = math.inf
@@ -171,6 +181,8 @@ class Step:
         Estimated relative error in time of this step; NaN where no estimate was made.
     converged : bool
         Whether the contact solver reached its tolerance.
+    scene : Scene
+        The scene, on the grid that it has by now.
     state : State
         The state after the step.
     """
@@ -180,6 +192,7 @@ class Step:
     bound: float
     time_error: float
     converged: bool
+    scene: Scene
     state: State
 
 
@@ -226,14 +239,14 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     while state.segment < len(segments):
         segment = segments[state.segment]
         if segment.duration == 0:
-            state, trial = _jump(scene, state, segment)
+            scene, state, trial = _jump(scene, state, segment)
             following = segments[state.segment : state.segment + 1]
             right_hand = _can_jump(scene) or state.now.time == 0
             if right_hand and not (following and following[0].duration == 0):
                 yield _step(scene, state, trial, math.nan)
         else:
             for step in _through(scene, state, segment):
-                state = step.state
+                scene, state = step.scene, step.state
                 corner = state.segment < len(segments) and state.now.time == state.began
                 if not (corner and segments[state.segment].duration == 0 and _can_jump(scene)):
                     yield step
@@ -261,17 +274,16 @@ def _attempt(
     ``share`` scales the contact solver's tolerance.
     """
     alpha, carried = scene.memory.predict(state.memory, length, rule)
-    extra = 0
-    if scene.memory.acts_on == "pressure":
-        carried = scene.halfspace.displacement(carried)
-        extra = 1
+    effective = carried if scene.memory.acts_on == "pressure" else None
+    if effective is not None:
+        carried = scene.halfspace.displacement(effective)
     gap = scene.gap + carried
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
         nothing = np.zeros_like(gap)
-        return _Trial(Instant(time, nothing, carried, 0.0, approach), nothing, length, rule, None)
+        return _Trial(Instant(time, nothing, carried, 0.0, approach, effective), nothing, length, rule, None)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
@@ -284,7 +296,8 @@ def _attempt(
         start=_extrapolated(state, length) * alpha,
         present=scene.present,
     )
-    contact = replace(contact, convolutions=contact.convolutions + extra)
+    if effective is not None:
+        contact = replace(contact, convolutions=contact.convolutions + 1)
     pressure = contact.pressure / alpha
     instant = Instant(
         time,
@@ -292,6 +305,7 @@ def _attempt(
         carried + contact.displacement,
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
+        None if effective is None else effective + contact.pressure,
     )
     field = pressure if scene.memory.acts_on == "pressure" else contact.displacement / alpha
     return _Trial(instant, field, length, rule, contact)
@@ -310,6 +324,8 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, trial.field)
     now = trial.instant
     touching = now.force > 0
+    # an unresolved jump of the load precedes the step
+    mean_force = now.force if state.unresolved else 0.5 * (state.now.force + now.force)
     return replace(
         state,
         now=now,
@@ -318,6 +334,7 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
+        work=state.work + mean_force * (now.approach - state.now.approach),
         unresolved=False,
         blind=False,
     )
@@ -337,7 +354,7 @@ def _step(scene: Scene, state: State, trial: _Trial | None, time_error: float) -
     """What is yielded of an accepted trial."""
     contact = trial.contact if trial is not None else None
     if contact is None:
-        return Step(state.now, state.now.approach, 0.0, time_error, True, state)
+        return Step(state.now, state.now.approach, 0.0, time_error, True, scene, state)
     if trial is not None and trial.length > 0 and _kept(scene, state.now.time) and _soft(scene, trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
@@ -345,11 +362,16 @@ def _step(scene: Scene, state: State, trial: _Trial | None, time_error: float) -
             scene, replace(state, before=None), "load", state.now.force, _DISCARDED * trial.length, "right"
         )
         state = _spent(state, sharp)
-        shown = replace(state.now, pressure=sharp.instant.pressure, displacement=sharp.instant.displacement)
+        shown = replace(
+            state.now,
+            pressure=sharp.instant.pressure,
+            displacement=sharp.instant.displacement,
+            effective=sharp.instant.effective,
+        )
         assert sharp.contact is not None
         converged = contact.converged and sharp.contact.converged
-        return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, state)
-    return Step(state.now, state.now.approach, contact.bound, time_error, contact.converged, state)
+        return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, scene, state)
+    return Step(state.now, state.now.approach, contact.bound, time_error, contact.converged, scene, state)
 
 
 def _soft(scene: Scene, length: float) -> bool:
@@ -361,18 +383,47 @@ def _kept(scene: Scene, time: float) -> bool:
     return scene.times is None or time in scene.times
 
 
-def check_edge(scene: Scene, pressure: Array, time: float) -> None:
-    """Refuse pressure at the border of a free-space grid, which would act as the edge of a punch."""
+def at_edge(scene: Scene, pressure: Array) -> bool:
+    """Whether pressure at the border of a free-space grid acts as the edge of a punch that nobody asked for."""
     if scene.halfspace.boundary != "free" or scene.accept_edge:
-        return
-    border = [pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]]
-    if any(np.any(side > 0) for side in border):
-        raise EdgeContactError(
-            f"at {time:.6g} s contact reaches the border of the free-space domain of "
-            f"{scene.halfspace.shape[0]} x {scene.halfspace.shape[1]} cells: expected contact inside it; "
-            "use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or edge='accept' "
-            "to press it as a punch of that outline"
+        return False
+    return any(bool(np.any(side > 0)) for side in (pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]))
+
+
+def edge_error(scene: Scene, time: float) -> EdgeContactError:
+    """The error to raise where the grid cannot grow."""
+    nx, ny = scene.halfspace.shape
+    return EdgeContactError(
+        f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
+        "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
+        "edge='accept' to press it as a punch of that outline"
+    )
+
+
+def _enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
+    """Scene and state on a larger grid: nothing outside ever carried pressure."""
+    larger = scene.enlarge(scene) if scene.enlarge is not None else None
+    if larger is None:
+        raise edge_error(scene, time)
+    scene, offset = larger
+    shape = scene.halfspace.shape
+    memory = scene.memory.enlarged(state.memory, shape, offset)
+
+    def moved(instant: Instant | None) -> Instant | None:
+        if instant is None:
+            return None
+        effective = None if instant.effective is None else padded(instant.effective, shape, offset)
+        source = np.zeros(shape) if effective is None else effective
+        return replace(
+            instant,
+            pressure=padded(instant.pressure, shape, offset),
+            displacement=scene.halfspace.displacement(source),
+            effective=effective,
         )
+
+    now = moved(state.now)
+    assert now is not None
+    return scene, replace(state, now=now, before=moved(state.before), memory=memory)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -400,12 +451,12 @@ def _entered(scene: Scene, state: State) -> State:
     )
 
 
-def _jump(scene: Scene, state: State, segment: Segment) -> tuple[State, _Trial | None]:
+def _jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, State, _Trial | None]:
     """Zero-length segment: solved with the instantaneous compliance; left for the next step if there is none."""
     value = segment.value(0.0, state.start)
     current = state.now.force if segment.control == "load" else state.now.approach
     if value == current:
-        return _entered(scene, state), None
+        return scene, _entered(scene, state), None
     if not _can_jump(scene):
         if segment.control == "approach":
             raise InputError(
@@ -415,10 +466,12 @@ def _jump(scene: Scene, state: State, segment: Segment) -> tuple[State, _Trial |
         entered = _entered(scene, state)
         following = scene.program.segments[entered.segment : entered.segment + 1]
         start = value if following and following[0].control == "load" else entered.start
-        return replace(entered, unresolved=True, start=start), None
+        return scene, replace(entered, unresolved=True, start=start), None
     trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
-    check_edge(scene, trial.instant.pressure, state.now.time)
-    return _entered(scene, _committed(scene, _spent(state, trial), trial)), trial
+    while at_edge(scene, trial.instant.pressure):
+        scene, state = _enlarged(scene, _spent(state, trial), state.now.time)
+        trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
+    return scene, _entered(scene, _committed(scene, _spent(state, trial), trial)), trial
 
 
 def next_event(scene: Scene, state: State, end: float) -> float:
@@ -452,6 +505,12 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         trial = _attempt(scene, state, segment.control, value, length, rule, share)
         trial = replace(trial, instant=replace(trial.instant, time=arrival))
         state = _spent(state, trial)
+        if at_edge(scene, trial.instant.pressure):
+            if held is not None:
+                yield held
+                held = None
+            scene, state = _enlarged(scene, state, arrival)
+            continue
         error = _estimate(scene, state, trial, segment, event)
         limit = _SHARE * scene.tolerance * (1 if _kept(scene, arrival) else 2)
         fixed = scene.time_step is not None
@@ -469,7 +528,6 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
                 convolutions=spent[1],
             )
             continue
-        check_edge(scene, trial.instant.pressure, arrival)
         unresolved = state.unresolved
         accepted = _committed(scene, state, trial)
         accepted = replace(
@@ -551,9 +609,19 @@ def _length(scene: Scene, state: State, segment: Segment, event: float, end: flo
         return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
     length = state.suggestion or _first_length(scene, state, segment, event)
     length = max(length, _SMALLEST_STEP * segment.duration)
+    if "bdf2" not in scene.memory.rules:
+        length = min(length, _longest_linear(scene, distance))
     if length >= distance * (1 - 1e-9):
         return distance
     return distance / 2 if length > distance / 2 else length
+
+
+def _longest_linear(scene: Scene, distance: float) -> float:
+    """Longest step in which pressure taken as linear does not ring. [s]"""
+    length = distance
+    while stiff_ratio(scene.material, length) > 0.5 and length > 1e-9 * distance:
+        length /= 2
+    return length
 
 
 def _first_length(scene: Scene, state: State, segment: Segment, event: float) -> float:
@@ -585,6 +653,8 @@ def _time_of_creep(scene: Scene, relative: float, span: float) -> float:
 
 def _rule(scene: Scene, state: State, length: float) -> Rule:
     """Piecewise-linear pressure where it does not ring, else the damped two-step rule or its start."""
+    if "bdf2" not in scene.memory.rules:
+        return "linear"
     if state.before is None:
         return "euler" if _soft(scene, length) else "linear"
     if stiff_ratio(scene.material, length) <= 0.5:
@@ -640,7 +710,7 @@ def _fading(scene: Scene, state: State, trial: _Trial, event: float) -> float:
 
 def _receding(state: State, trial: _Trial) -> bool:
     """Whether fewer cells are in contact after a step than before it."""
-    return np.count_nonzero(trial.instant.pressure) < np.count_nonzero(state.now.pressure)
+    return bool(np.count_nonzero(trial.instant.pressure) < np.count_nonzero(state.now.pressure))
 
 
 def _growth(state: State, segment: Segment, time: float, event: float) -> float:
