@@ -11,11 +11,11 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.growing_contact import ContactRelaxation
 from roughvisc.mechanics.indenters import Indenter
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Prony
 from roughvisc.mechanics.quadrature import bisect, integrate
-from roughvisc.mechanics.step_load import ContactRelaxation
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
