@@ -1,8 +1,8 @@
 """Analytic solutions of frictionless normal contact, as importable code: what the numerical solver is held against.
 
-Elastic solutions take the contact modulus ``E* = G / (1 - nu) * 2 = E / (1 - nu^2)``; viscoelastic ones take a
-material with the contact compliance ``C(t) = 1 / E*(t)``. The elastic and the periodic solutions are in this file;
-the histories are imported from their own files, and all have their names here.
+Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``; viscoelastic ones take a
+material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one. The elastic and the periodic
+solutions are in this file; the histories are imported from their own files, and all have their names here.
 """
 
 from __future__ import annotations

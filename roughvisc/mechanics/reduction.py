@@ -352,6 +352,15 @@ def reduced_contact(
     While the contact is open under zero load the approach is where it would touch. A jump of load on a
     material without instantaneous compliance leaves contact and force as they were; the steps after it see
     the new load.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.indenters import Paraboloid
+    >>> from roughvisc.mechanics.materials import elastic
+    >>> press = Program().load(4 / 3, over=0.0).load(0.0, over=1.0)
+    >>> found = reduced_contact(Paraboloid(1.0), elastic(0.25), press, [0.0, 1.0], steps=20)
+    >>> found.radius.round(4), found.work.round(4)
+    (array([1., 0.]), array([0.5333, 0.    ]))
     """
     corners = program.corners
     instants = np.unique(corners) if times is None else np.asarray(times, dtype=float)

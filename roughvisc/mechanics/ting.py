@@ -109,8 +109,10 @@ class SingleMaximum:
     ----------
     indenter : Indenter
         The rigid indenter.
+    material : Prony
+        The half-space.
     relaxation : ContactRelaxation
-        Of the half-space.
+        Its relaxing contact modulus.
     load : callable
         Load at times. [N]
     corners : tuple of float
