@@ -345,9 +345,9 @@ def reduced_contact(
     differences. Both converge with the square of the step, which the extrapolation uses. The integral over the
     elements is that of the linear interpolant.
 
-    Against :func:`ting` and :func:`lee_radok` the defaults give the approach to 3e-8 and the radius to 1e-6 of
-    its value on a sphere (Maxwell, Zener 1:1, power laws), and 3e-6 for both on Zener 1:100 and Kelvin-Voigt, which
-    take the backward differences; 400 steps bring these to 5e-8.
+    Against :func:`ting` and :func:`lee_radok` the defaults give, of the value itself, the approach to 3e-7 and the
+    radius to 3e-6 under a sphere on Maxwell, Zener (also 1:100) and two-mode materials, and both to 3e-6 on a Kelvin-Voigt solid;
+    ``steps=400`` brings the approach to 1e-7 and the radius to 3e-7 in general, and both to 3e-7 for Kelvin-Voigt.
 
     While the contact is open under zero load the approach is where it would touch. A jump of load on a
     material without instantaneous compliance leaves contact and force as they were; the steps after it see
