@@ -346,8 +346,9 @@ def reduced_contact(
     elements is that of the linear interpolant.
 
     Against :func:`ting` and :func:`lee_radok` the defaults give, of the value itself, the approach to 3e-7 and the
-    radius to 3e-6 under a sphere on Maxwell, Zener (also 1:100) and two-mode materials, and both to 3e-6 on a Kelvin-Voigt solid;
-    ``steps=400`` brings the approach to 1e-7 and the radius to 3e-7 in general, and both to 3e-7 for Kelvin-Voigt.
+    radius to 3e-6 under a sphere on Maxwell, Zener (also 1:100) and two-mode materials, and both to 3e-6 on a
+    Kelvin-Voigt solid; ``steps=400`` brings the approach to 1e-7 and the
+    radius to 3e-7 in general, and both to 3e-7 for Kelvin-Voigt.
 
     While the contact is open under zero load the approach is where it would touch. A jump of load on a
     material without instantaneous compliance leaves contact and force as they were; the steps after it see
