@@ -1,8 +1,8 @@
 """Analytic solutions of frictionless normal contact, as importable code: what the numerical solver is held against.
 
-Elastic solutions take the contact modulus ``E* = G / (1 - nu) * 2 = E / (1 - nu^2)``; viscoelastic ones take a
-material with the contact compliance ``C(t) = 1 / E*(t)``. The elastic and the periodic solutions are in this file;
-the histories are imported from their own files, and all have their names here.
+Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``; viscoelastic ones take a
+material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one. The elastic and the periodic
+solutions are in this file; the histories are imported from their own files, and all have their names here.
 """
 
 from __future__ import annotations
@@ -13,26 +13,62 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.fixed_contact import (
+    full_contact_wave,
+    punch_approach,
+    punch_dissipation,
+    punch_force,
+    westergaard_half_width,
+)
+from roughvisc.mechanics.growing_contact import (
+    ContactRelaxation,
+    GrowingContact,
+    KelvinVoigtStep,
+    PowerLawRamp,
+    StepLoad,
+    hereditary_integral,
+    kelvin_voigt_step,
+    lee_radok,
+    lee_radok_step,
+    power_law_ramp,
+)
 from roughvisc.mechanics.indenters import Cone, Indenter, Paraboloid, punch_pressure
-from roughvisc.mechanics.step_load import KelvinVoigtStep, StepLoad, kelvin_voigt_step, lee_radok_step
+from roughvisc.mechanics.reduction import ContactHistory, reduced_contact
+from roughvisc.mechanics.ting import SingleMaximum, ting
 
 __all__ = [
     "AxisymmetricContact",
     "Cone",
+    "ContactHistory",
+    "ContactRelaxation",
     "FlatPunchContact",
+    "GrowingContact",
     "Indenter",
     "KelvinVoigtStep",
     "Paraboloid",
+    "PowerLawRamp",
+    "SingleMaximum",
     "StepLoad",
     "WavyContact",
     "flat_punch",
     "full_contact_pressure",
+    "full_contact_wave",
+    "hereditary_integral",
     "hertz",
     "johnson_greenwood_higginson",
     "kelvin_voigt_step",
+    "lee_radok",
     "lee_radok_step",
+    "power_law_ramp",
+    "punch_approach",
+    "punch_dissipation",
+    "punch_force",
+    "punch_pressure",
+    "reduced_contact",
     "sneddon_cone",
+    "ting",
     "westergaard",
+    "westergaard_half_width",
 ]
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_ORDER = 12
-_LEVELS = 50  # the last panel is 2^-50 of the interval
+_ORDER = 10
+_LEVELS = 40  # the last panel is 2^-40 of the interval
 _BLOCK = 2000  # integrals evaluated at once, which bounds the memory
 
 

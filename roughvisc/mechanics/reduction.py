@@ -14,15 +14,16 @@ long as the contact is a disc; the run stops where it is not. Nothing here is sh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.element_memory import AllForces, Exponentials, Memory
 from roughvisc.mechanics.indenters import Indenter
 from roughvisc.mechanics.loading import Program, Segment
 from roughvisc.mechanics.materials import Material, Prony, one_less_mean_decay
@@ -50,121 +51,6 @@ class ContactHistory:
     force: Array
     work: Array
     error: float
-
-
-class _Memory(Protocol):
-    """What the elements remember. One column an element, in order of creation."""
-
-    def predict(self, h: float, count: int) -> tuple[Array, float]:
-        """Displacement left by the past after a step, and compliance to the new force."""
-        ...
-
-    def accept(self, force: Array) -> None:
-        """End the step with the forces found."""
-        ...
-
-    def insert(self, left: int, right: int, weight: float, count: int) -> None:
-        """New column ``count``, between two old ones."""
-        ...
-
-    def restart(self) -> None:
-        """After a corner or a jump: rates are not continuous there."""
-        ...
-
-
-class _Exponentials:
-    """Internal variables of an exponential series; piecewise-linear force, or second-order backward differences."""
-
-    def __init__(self, material: Prony, capacity: int, *, stiff: bool):
-        factor = 0.5 * (1 - material.poisson)
-        self.glassy, self.flow = factor * material.glassy, factor * material.fluidity
-        self.compliances = factor * np.array(material.compliances)
-        self.times = np.array(material.times)
-        self.stiff = stiff
-        # rows: one for each retarded compliance, the viscous one (its increments in time units), the force
-        rows = len(self.times) + 1
-        self.now, self.before = np.zeros((rows, capacity)), np.zeros((rows, capacity))
-        self.force = np.zeros(capacity)
-        self.last_h = 0.0
-        self._pending: tuple[float, Array, Array] | None = None
-
-    def restart(self) -> None:
-        """After a corner or a jump: the rate is not continuous."""
-        self.last_h = 0.0
-
-    def predict(self, h: float, count: int) -> tuple[Array, float]:
-        now, force = self.now[:, :count], self.force[:count]
-        weights = np.append(self.compliances, self.flow)
-        if h == 0:
-            kept, gain = now, np.zeros(len(weights))
-        elif not self.stiff:
-            x = h / self.times
-            b = one_less_mean_decay(x)
-            gain = np.append(b, h / 2)
-            past = np.append(-np.expm1(-x) - b, h / 2)
-            kept = np.append(np.exp(-x), 1.0)[:, None] * now + past[:, None] * force
-        else:
-            ratio = h / self.last_h if self.last_h else np.inf
-            if ratio > 2.4:  # backward Euler at a restart, and where the steps grow too fast for the other
-                beta, known = 1.0, now
-            else:
-                beta = (1 + ratio) / (1 + 2 * ratio)
-                known = ((1 + ratio) ** 2 * now - ratio**2 * self.before[:, :count]) / (1 + 2 * ratio)
-            x = beta * h / self.times
-            gain = np.append(x / (1 + x), beta * h)
-            kept = np.append(1 / (1 + x), 1.0)[:, None] * known
-        self._pending = (h, kept, gain)
-        return weights @ kept, self.glassy + float(weights @ gain)
-
-    def accept(self, force: Array) -> None:
-        assert self._pending is not None
-        h, kept, gain = self._pending
-        count = len(force)
-        if h > 0:
-            self.before[:, :count] = self.now[:, :count]
-            self.now[:, :count] = kept + gain[:, None] * force
-            self.last_h = h
-        self.force[:count] = force
-
-    def insert(self, left: int, right: int, weight: float, count: int) -> None:
-        for field in (self.now, self.before, self.force):
-            field[..., count] = (1 - weight) * field[..., left] + weight * field[..., right]
-        if self._pending is not None:
-            h, kept, gain = self._pending
-            column = (1 - weight) * kept[:, left] + weight * kept[:, right]
-            self._pending = (h, np.column_stack([kept, column]), gain)
-
-
-class _AllForces:
-    """All past forces, with weights from the antiderivative of the compliance: exact for piecewise-linear force."""
-
-    def __init__(self, material: Material, capacity: int, steps: int):
-        self.material = material
-        self.forces = np.zeros((steps + 1, capacity))
-        self.times = np.zeros(steps + 1)
-        self.step = 0
-
-    def restart(self) -> None:
-        pass
-
-    def predict(self, h: float, count: int) -> tuple[Array, float]:
-        k = self.step
-        self.times[k + 1] = now = self.times[k] + h
-        lags, spans = now - self.times[: k + 2], np.diff(self.times[: k + 2])
-        integral = np.asarray(self.material.contact_integral(lags))
-        jump = np.asarray(self.material.contact_compliance(lags[1:]))
-        mean = np.where(spans > 0, -np.diff(integral) / np.where(spans > 0, spans, 1.0), jump)
-        # sum over increments of the force, written as a sum over the forces
-        weights = np.append(0.0, mean[:-1]) - mean
-        return weights @ self.forces[: k + 1, :count], float(mean[-1])
-
-    def accept(self, force: Array) -> None:
-        self.step += 1
-        self.forces[self.step, : len(force)] = force
-
-    def insert(self, left: int, right: int, weight: float, count: int) -> None:
-        rows = self.forces[: self.step + 1]
-        rows[:, count] = (1 - weight) * rows[:, left] + weight * rows[:, right]
 
 
 class _OutOfElements(Exception):
@@ -198,21 +84,20 @@ class _Row:
 
     def level_for(self, x: Array, y: Array, area: float, guess: float) -> float:
         """Level under which the interpolant encloses an area: Newton's method on a convex function."""
-        level = max(guess, float(np.min(y)))
-        if self.area(x, y, level)[1] == 0:
-            level = float(np.max(y[: 1 + max(1, int(np.argmin(y)) + 1)]))
-        for _ in range(100):
+        bottom, top = float(np.min(y)), float(np.max(y))
+        if self.area(x, y, top)[0] < area:
+            raise _OutOfElements
+        level = guess if bottom < guess < top else top
+        for _ in range(200):
             found, slope = self.area(x, y, level)
-            change = (area - found) / slope
-            level += change
-            if abs(change) <= 4e-16 * (abs(level) + abs(float(y[0]))):
-                return level
-            if self.area(x, y, level)[1] == 0:  # fell off the flat end: return half-way
-                level -= change * 0.5
-        return level
+            step = (area - found) / slope if slope > 0 else np.inf
+            before, level = level, min(level + step, top)  # a hardly touching start would throw it far away
+            if abs(level - before) <= 4e-16 * (abs(level) + abs(bottom)):
+                break
+        return max(level, bottom)
 
 
-def _edge(x: Array, y: Array, level: float) -> tuple[int, float]:
+def _edge(x: Array, y: Array, level: float, strict: bool) -> tuple[int, float]:
     """Index of the last touching element and the radius; (-1, 0) where nothing touches."""
     touching = level > y
     if not touching.any():
@@ -221,7 +106,7 @@ def _edge(x: Array, y: Array, level: float) -> tuple[int, float]:
     if last == len(y) - 1:
         raise _OutOfElements
     depth = level - y[: last + 1]
-    if np.any(depth < -1e-6 * np.max(depth)):
+    if strict and np.any(depth < -0.01 * np.max(depth)):
         raise ConvergenceError("the contact is no longer a disc: the reduction to independent elements does not hold")
     return last, float(x[last] + (x[last + 1] - x[last]) * depth[-1] / (y[last + 1] - y[last]))
 
@@ -240,8 +125,11 @@ def _mesh(segment: Segment, start: float, stops: Array, steps: int, refine: int,
 
     else:  # quadratic, then exponential, so that all decades down to the fastest mode are seen
         stretch = np.arcsinh(np.sqrt(min(max(1.0, length / fastest), 1e12)))
+        closing = segment.control == "load" and segment.end == 0  # quadratic again where the contact vanishes
 
         def instant(u: Array) -> Array:
+            if closing:
+                u = u * (2 - u)
             return np.asarray((np.sinh(stretch * u) / np.sinh(stretch)) ** 2)
 
     fine = np.linspace(0, 1, 20001)
@@ -259,8 +147,8 @@ def _mesh(segment: Segment, start: float, stops: Array, steps: int, refine: int,
 class _Run:
     """One pass through a program at one resolution."""
 
-    def __init__(self, indenter: Indenter, memory: _Memory, row: _Row):
-        self.indenter, self.memory, self.row = indenter, memory, row
+    def __init__(self, indenter: Indenter, memory: Memory, row: _Row, *, strict: bool):
+        self.indenter, self.memory, self.row, self.strict = indenter, memory, row, strict
         self.radius = self.approach = self.force = self.work = 0.0
         self.largest_radius = 0.0
         self.pending_load: float | None = None  # set by a jump that the material could not follow
@@ -286,7 +174,7 @@ class _Run:
             level = float(np.min(y))
         else:
             level = row.level_for(x, y, value * compliance / 2, self.approach)
-        last, radius = _edge(x, y, level)
+        last, radius = _edge(x, y, level, self.strict)
         depth = np.maximum(level - (row.g[: row.count] + free), 0.0)
         if last >= 0:
             weight = (radius - x[last]) / (x[last + 1] - x[last])
@@ -309,7 +197,8 @@ class _Run:
         """A jump as the limit of a fast ramp; its work needs the path."""
         start = self.value(control)
         for i in range(1, increments + 1):
-            self.advance(0.0, control, start + (value - start) * i / increments)
+            u = i / increments  # slow at both ends, where force may grow as a power of approach
+            self.advance(0.0, control, start + (value - start) * u**3 * (10 - 15 * u + 6 * u**2))
 
 
 def _fastest(material: Material) -> float:
@@ -354,6 +243,7 @@ def _pass(
     outermost: float,
     stiff: bool,
     exponentials: bool,
+    strict: bool = True,
 ) -> tuple[Array, float]:
     """Radius, approach, force and work at the times, and the largest radius, at one resolution."""
     steps, refine, elements = resolution
@@ -363,14 +253,14 @@ def _pass(
         for segment, start in zip(program.segments, corners, strict=False)
     ]
     total = sum(len(mesh) for mesh in meshes)
-    memory: _Memory
+    memory: Memory
     if exponentials:
         assert isinstance(material, Prony)
-        memory = _Exponentials(material, elements + total, stiff=stiff)
+        memory = Exponentials(material, elements + total, stiff=stiff)
     else:
-        memory = _AllForces(material, elements + total, total)
+        memory = AllForces(material, elements + total, total)
     can_jump = float(material.contact_compliance(0.0)) > 0
-    run = _Run(indenter, memory, _Row(indenter, outermost, elements, elements + total))
+    run = _Run(indenter, memory, _Row(indenter, outermost, elements, elements + total), strict=strict)
     kept = np.zeros((4, len(times)))
     for segment, start, end, mesh in zip(program.segments, corners, corners[1:], meshes, strict=False):
         memory.restart()
@@ -392,6 +282,16 @@ def _pass(
             at = times == start + before if before < segment.duration else times == end
             kept[:, at] = run.state[:, None]
     return kept, run.largest_radius
+
+
+def _growing_row(run: Callable[..., tuple[Array, float]], outermost: float) -> tuple[tuple[Array, float], float]:
+    """A pass, with the row of elements as long as it has to be."""
+    for _ in range(40):
+        try:
+            return run(outermost=outermost), outermost
+        except _OutOfElements:
+            outermost *= 1.5
+    raise ConvergenceError("the contact radius grows beyond all bounds")
 
 
 def reduced_contact(
@@ -445,9 +345,23 @@ def reduced_contact(
     differences. Both converge with the square of the step, which the extrapolation uses. The integral over the
     elements is that of the linear interpolant.
 
+    Against :func:`ting` and :func:`lee_radok` the defaults give, of the value itself, the approach to 3e-7 and the
+    radius to 3e-6 under a sphere on Maxwell, Zener (also 1:100) and two-mode materials, and both to 3e-6 on a
+    Kelvin-Voigt solid; ``steps=400`` brings the approach to 1e-7 and the
+    radius to 3e-7 in general, and both to 3e-7 for Kelvin-Voigt.
+
     While the contact is open under zero load the approach is where it would touch. A jump of load on a
     material without instantaneous compliance leaves contact and force as they were; the steps after it see
     the new load.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.indenters import Paraboloid
+    >>> from roughvisc.mechanics.materials import elastic
+    >>> press = Program().load(4 / 3, over=0.0).load(0.0, over=1.0)
+    >>> found = reduced_contact(Paraboloid(1.0), elastic(0.25), press, [0.0, 1.0], steps=20)
+    >>> found.radius.round(4), found.work.round(4)
+    (array([1., 0.]), array([0.5333, 0.    ]))
     """
     corners = program.corners
     instants = np.unique(corners) if times is None else np.asarray(times, dtype=float)
@@ -461,38 +375,17 @@ def reduced_contact(
         for segment, start in zip(program.segments, corners, strict=False)
     ]
     stiff = _rings(material, coarse)
-    outermost, largest = _outermost(indenter, material, program), 0.0
+    outermost = _outermost(indenter, material, program)
+    run = partial(_pass, indenter, material, program, instants, stiff=stiff, exponentials=exponentials)
     # a coarse pass shows how far the contact really goes
-    for _ in range(60):
-        try:
-            largest = _pass(
-                indenter,
-                material,
-                program,
-                instants,
-                resolution=(max(20, steps // 4), 1, 400),
-                outermost=outermost,
-                stiff=stiff,
-                exponentials=exponentials,
-            )[1]
-            break
-        except _OutOfElements:
-            outermost *= 2
+    coarsest = max(20, steps // 4), 1, 400
+    (_, largest), outermost = _growing_row(partial(run, resolution=coarsest, strict=False), outermost)
     outermost = 1.1 * largest if largest else outermost
     levels = []
     for level in range(refinements):
-        levels.append(
-            _pass(
-                indenter,
-                material,
-                program,
-                instants,
-                resolution=(steps, 2**level, elements),
-                outermost=outermost,
-                stiff=stiff,
-                exponentials=exponentials,
-            )[0]
-        )
+        resolution = steps, 2**level, elements
+        (kept, _), outermost = _growing_row(partial(run, resolution=resolution), outermost)
+        levels.append(kept)
     better = [fine + (fine - rough) / 3 for rough, fine in pairwise(levels)] or levels
     error = np.inf
     if len(better) > 1:
