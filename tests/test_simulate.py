@@ -98,6 +98,40 @@ def test_westergaard__wavy_surface_under_periodic_boundaries():
     assert np.abs(ds.pressure.values[0, :, 1] - expected).sum() < 5e-3 * expected.sum()
 
 
+@pytest.mark.parametrize("program", [rv.Program().load(0.1, over=0), rv.Program().load(0.1, over=0.2).hold(1.0)])
+def test_analytic_profile__grows_and_ends_as_on_a_large_grid(program):
+    """Growth changes nothing but cost; what was kept before it is reported on the final grid."""
+    small = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29))
+    large = rv.sphere(1e-3, size=(702e-6, 698e-6), shape=(351, 349))
+    settings = {"tolerance": 1e-2, "times": 3, "fields": FIELDS}
+    grown, exact = (simulate(h, rv.maxwell(1e6, 1e6), program, **settings) for h in (small, large))
+    assert grown.sizes["x"] > 100
+    assert grown.approach.values == pytest.approx(exact.approach.values, rel=3e-3)
+    inside = exact.isel(x=slice(160, 191), y=slice(160, 189))
+    first = int(np.searchsorted(grown.x, 0)), int(np.searchsorted(grown.y, 0))
+    same = grown.isel(x=slice(first[0], first[0] + 31), y=slice(first[1], first[1] + 29))
+    assert same.height.values == pytest.approx(inside.height.values, abs=1e-12)
+    for name, scale in (("pressure", exact.pressure.max()), ("displacement", exact.displacement.max())):
+        assert np.abs(same[name].values - inside[name].values).max() < 2e-2 * float(scale)
+    assert "grown from" in grown.attrs["history"]
+
+
+def test_recipe_that_no_longer_holds__does_not_grow():
+    with xr.set_options(keep_attrs=True):
+        scaled = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29)) * 0.5
+    assert "recipe" in scaled.attrs
+    with pytest.raises(rv.EdgeContactError):
+        simulate(scaled, program=rv.Program().load(0.1, over=0))
+
+
+def test_work__is_that_of_the_force_on_the_approach():
+    """Hertz: two fifths of force times approach, for an elastic ramp."""
+    program = rv.Program().load(2e-3, over=1.0)
+    ds = simulate(BALL, rv.elastic(1e6), program, times=81, tolerance=1e-6)
+    assert float(ds.work[-1]) == pytest.approx(0.4 * float(ds.force[-1] * ds.approach[-1]), rel=1e-2)
+    assert (np.diff(ds.work) >= 0).all()
+
+
 def test_zero_load__is_open():
     ds = simulate(program=rv.Program().load(2e-3, over=0).hold(0.5).load(0, over=0).hold(0.5), times=[0.25, 0.75])
     assert [ds.status.attrs["flag_meanings"].split()[i] for i in ds.status.values] == ["converged", "open"]
@@ -132,7 +166,7 @@ def with_value(value):
         (lambda: simulate(height=BALL * np.nan), "missing everywhere"),
         (lambda: simulate(height=BALL.values), r"height is ndarray: expected a DataArray"),
         (lambda: simulate(height=BALL.T), r"height is \('y', 'x'\)"),
-        (lambda: simulate(height=BALL[[0, 1, 5]]), "not evenly spaced"),
+        (lambda: simulate(height=BALL[[0, 1, 5]]), "expected a uniform, ascending grid"),
         (lambda: simulate(boundary="open"), "boundary is 'open'"),
         (lambda: simulate(tolerance=0), "tolerance is 0"),
         (lambda: simulate(time_step=-1.0), r"time_step is -1\.0"),
@@ -142,7 +176,10 @@ def with_value(value):
         (lambda: simulate(times=[2.0]), "times holds 2 s: expected times from 0 to the program's end at 1 s"),
         (lambda: simulate(times=0), "times is 0"),
         (lambda: simulate(missing="ignore"), "missing is 'ignore'"),
-        (lambda: simulate(program=rv.Program().load(10.0, over=0)), "contact reaches the border"),
+        (
+            lambda: simulate(height=rv.from_array(BALL.values, 1e-5), program=rv.Program().load(10.0, over=0)),
+            "contact reaches the border of the free-space domain of 31 x 34 cells",
+        ),
         (
             lambda: simulate(boundary="periodic", program=rv.Program().approach(1e-3, over=1)),
             "with periodic boundaries contact is full",

@@ -254,7 +254,8 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 def _rest(scene: Scene) -> State:
     shape = scene.halfspace.shape
-    now = Instant(0.0, np.zeros(shape), np.zeros(shape), 0.0, scene.lowest(scene.gap))
+    effective = np.zeros(shape) if scene.memory.acts_on == "pressure" else None
+    now = Instant(0.0, np.zeros(shape), np.zeros(shape), 0.0, scene.lowest(scene.gap), effective)
     return State(now, scene.memory.start(shape))
 
 

@@ -90,7 +90,7 @@ class Rows:
         """Bring the rows of smaller grids to the final one."""
         shape = self._scene.halfspace.shape
         x, y = self._ground.height["x"].values, self._ground.height["y"].values
-        for row, (pressure, effective, level, corner) in zip(self._rows, self._sources, strict=False):
+        for row, (pressure, effective, level, corner) in zip(self._rows, self._sources, strict=bool(self._sources)):
             if pressure.shape != shape:
                 offset = (int(np.searchsorted(x, corner[0])), int(np.searchsorted(y, corner[1])))
                 displacement = self._scene.halfspace.displacement(padded(effective, shape, offset))
