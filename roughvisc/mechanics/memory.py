@@ -210,9 +210,7 @@ def padded(fields: Array, shape: tuple[int, int], offset: tuple[int, int]) -> Ar
 
 def mean_compliance(material: Material, step: float) -> float:
     """Mean contact compliance over the first ``step`` of creep, ``int_0^h C / h``. [1/Pa]"""
-    if step == 0:
-        return float(material.contact_compliance(0.0))
-    return float(material.contact_integral(step)) / step
+    return float(material.mean_contact_compliance(0.0, step))
 
 
 def stiff_ratio(material: Material, step: float) -> float:

@@ -1,0 +1,61 @@
+"""What a number of a material must be, in the words of its refusal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def check_poisson(poisson: float) -> None:
+    if not -1 < poisson <= 0.5:
+        raise InputError(f"poisson is {poisson!r}: expected a number above -1 and up to 0.5")
+
+
+def check_number(name: str, value: float, unit: str, *, zero: bool = False) -> None:
+    good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
+    if not good:
+        raise InputError(f"{name} is {value!r}: expected a {'non-negative' if zero else 'positive'} number [{unit}]")
+
+
+def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
+    """Columns of a table of measurements as arrays.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What each column holds, for the messages; the first is what the rows are taken at.
+    columns : array_like
+        As many numbers in each.
+    ascending : bool
+        Whether the first column must ascend.
+
+    Returns
+    -------
+    tuple of ndarray
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, there are fewer than two rows, a number is negative or not finite, or the first
+        column does not ascend; the offending row is named, counted from 0.
+    """
+    arrays = tuple(np.asarray(column, dtype=float) for column in columns)
+    sizes = [array.size for array in arrays]
+    if any(array.ndim != 1 for array in arrays) or len(set(sizes)) > 1 or sizes[0] < 2:
+        found = ", ".join(f"{size} of {name}" for size, name in zip(sizes, names, strict=True))
+        raise InputError(f"table has {found}: expected as many, at least two")
+    for name, array in zip(names, arrays, strict=True):
+        for row in np.flatnonzero(~(np.isfinite(array) & (array >= 0)))[:1]:
+            raise InputError(f"table row {row}: {name} is {array[row]:g}: expected a finite number, not negative")
+    first = arrays[0]
+    for row in np.flatnonzero(np.diff(first) <= 0)[:1] if ascending else ():
+        raise InputError(
+            f"table row {row + 1}: {names[0]} {first[row + 1]:g} after {first[row]:g}: expected ascending {names[0]}"
+        )
+    return arrays

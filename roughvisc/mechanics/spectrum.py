@@ -1,0 +1,38 @@
+"""Positive spectra on a lattice of times: how measured or given functions become series."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+Array = NDArray[np.float64]
+
+
+def lattice(shortest: float, longest: float, per_decade: float) -> Array:
+    """Times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
+    count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
+    return np.geomspace(shortest, longest, count)
+
+
+def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
+    """Non-negative weights of the columns whose sum comes nearest to the target, in least squares.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (rows, terms)
+    target : ndarray, shape (rows,)
+    scale : ndarray, shape (rows,)
+        Positive: what the misfit of a row counts relative to.
+    """
+    scaled = columns / scale[:, None]
+    norms = np.sqrt(np.sum(scaled**2, axis=0))
+    norms[norms == 0] = 1.0
+    weights, _ = nnls(scaled / norms, target / scale, maxiter=50 * columns.shape[1])
+    return np.asarray(weights / norms)
+
+
+def in_words(terms: int, rows: int, misfit: Array) -> str:
+    """How many terms stand for how many rows, and how well."""
+    rms = float(np.sqrt(np.mean(misfit**2)))
+    return f"{terms} terms fitted to {rows} rows, largest misfit {np.abs(misfit).max():.2g}, rms {rms:.2g} (relative)"
