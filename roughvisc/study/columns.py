@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
 
 _HEADING = re.compile(r"\s*(?P<name>[^\[\(]*?)\s*(?:[\[\(]\s*(?P<unit>.*?)\s*[\]\)])?\s*")
+_INVERSE = re.compile(r"1\s*/\s*(?P<unit>\w+)")
 
 
-def read_columns(path: str | Path, units: Mapping[str, str]) -> tuple[list[float], ...]:
+#: units that measure the same to a library of units, and differ by 2 pi: never converted
+FREQUENCY_UNITS = ("rad/s", "Hz")
+
+
+def read_columns(
+    path: str | Path,
+    units: Mapping[str, str],
+    given: Mapping[str, str] | None = None,
+    optional: Collection[str] = (),
+) -> tuple[list[float], ...]:
     """Columns of a CSV file, in SI.
 
     Parameters
@@ -24,11 +34,15 @@ def read_columns(path: str | Path, units: Mapping[str, str]) -> tuple[list[float
         and converted; without one they are taken in the order of `units`, in SI.
     units : mapping of str to str
         Name of each column wanted, and the unit it is wanted in.
+    given : mapping of str to str, optional
+        Unit that a column is in, for a file whose heading does not say so.
+    optional : collection of str
+        Columns that a file need not have; without a heading it has none of them.
 
     Returns
     -------
     tuple of list of float
-        One list for each entry of `units`.
+        One list for each entry of `units`; empty for an optional column that is not there.
 
     Raises
     ------
@@ -40,18 +54,25 @@ def read_columns(path: str | Path, units: Mapping[str, str]) -> tuple[list[float
     if not lines:
         raise InputError(f"{path}: holds no rows: expected columns {', '.join(units)}")
     number, heading = lines[0]
-    order, factors = list(range(len(units))), [1.0] * len(units)
-    if not _is_number(heading[0]):
-        order, factors = _from_heading(path, heading, units)
+    headed = not _is_number(heading[0])
+    names = [name for name in units if headed or name not in optional]
+    places: list[int | None] = list(range(len(names)))
+    stated: list[str | None] = [None] * len(names)
+    if headed:
+        places, stated = _from_heading(path, heading, names, optional)
         lines = lines[1:]
-    columns: tuple[list[float], ...] = tuple([] for _ in units)
+    given = given or {}
+    factors = [_factor(path, n, own, given.get(n), units[n]) for n, own in zip(names, stated, strict=True)]
+    columns: dict[str, list[float]] = {name: [] for name in units}
     for number, cells in lines:
-        for column, place, factor, name in zip(columns, order, factors, units, strict=True):
+        for name, place, factor in zip(names, places, factors, strict=True):
+            if place is None:
+                continue
             if place >= len(cells) or not _is_number(cells[place]):
                 found = repr(cells[place]) if place < len(cells) else f"{len(cells)} columns"
                 raise InputError(f"{path}, line {number}: found {found}: expected a number for {name}")
-            column.append(float(f"{float(cells[place]) * factor:.15g}"))
-    return columns
+            columns[name].append(float(f"{float(cells[place]) * factor:.15g}"))
+    return tuple(columns.values())
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
@@ -74,17 +95,34 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _from_heading(path: str | Path, heading: list[str], units: Mapping[str, str]) -> tuple[list[int], list[float]]:
-    """Place and factor to SI of each wanted column."""
+def _from_heading(
+    path: str | Path, heading: list[str], names: Sequence[str], optional: Collection[str]
+) -> tuple[list[int | None], list[str | None]]:
+    """Place and unit of each wanted column, None where there is none."""
     found = [_HEADING.fullmatch(cell) for cell in heading]
-    names = [match["name"].lower() if match else "" for match in found]
-    order, factors = [], []
-    for name, unit in units.items():
-        if name not in names:
-            raise InputError(f"{path}: has columns {', '.join(names)}: expected {', '.join(units)}")
-        place = names.index(name)
-        match = found[place]
-        given = match["unit"] if match else None
-        order.append(place)
-        factors.append(quantity(f"1 {given}", unit, f"{path}: unit of {name}") if given else 1.0)
-    return order, factors
+    present = [match["name"].lower() if match else "" for match in found]
+    places: list[int | None] = []
+    units: list[str | None] = []
+    for name in names:
+        if name not in present and name not in optional:
+            needed = [one for one in names if one not in optional]
+            raise InputError(f"{path}: has columns {', '.join(present)}: expected {', '.join(needed)}")
+        place = present.index(name) if name in present else None
+        match = None if place is None else found[place]
+        places.append(place)
+        units.append(match["unit"] if match else None)
+    return places, units
+
+
+def _factor(path: str | Path, name: str, headed: str | None, given: str | None, wanted: str) -> float:
+    """Factor to the wanted unit, from the unit in the heading or the one given otherwise."""
+    where = f"{path}: unit of {name}"
+    if headed and given and headed != given:
+        raise InputError(f"{where}: the heading says {headed!r} and the study {given!r}: expected one of them")
+    unit = headed or given
+    if unit is None or unit == wanted:
+        return 1.0
+    if wanted in FREQUENCY_UNITS:
+        raise InputError(f"{where}: found {unit!r}: expected {wanted!r}, as the study says")
+    inverse = _INVERSE.fullmatch(unit)
+    return quantity(f"1 {inverse['unit']}^-1" if inverse else f"1 {unit}", wanted, where)

@@ -34,14 +34,17 @@ _PROSE = {
 def case_key(settings: Study) -> str:
     """Digest of all that determines the numbers: sixteen hexadecimal digits.
 
-    The surface counts by the content of its file and not by its path, the program by its segments and not by how
-    they were written, and no title counts.
+    The surface counts by the content of its file and not by its path, as do tables of a material; the program by
+    its segments and not by how they were written, and no title counts.
     """
-    stated = settings.model_dump(mode="json", exclude={"title", "program", "surface"}, serialize_as_any=True)
+    stated = settings.model_dump(
+        mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
+    )
     stated["program"] = [
         [segment.control, segment.duration, segment.end, segment.amplitude, segment.period]
         for segment in settings.loading().segments
     ]
+    stated["material"] = settings.material.content()
     stated["surface"] = surface_content(settings.surface)
     stated["numerics"] = NUMERICS_REVISION
     return _digest(stated)[:16]
