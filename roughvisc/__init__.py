@@ -19,7 +19,10 @@ _PUBLIC = {
         ),
         "roughvisc.topography.parameters": "parameters psd",
         "roughvisc.topography.synthesis": "sphere cone flat_punch wavy self_affine",
-        "roughvisc.mechanics.materials": "Prony elastic maxwell kelvin_voigt zener from_relaxation",
+        "roughvisc.mechanics.materials": (
+            "Prony PowerLaw Tabulated elastic maxwell kelvin_voigt zener from_relaxation pair "
+            "from_creep_table from_relaxation_table from_dynamic"
+        ),
         "roughvisc.mechanics.loading": "Program",
         "roughvisc.study.simulate": "simulate",
         "roughvisc.study.case": "read_study read_cases vary study_schema",

@@ -88,7 +88,7 @@ class Scene:
 
     def compliance(self, t: float) -> float:
         """Contact compliance. [1/Pa]"""
-        return float(self.material.contact_compliance(t))
+        return float(self.material.contact_compliance(min(t, self.program.duration)))
 
 
 @dataclass(frozen=True)
@@ -731,7 +731,7 @@ def _suggestion(scene: Scene, trial: _Trial, error: float, state: State) -> floa
     constant = trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
     curvature = error / (constant * trial.length * (trial.length + last))
     target = _SHARE * scene.tolerance / curvature
-    length = math.sqrt(4.2 * target)
+    length = min(math.sqrt(4.2 * target), 2 * trial.length, scene.program.duration)
     if stiff_ratio(scene.material, length) > 0.5:
         length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + 8.4 * target))
-    return min(max(length, 0.2 * trial.length), 2 * trial.length)
+    return max(min(length, 2 * trial.length), 0.2 * trial.length)

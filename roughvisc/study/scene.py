@@ -11,12 +11,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.engine import Engine, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
-from roughvisc.mechanics.materials import Material, Prony
-from roughvisc.mechanics.memory import Modes
+from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
-from roughvisc.topography.grid import spacing
+from roughvisc.topography.grid import axis_step
 from roughvisc.topography.synthesis import grown
 
 #: An analytic profile's grid grows by this factor a time, and no farther than so many cells.
@@ -41,7 +41,8 @@ class Ground:
 
     def halfspace(self, boundary: Boundary, workers: int = 1) -> HalfSpace:
         """Half-space on the surface's grid."""
-        return HalfSpace(self.height.shape, spacing(self.height, "height"), boundary, workers)
+        sides = (_side(self.height, "x"), _side(self.height, "y"))
+        return HalfSpace(self.height.shape, sides, boundary, workers)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""
@@ -70,8 +71,8 @@ def prepare(
     time_step: float | Literal["auto"],
     times: int | Sequence[float] | None,
     edge: Literal["error", "accept"],
-) -> Scene:
-    """Scene of a case; see :func:`roughvisc.simulate` for the parameters.
+) -> tuple[Scene, Engine]:
+    """Scene of a case and what models its material; see :func:`roughvisc.simulate` for the parameters.
 
     Raises
     ------
@@ -86,16 +87,17 @@ def prepare(
         raise InputError(f"time_step is {time_step!r}: expected 'auto' or a positive number [s]")
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
-    if not isinstance(material, Prony):
+    if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     grows = boundary == "free" and edge == "error" and ground.can_grow()
     gap = ground.gap
     _check_approach(program, boundary, gap[ground.present])
-    return Scene(
+    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement")
+    scene = Scene(
         halfspace=ground.halfspace(boundary),
         gap=gap,
         material=material,
-        memory=Modes(material, "pressure" if grows else "displacement"),
+        memory=engine.memory,
         program=program,
         times=kept_times(program, times),
         tolerance=float(tolerance),
@@ -104,6 +106,7 @@ def prepare(
         accept_edge=edge == "accept",
         enlarge=ground.enlarge if grows else None,
     )
+    return scene, engine
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
@@ -113,10 +116,21 @@ def _checked(height: xr.DataArray) -> xr.DataArray:
     if 0 in height.shape:
         raise InputError(f"height has {height.shape[0]} x {height.shape[1]} cells: expected at least one each way")
     height = height.astype(float, copy=False)
-    spacing(height, "height")
+    for axis in ("x", "y"):
+        _side(height, axis)
     if np.isinf(height.values).any():
         raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
     return height
+
+
+def _side(height: xr.DataArray, axis: str) -> float:
+    """Side of the cells along one axis, [m]; a single cell begins at zero."""
+    if height.sizes[axis] > 1:
+        return axis_step(height, axis, "height")
+    centre = float(height[axis].values[0]) if axis in height.coords else math.nan
+    if not 0 < centre < math.inf:
+        raise InputError(f"height: the only cell along {axis!r} is centred at {centre:g} m: expected half its side")
+    return 2 * centre
 
 
 def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:

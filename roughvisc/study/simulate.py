@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -20,6 +21,8 @@ from roughvisc.mechanics.stepper import Scene, Step, march
 from roughvisc.study.rows import Rows
 from roughvisc.study.scene import Ground, prepare
 from roughvisc.variables import FIELDS
+
+log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
 Method = Literal["fast", "seed"]
@@ -99,7 +102,7 @@ def simulate(
     """
     began = time.perf_counter()
     ground = Ground(height, missing)
-    scene = prepare(
+    scene, engine = prepare(
         ground,
         material,
         program,
@@ -120,7 +123,11 @@ def simulate(
         rows.add(step, time.perf_counter() - began)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-    return rows.dataset(method)
+    log.info("memory: %s", engine.note)
+    dataset = rows.dataset(method)
+    described = {"memory": engine.note, "series_error": engine.series_error, "material_note": material.note}
+    dataset.attrs |= {name: value for name, value in described.items() if value != ""}
+    return dataset
 
 
 def _shown(steps: Iterator[Step], scene: Scene, progress: bool | Progress) -> Iterator[Step]:

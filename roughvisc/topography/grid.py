@@ -77,12 +77,8 @@ def axis_step(h: xr.DataArray, axis: str, step: str) -> float:
     if axis not in h.coords:
         raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
     at = np.asarray(h[axis].values)
-    if at.dtype.kind not in "fiu" or at.size < 1 or not np.isfinite(at).all():
-        raise InputError(f"{step}: coordinate {axis!r} has {at.size} point(s): expected finite numbers, at least one")
-    if at.size == 1:  # a single cell begins at zero
-        if not at[0] > 0:
-            raise InputError(f"{step}: the only cell along {axis!r} is centred at {at[0]:g} m: expected half its side")
-        return float(2 * at[0])
+    if at.dtype.kind not in "fiu" or at.size < 2 or not np.isfinite(at).all():
+        raise InputError(f"{step}: coordinate {axis!r} has {at.size} point(s): expected at least 2 finite numbers")
     d = float(at[-1] - at[0]) / (at.size - 1)
     if not d > 0 or np.abs(np.diff(at) - d).max() > 1e-4 * d:
         steps = np.diff(at)

@@ -1,0 +1,96 @@
+"""Which memory models a material: the cheapest one whose error is known to be small enough, and what it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from roughvisc.mechanics.history import History
+from roughvisc.mechanics.materials import Material, Prony
+from roughvisc.mechanics.memory import ActsOn, Memory, Modes, stiff_ratio
+from roughvisc.mechanics.series import series_of
+
+#: Part of the tolerance that a series in place of a material may take.
+SERIES_SHARE = 0.1
+#: A series is certified from this part of the program's length to its whole.
+SHORTEST_AGE = 1e-6
+#: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
+_SHORTEST_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A memory, and how well it stands for the material.
+
+    Attributes
+    ----------
+    memory : Memory
+        What the stepper marches with.
+    series_error : float
+        Largest relative error of the compliance over the times used; zero where the memory is exact.
+    note : str
+        What is modelled, in words.
+    """
+
+    memory: Memory
+    series_error: float
+    note: str
+
+
+def engine_for(material: Material, duration: float, tolerance: float, acts_on: ActsOn = "displacement") -> Engine:
+    """Memory for a material over a program.
+
+    Parameters
+    ----------
+    material : Material
+        Any material.
+    duration : float
+        Length of the program. [s]
+    tolerance : float
+        Relative error that the whole computation is allowed.
+    acts_on : {"displacement", "pressure"}
+        The form that a recursive memory takes.
+
+    Returns
+    -------
+    Engine
+        Recursive exponentials where the material is a series or has one within a tenth of the tolerance; else the
+        direct history, where that is accurate; else the best series, with its error.
+
+    Raises
+    ------
+    InputError
+        If the material is not known over the whole program.
+    """
+    if isinstance(material, Prony):
+        return Engine(Modes(material, acts_on), 0.0, _terms(material))
+    if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
+        glassy = float(material.contact_compliance(0.0))
+        return Engine(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
+    series = series_of(material, SHORTEST_AGE * duration, duration, SERIES_SHARE * tolerance)
+    certified = f"{_terms(series.prony)} in place of the compliance, within {series.error:.1e} of it"
+    if series.error > SERIES_SHARE * tolerance and _direct_is_accurate(material, duration):
+        return Engine(
+            History(material),
+            0.0,
+            f"direct history of every pressure (the best series, {series.error:.1e} off, missed the tolerance)",
+        )
+    return Engine(Modes(series.prony, acts_on), series.error, certified)
+
+
+def _terms(series: Prony) -> str:
+    if not series.times and not series.fluidity:
+        return "no memory: elastic"
+    count = len(series.times)
+    exponentials = f"{count} exponential{'' if count == 1 else 's'}"
+    return f"{exponentials} and a fluidity" if series.fluidity and count else exponentials if count else "a fluidity"
+
+
+def _direct_is_accurate(material: Material, duration: float) -> bool:
+    """Pressure taken as linear in each step must not ring, and a jump must be followed at once."""
+    if float(material.contact_compliance(0.0)) == 0:
+        return False
+    length = duration
+    while stiff_ratio(material, length) > 0.5 and length > 1e-12 * duration:
+        length /= 2
+    return math.isfinite(length) and length >= _SHORTEST_STEP * duration
