@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -14,14 +15,16 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.checks import check_poisson, checked_rows
 from roughvisc.mechanics.prony import Prony
 from roughvisc.mechanics.relaxation import from_relaxation
-from roughvisc.mechanics.spectrum import in_words, lattice, nonnegative
+from roughvisc.mechanics.spectrum import lattice, nonnegative
 from roughvisc.mechanics.tabulated import Tabulated
 
 Array = NDArray[np.float64]
 Kind = Literal["shear", "tensile"]
 
-#: terms offered to a fit, in a decade of times; non-negative least squares takes few of them
-_PER_DECADE = 4
+#: terms offered to a fit, in a decade of times
+_PER_DECADE = (1, 1.5, 2, 3, 4, 6)
+#: how much larger the misfit may be than the smallest found, for the sake of fewer terms
+_ALLOWED = 1.1
 #: how far beyond the measured times terms are offered: a slower one is a plateau, a faster one is not seen
 _BEYOND = 3.0
 
@@ -99,11 +102,13 @@ def from_relaxation_table(
         raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
     shear = values / _tensile_to_shear(kind, poisson)
     known = t[t > 0]
-    theta = lattice(known[0] / _BEYOND, known[-1] * _BEYOND, _PER_DECADE)
-    columns = np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
-    weights = nonnegative(columns, shear, shear)
-    misfit = columns @ weights / shear - 1
-    return _fitted(weights, theta, misfit, t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
+    spectrum = _sparsest(
+        lambda theta: np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)]),
+        (known[0] / _BEYOND, known[-1] * _BEYOND),
+        shear,
+        shear,
+    )
+    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
 
 
 def from_dynamic(
@@ -161,16 +166,20 @@ def from_dynamic(
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
     factor = _tensile_to_shear(kind, poisson)
     elastic, viscous = elastic / factor, viscous / factor
-    theta = lattice(1 / (_BEYOND * omega.max()), _BEYOND / omega.min(), _PER_DECADE)
-    x = omega[:, None] * theta
-    in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
-    out_of_phase = np.column_stack([np.zeros(omega.size), x / (1 + x**2)])
-    columns, target = np.vstack([in_phase, out_of_phase]), np.append(elastic, viscous)
-    scale = np.maximum(target, 1e-3 * np.tile(np.hypot(elastic, viscous), 2))
-    weights = nonnegative(columns, target, scale)
-    misfit = (columns @ weights - target) / scale
-    span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return _fitted(weights, theta, misfit, omega.size, span, poisson)
+    target = np.append(elastic, viscous)
+
+    def columns(theta: Array) -> Array:
+        x = omega[:, None] * theta
+        in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
+        return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
+
+    spectrum = _sparsest(
+        columns,
+        (1 / (_BEYOND * omega.max()), _BEYOND / omega.min()),
+        target,
+        np.maximum(target, 1e-3 * np.tile(np.hypot(elastic, viscous), 2)),
+    )
+    return spectrum.material(omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", poisson)
 
 
 def _tensile_to_shear(kind: Kind, poisson: float) -> float:
@@ -181,10 +190,38 @@ def _tensile_to_shear(kind: Kind, poisson: float) -> float:
     return 2 * (1 + poisson) if kind == "tensile" else 1.0
 
 
-def _fitted(weights: Array, theta: Array, misfit: Array, rows: int, span: str, poisson: float) -> Prony:
-    """Series from the equilibrium modulus and the moduli at the times ``theta``."""
-    used = np.flatnonzero(weights[1:] > 0)
-    moduli = weights[1:][used]
-    series = from_relaxation(float(weights[0]), moduli.tolist(), theta[used].tolist(), poisson)
-    note = f"{in_words(int(np.count_nonzero(weights)), rows, misfit)}, {span}"
-    return dataclasses.replace(series, note=note)
+@dataclass(frozen=True)
+class _Spectrum:
+    """Moduli [Pa], the equilibrium modulus first, at relaxation times [s], and the relative misfit of each datum."""
+
+    moduli: Array
+    theta: Array
+    misfit: Array
+
+    @property
+    def terms(self) -> int:
+        return int(np.count_nonzero(self.moduli))
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.misfit**2)))
+
+    def material(self, rows: int, span: str, poisson: float) -> Prony:
+        used = np.flatnonzero(self.moduli[1:])
+        series = from_relaxation(
+            float(self.moduli[0]), self.moduli[1:][used].tolist(), self.theta[used].tolist(), poisson
+        )
+        misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
+        return dataclasses.replace(series, note=f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}")
+
+
+def _sparsest(columns: Callable[[Array], Array], within: tuple[float, float], target: Array, scale: Array) -> _Spectrum:
+    """The spectrum of fewest terms among those whose misfit is about the smallest."""
+    found = []
+    for per_decade in _PER_DECADE:
+        theta = lattice(*within, per_decade)
+        matrix = columns(theta)
+        moduli = nonnegative(matrix, target, scale)
+        found.append(_Spectrum(moduli, theta, (matrix @ moduli - target) / scale))
+    enough = _ALLOWED * min(one.rms for one in found) + 1e-9
+    return min((one for one in found if one.rms <= enough), key=lambda one: one.terms)

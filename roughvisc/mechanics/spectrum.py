@@ -9,6 +9,10 @@ from scipy.optimize import nnls
 Array = NDArray[np.float64]
 
 
+#: a term that nowhere makes up more of the target than this is left out
+_UNSEEN = 1e-10
+
+
 def lattice(shortest: float, longest: float, per_decade: float) -> Array:
     """Times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
     count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
@@ -16,7 +20,7 @@ def lattice(shortest: float, longest: float, per_decade: float) -> Array:
 
 
 def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
-    """Non-negative weights of the columns whose sum comes nearest to the target, in least squares.
+    """Non-negative weights of the columns whose sum comes nearest to the target, in least squares; mostly zeros.
 
     Parameters
     ----------
@@ -29,10 +33,5 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     norms = np.sqrt(np.sum(scaled**2, axis=0))
     norms[norms == 0] = 1.0
     weights, _ = nnls(scaled / norms, target / scale, maxiter=50 * columns.shape[1])
-    return np.asarray(weights / norms)
-
-
-def in_words(terms: int, rows: int, misfit: Array) -> str:
-    """How many terms stand for how many rows, and how well."""
-    rms = float(np.sqrt(np.mean(misfit**2)))
-    return f"{terms} terms fitted to {rows} rows, largest misfit {np.abs(misfit).max():.2g}, rms {rms:.2g} (relative)"
+    seen = np.abs(scaled / norms).max(axis=0) * weights
+    return np.where(seen > _UNSEEN, weights / norms, 0.0)

@@ -165,10 +165,10 @@ def _ascending(times: Array, compliances: Array, noise: float) -> tuple[Array, l
         return compliances, []
     # relative deviations count alike; a compliance of zero comes first and is never moved
     weights = (highest[-1] / np.where(compliances > 0, compliances, highest[-1])) ** 2
-    repaired = np.asarray(isotonic_regression(compliances, weights=weights).x)
+    repaired = np.maximum.accumulate(isotonic_regression(compliances, weights=weights).x)
     moved = np.abs(repaired - compliances) / np.where(repaired > 0, repaired, 1.0)
     return repaired, [
-        f"{np.count_nonzero(moved > 0)} of {times.size} rows were made to ascend by isotonic regression, "
+        f"{np.count_nonzero(moved > 1e-12)} of {times.size} rows were made to ascend by isotonic regression, "
         f"by {moved.max():.2%} at most"
     ]
 
