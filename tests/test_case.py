@@ -90,12 +90,200 @@ def test_read_study__units_become_si(study):
             materials.Prony(1e-9, 0.0, (1e-6,), (1.0,)),
         ),
         ('model = "prony"\nglassy = 1e-9', materials.Prony(1e-9)),
+        (
+            'model = "zener"\nshear_modulus = 3\nkelvin_modulus = 2\nkelvin_viscosity = 1\nbulk_modulus = "2 kPa"',
+            materials.zener(3.0, 2.0, 1.0, bulk_modulus=2e3),
+        ),
+        (
+            'model = "power_law"\nglassy = 0\ncoefficient = "1 MPa^-1"\nexponent = 0.4\ntime_scale = "2 h"',
+            materials.PowerLaw(0.0, 1e-6, 0.4, 7200.0),
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, "2 min"]\ncompliances = [1, 2]\nnoise = 0.01\nkind = "tensile"',
+            materials.from_creep_table((0, 120), (1, 2), "tensile", 0.01),
+        ),
+        (
+            'model = "relaxation_table"\ntimes = [0, 1, 2]\nmoduli = ["3 MPa", 2e6, 1.5e6]\npoisson = 0.3',
+            materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), poisson=0.3),
+        ),
+        (
+            'model = "dynamic"\nfrequency_unit = "Hz"\nfrequencies = [1, 10]\nstorage = [2, 3]\nloss = [1, "1 Pa"]',
+            materials.from_dynamic((1, 10), (2, 3), (1, 1), frequency_unit="Hz"),
+        ),
+        (
+            'model = "pair"\na = { model = "elastic", shear_modulus = "80 GPa", poisson = 0.3 }\n'
+            '[material.b]\nmodel = "power_law"\nglassy = 1e-9\ncoefficient = 1e-6\nexponent = 0.5',
+            materials.pair(materials.elastic(8e10, 0.3), materials.PowerLaw(1e-9, 1e-6, 0.5)),
+        ),
     ],
 )
 def test_material__every_model(study, table, expected):
     head, rest = BALL.split("[material]")
     case = read_study(study(f"{head}[material]\n{table}\n[[program]]" + rest.split("[[program]]", 1)[1]))
     assert case.material() == expected
+
+
+def with_material(table):
+    """BALL of another material."""
+    return f"{BALL.split('[material]')[0]}[material]\n{table}\n[[program]]{BALL.split('[[program]]', 1)[1]}"
+
+
+CREEP = materials.from_creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7))
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("0, 1e-7\n60, 2e-7\n3600, 5e-7\n", ""),
+        ("0, 0.1\n1, 0.2\n60, 0.5", 'time_unit = "min"\ncompliance_unit = "1/MPa"'),
+        ("time (s); compliance (MPa^-1)\n0; 0.1\n60; 0.2\n3600; 0.5", ""),
+        ("# rheometer\ncompliance [1/MPa],time\n0.1,0\n0.2,1\n0.5,60", 'time_unit = "min"'),
+        ("time [min], compliance [1/MPa]\n0, 0.1\n1, 0.2\n60, 0.5", 'time_unit = "min"'),
+    ],
+)
+def test_material__table_from_csv(study, tmp_path, rows, keys):
+    (tmp_path / "creep.csv").write_text(rows)
+    case = read_study(study(with_material(f'model = "tabulated"\nfile = "creep.csv"\n{keys}')))
+    assert case.material() == CREEP
+    listed = 'model = "tabulated"\ntimes = [0, 60, 3600]\ncompliances = [1e-7, 2e-7, 5e-7]'
+    assert case.key == read_study(study(with_material(listed))).key, "the content counts, not the path or the units"
+    (tmp_path / "creep.csv").unlink()
+    again = Case.from_json(case.to_json())
+    assert again == case, "a stored case needs its CSV file no longer"
+    assert again.material() == CREEP
+    assert vary(again, {"material.noise": 0.1}).material().noise == 0.1
+
+
+def test_key__knows_a_creep_table_by_its_content(study, tmp_path):
+    rows = {"a.csv": "0, 1\n1, 2", "b.csv": "0, 1\n1, 2", "c.csv": "0, 1\n1, 3"}
+    for name, text in rows.items():
+        (tmp_path / name).write_text(text)
+    sweep = '\n[sweep]\n"material.file" = ["a.csv", "b.csv", "c.csv"]'
+    a, b, c = read_cases(study(with_material('model = "tabulated"\nfile = "a.csv"') + sweep))
+    assert a.key == b.key != c.key
+    assert c.varied == {"material.file": "c.csv"}
+    assert c.material().compliances == (1.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("1, 3e6, 1e6\n10, 5e6, 2e6", ""),
+        ("frequency [Hz], storage [MPa], loss [MPa]\n1, 3, 1\n10, 5, 2", ""),
+        ("storage, frequency, loss\n3, 1, 1\n5, 10, 2", 'modulus_unit = "MPa"'),
+        ("frequency, storage, loss, shift_factor\n2, 3, 1, 0.5\n2, 5, 2, 5", 'modulus_unit = "MPa"'),
+    ],
+)
+def test_material__dynamic_from_csv(study, tmp_path, rows, keys):
+    (tmp_path / "dma.csv").write_text(rows)
+    table = f'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "Hz"\n{keys}'
+    material = read_study(study(with_material(table))).material()
+    assert material == materials.from_dynamic((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
+    other = read_study(study(with_material(table.replace('"Hz"', '"rad/s"')))) if "[Hz]" not in rows else None
+    assert other is None or other.material() != material
+
+
+def test_material__relaxation_from_csv(study, tmp_path):
+    (tmp_path / "relaxation.csv").write_text("time [ms], modulus\n0, 3\n1000, 2\n2000, 1.5")
+    table = 'model = "relaxation_table"\nfile = "relaxation.csv"\nmodulus_unit = "MPa"\nkind = "tensile"'
+    material = read_study(study(with_material(table))).material()
+    assert material == materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), "tensile")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            'model = "tabulated"\nfile = "gone.csv"',
+            "material.file: found 'gone.csv', which does not exist: expected a file ({folder}/gone.csv)",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntimes = [0, 1]',
+            "material.file: found beside times: expected one of them",
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, 1]',
+            "material.compliances: missing: expected file, or times and compliances",
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, 1]\ncompliances = [1, 2]\ntime_unit = "s"',
+            "material.time_unit: found without a file: expected units where the values are",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = 3',
+            "material.time_unit: found 3: expected a unit",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = "mm"',
+            "material.file: {folder}/creep.csv: unit of time is '1 mm', which is in millimeter: expected a number in "
+            "s, or a string with a unit of its kind",
+        ),
+        (
+            'model = "tabulated"\nfile = "dma.csv"\ntime_unit = "s"',
+            "material.file: {folder}/dma.csv: has columns frequency, storage, loss: expected time, compliance",
+        ),
+        (
+            'model = "tabulated"\nfile = "headed.csv"\ntime_unit = "s"',
+            "material.file: {folder}/headed.csv: unit of time: the heading says 'h' and the study 's': expected "
+            "one of them",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\nfiel = 1',
+            "material.fiel: unknown key; did you mean 'file'?",
+        ),
+        (
+            'model = "tabulated"\nfile = "falling.csv"\nnoise = "1 %"',
+            "material: table row 1: compliance 1 1/Pa at 1 s is 50.00% below an earlier row, noise is 0.01: expected "
+            "an ascending compliance, or a larger noise",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"',
+            "material.frequency_unit: missing: expected 'rad/s' or 'Hz'",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "kHz"',
+            "material.frequency_unit: found 'kHz': expected 'rad/s' or 'Hz'",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "rad/s"',
+            "material.file: {folder}/dma.csv: unit of frequency: the heading says 'Hz' and the study 'rad/s': expected "
+            "one of them",
+        ),
+        (
+            'model = "elastic"\nshear_modulus = 1\npoisson = 0.3\nbulk_modulus = 3',
+            "material: poisson is 0.3 and bulk_modulus is 3.0: expected one of them",
+        ),
+        (
+            'model = "power_law"\nglassy = 0\ncoefficient = 1\nexponent = 1',
+            "material.exponent: found 1: expected a number above 0 and below 1",
+        ),
+        (
+            'model = "pair"\na = { model = "elastic", shear_modulus = -1 }\nb = { model = "pair" }',
+            "2 problems\n"
+            "  material.a.shear_modulus: found -1: expected a number in Pa, or a string with a unit of its kind, above "
+            "0\n  material.b.model: found 'pair', which is no known model: expected one of elastic, maxwell, "
+            "kelvin_voigt, zener, from_relaxation, prony, power_law, tabulated, relaxation_table, dynamic",
+        ),
+        ('model = ["pair"]', "material.model: found ['pair'], which is no known model; did you mean 'pair'?"),
+    ],
+)
+def test_material__refused_in_plain_words(study, tmp_path, table, message):
+    (tmp_path / "creep.csv").write_text("0, 1\n1, 2")
+    (tmp_path / "headed.csv").write_text("time [h], compliance\n0, 1\n1, 2")
+    (tmp_path / "falling.csv").write_text("0, 2\n1, 1")
+    (tmp_path / "dma.csv").write_text("frequency [Hz], storage, loss\n1, 3, 1\n10, 5, 2")
+    assert refusal(study(with_material(table))) == message.format(folder=tmp_path)
+
+
+def test_pair__is_varied_within(study):
+    bodies = 'a = { model = "elastic", shear_modulus = 1 }\nb = { model = "tabulated", file = "creep.csv" }'
+    path = study(with_material(f'model = "pair"\n{bodies}'))
+    (path.parent / "creep.csv").write_text("0, 1\n1, 2")
+    case = read_study(path)
+    assert Case.from_json(case.to_json()).key == case.key
+    changed = vary(case, {"material.a.shear_modulus": "2 Pa"})
+    assert changed.key != case.key
+    assert changed.material() == materials.pair(materials.elastic(2.0), materials.Tabulated((0, 1), (1, 2)))
 
 
 def test_program__every_segment(study):
@@ -395,6 +583,7 @@ def test_key__counts_what_determines_the_numbers(study):
         ('hold = "5 s"', 'hold = "5000 ms"\ncontrol = "load"'),
         ("[surface]", "[solve]\nboundary = 'free'\n[keep]\nfields = ['gap', 'pressure']\n[surface]"),
         ("[material]", "level = false\n[material]"),
+        ('model = "zener"', 'model = "zener"\npoisson = 0.5'),
     ]
     other = [
         ('"50 ms"', '"51 ms"'),
@@ -405,6 +594,8 @@ def test_key__counts_what_determines_the_numbers(study):
         ("[surface]", "[keep]\ntimes = 3\n[surface]"),
         ("[surface]", "[keep]\nfields = ['gap']\n[surface]"),
         ("[material]", "level = 1\n[material]"),
+        ('model = "zener"', 'model = "zener"\npoisson = 0.4'),
+        ('model = "zener"', 'model = "zener"\nbulk_modulus = "1 GPa"'),
     ]
     key = read_study(study()).key
     assert len(key) == 16
