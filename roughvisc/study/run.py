@@ -146,6 +146,37 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
     }
 
 
+def run_case(
+    case: Case, folder: Path, *, progress: bool | Progress = False, stop: Callable[[], bool] | None = None
+) -> Path:
+    """Bring one case to its file in a folder, and give the file's path.
+
+    Parameters
+    ----------
+    case : Case
+        What to compute.
+    folder : path
+        Where the file goes; it is named by the case's key.
+    progress : bool or callable
+        As in :func:`run`.
+    stop : callable, optional
+        Asked at every accepted step; if it says so, :class:`KeyboardInterrupt` is raised.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        As :func:`run`; an unconverged result is kept all the same.
+    """
+
+    def report(now: float, end: float) -> None:
+        if stop is not None and stop():
+            raise KeyboardInterrupt
+        if callable(progress):
+            progress(now, end)
+
+    return keep(compute(case, progress=report), case, folder)
+
+
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
     path = write_result(dataset, folder / f"{case.key}.nc")
