@@ -39,7 +39,10 @@ class HeightAccessor:
     def __getattr__(self, name: str) -> Any:
         if name not in METHODS:
             raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(METHODS)}")
-        return partial(getattr(import_module(METHODS[name]), name), self._height)
+        function = getattr(import_module(METHODS[name]), name)
+        method = partial(function, self._height)
+        method.__doc__ = function.__doc__
+        return method
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *METHODS]

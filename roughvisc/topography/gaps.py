@@ -95,7 +95,7 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
         filled=(("x", "y"), marked, {"long_name": "height was missing and filled in"})
     )
     line = f"filled: {int(missing.sum())} missing points, {method}"
-    return noted(filled, line, filled_points=int(marked.sum()), fill_method=method)
+    return noted(filled, line, fill_method=method)
 
 
 def _local_median(values: np.ndarray, window: int) -> np.ndarray:
