@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
-_SHARE = 0.4
+_SHARE = 0.33
 # The relative duality gap of each step's contact problem, in units of the tolerance (the error in pressure, L1, is
 # about the gap); under given approach the force is not fixed, and ten times less is needed.
 _ALGEBRAIC = {"load": 0.1, "approach": 0.01}

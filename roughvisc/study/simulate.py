@@ -24,6 +24,12 @@ from roughvisc.variables import FIELDS
 
 log = logging.getLogger("roughvisc")
 
+#: What a result says of a material without instantaneous compliance.
+NO_JUMP = (
+    "The material has no instantaneous compliance: each cell that comes into contact makes the pressure jump. The "
+    "tolerance is kept on the approach; the pressure (L1) may miss it at times just after cells came into contact."
+)
+
 Progress = Callable[[float, float], None]
 Method = Literal["fast", "seed"]
 
@@ -117,15 +123,20 @@ def simulate(
         raise InputError(f"fields holds {unknown[0]!r}: expected some of {', '.join(FIELDS)}")
     if method not in ("fast", "seed"):
         raise InputError(f"method is {method!r}: expected 'fast' or 'seed'")
+    log.info("memory: %s", engine.note)
     steps = march(scene) if method == "fast" else march_seed(scene)
     rows = Rows(ground, scene, fields)
     for step in _shown(steps, scene, progress):
         rows.add(step, time.perf_counter() - began)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-    log.info("memory: %s", engine.note)
     dataset = rows.dataset(method)
-    described = {"memory": engine.note, "series_error": engine.series_error, "material_note": material.note}
+    described = {
+        "memory": engine.note,
+        "series_error": engine.series_error,
+        "material_note": material.note,
+        "accuracy_note": "" if scene.compliance(0.0) > 0 else NO_JUMP,
+    }
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset
 
