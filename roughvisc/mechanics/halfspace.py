@@ -101,37 +101,31 @@ class HalfSpace:
             rows[:, block] = fft.ifft(columns, axis=0, overwrite_x=True, workers=self.workers)[:nx]
         return fft.irfft(rows, n=my, axis=1, overwrite_x=True, workers=self.workers)[:, :ny]
 
-    def approximate_inverse(self, displacement: Array) -> Array:
+    def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
 
         Parameters
         ----------
-        displacement : ndarray, shape (nx, ny)
-            [m]
+        displacement : ndarray of float32, shape (nx, ny)
+            Of ordinary size: single precision underflows. [m]
 
         Returns
         -------
-        ndarray, shape (nx, ny)
-            Pressure over the contact modulus, good to single precision. [-]
+        ndarray of float32, shape (nx, ny)
+            Pressure over the contact modulus. [-]
 
         Notes
         -----
         The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
         positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
         """
-        largest = float(np.max(np.abs(displacement))) or 1.0  # the range of single precision is small
-        pressure = self._filtered((displacement / largest).astype(np.float32), self._inverse_symbol)
-        return pressure.astype(float) * (largest / self._inverse_scale)
+        return self._filtered(displacement, self._inverse_symbol)
 
     @cached_property
     def _inverse_symbol(self) -> NDArray[np.float32]:
-        symbol = periodic_symbol(self.shape, self.spacing) / self._inverse_scale
-        symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or 1.0
+        symbol = periodic_symbol(self.shape, self.spacing)
+        symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or self.spacing[0]
         return _both_signs(1 / symbol, self.shape[0]).astype(np.float32)
-
-    @property
-    def _inverse_scale(self) -> float:
-        return max(self.spacing)
 
     def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
         field_q = fft.rfft2(field, workers=self.workers)
