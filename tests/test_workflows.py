@@ -36,3 +36,13 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             r, p = points.get_data()
             inside = r < 0.8 * line.get_xdata()[np.flatnonzero(line.get_ydata())[-1]]
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
+
+
+def test_benchmarks__run_small(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
+    assert (tmp_path / "table.nc").exists()
+    for row in tables["seed"] + tables["tamaas"]:
+        assert row["error"] <= row["peer_error"]
+    for row in tables["scaling"]:
+        assert 0 < row["transform_share"] < 1
