@@ -7,10 +7,11 @@ written beyond that is cut away. So it survives what kills a process, a machine 
 from __future__ import annotations
 
 import json
+import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -21,8 +22,8 @@ from roughvisc.study.store import frames_together
 
 Array = NDArray[Any]
 
-# mark, length and checksum of the text, length and checksum of the arrays' bytes, checksum of these
-_HEAD = struct.Struct("<4sIIQII")
+# mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
+_HEAD = struct.Struct("<4sIII")
 _MARK = b"rvr1"
 _KINDS = "fiub"
 
@@ -36,18 +37,12 @@ def write_record(stream: IO[bytes], plain: Any, arrays: Mapping[str, Array]) -> 
 
     The stream must not be buffered: a full disk is then found here and nowhere else.
     """
-    whole = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    listed = [[name, array.dtype.str, array.shape] for name, array in whole.items()]
-    text = json.dumps([plain, listed]).encode()  # repr of a float gives it back exactly, infinities and NaN too
-    # in little-endian C order as they are on every machine that this runs on
-    payload = [array.reshape(-1).view(np.uint8).data for array in whole.values()]
-    checksum = 0
-    for part in payload:
-        checksum = zlib.crc32(part, checksum)
-    head = _HEAD.pack(_MARK, len(text), zlib.crc32(text), sum(map(len, payload)), checksum, 0)
-    head = head[:-4] + zlib.crc32(head[:-4]).to_bytes(4, "little")
+    payload = {name: np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for name, array in arrays.items()}
+    listed = [[name, a.dtype.str, a.shape, zlib.crc32(payload[name])] for name, a in arrays.items()]
+    text = json.dumps([plain, listed]).encode()  # the shortest text that gives a float back exactly
+    head = _HEAD.pack(_MARK, len(text), zlib.crc32(text), 0)[:-4]
     written = 0
-    for part in (head + text, *payload):
+    for part in (head + zlib.crc32(head).to_bytes(4, "little") + text, *payload.values()):
         left = memoryview(part)
         while len(left):
             left = left[stream.write(left) :]
@@ -55,8 +50,15 @@ def write_record(stream: IO[bytes], plain: Any, arrays: Mapping[str, Array]) -> 
     return written
 
 
-def read_record(stream: IO[bytes]) -> tuple[Any, dict[str, Array]]:
-    """Plain values and arrays of the record that begins here.
+def read_record(stream: IO[bytes], only: Collection[str] | None = None) -> tuple[Any, dict[str, Array]]:
+    """Plain values and arrays of the record that begins here; its end is then reached.
+
+    Parameters
+    ----------
+    stream : file
+        Open for reading.
+    only : collection of str, optional
+        Names of the arrays wanted. Default: all.
 
     Raises
     ------
@@ -64,27 +66,31 @@ def read_record(stream: IO[bytes]) -> tuple[Any, dict[str, Array]]:
         If it is not whole.
     """
     head = stream.read(_HEAD.size)
-    if len(head) < _HEAD.size or head[:4] != _MARK:
+    if len(head) < _HEAD.size:
         raise Damaged("no record begins here")
-    _, length, text_checksum, size, checksum, own = _HEAD.unpack(head)
-    if zlib.crc32(head[:-4]) != own:
+    mark, length, checksum, own = _HEAD.unpack(head)
+    if mark != _MARK or zlib.crc32(head[:-4]) != own:
         raise Damaged("a record's head is damaged")
-    text, payload = stream.read(length), stream.read(size)
-    if (len(text), zlib.crc32(text)) != (length, text_checksum) or (len(payload), zlib.crc32(payload)) != (
-        size,
-        checksum,
-    ):
+    text = stream.read(length)
+    if len(text) < length or zlib.crc32(text) != checksum:
         raise Damaged("a record is torn or damaged")
     plain, listed = json.loads(text)
-    arrays, first = {}, 0
-    for name, kind, shape in listed:
+    arrays = {}
+    for name, kind, shape, checksum in listed:
         dtype = np.dtype(kind)
         if dtype.kind not in _KINDS:
             raise Damaged(f"a record holds {kind}")
-        count = int(np.prod(shape, dtype=np.intp))
-        # copied: aligned, writable, and of its own
-        arrays[name] = np.frombuffer(payload, dtype, count, first).reshape(shape).copy()
-        first += count * dtype.itemsize
+        size = math.prod(shape) * dtype.itemsize
+        if only is not None and name not in only:
+            stream.seek(size, os.SEEK_CUR)
+            continue
+        array = np.empty(shape, dtype)
+        left = array.reshape(-1).view(np.uint8).data
+        while len(left) and (count := stream.readinto(left)):  # type: ignore[attr-defined]
+            left = left[count:]
+        if len(left) or zlib.crc32(array.reshape(-1).view(np.uint8).data) != checksum:
+            raise Damaged("a record is torn or damaged")
+        arrays[name] = array
     return plain, arrays
 
 
@@ -97,8 +103,8 @@ class RowStore(Protocol):
         """Take up a row: plain values and arrays."""
         ...
 
-    def arrays(self, row: int) -> Mapping[str, Array]:
-        """Arrays of a row."""
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
         ...
 
     def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
@@ -118,8 +124,8 @@ class RowsInMemory:
         self.plain.append(plain)
         self._arrays.append(arrays)
 
-    def arrays(self, row: int) -> Mapping[str, Array]:
-        """Arrays of a row."""
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
         return self._arrays[row]
 
     def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Array:
@@ -167,10 +173,10 @@ class RowFile:
         self.plain, self._begins = plain, begins
         return True
 
-    def arrays(self, row: int) -> Mapping[str, Array]:
-        """Arrays of a row."""
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
         self._stream.seek(self._begins[row])
-        return read_record(self._stream)[1]
+        return read_record(self._stream, names)[1]
 
     def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
         """All frames, read when they are asked for, as many at a time as lie in one chunk of the result's file."""

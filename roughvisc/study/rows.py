@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -49,7 +49,7 @@ class Rows:
 
     def add(self, step: Step, worst_error: float, converged: bool, wall_time: float) -> None:
         """Take up an accepted step, with the worst of those since the last row."""
-        shown, height = step.shown, self._ground.height
+        shown = step.shown
         counted, frames = self._fields_of(step.scene, shown.pressure, shown.displacement, step.level)
         row = {
             "time": shown.time,
@@ -64,7 +64,7 @@ class Rows:
             "wall_time": wall_time,
             **counted,
         }
-        grid = {"level": step.level, "corner": [float(height[axis].values[0]) for axis in ("x", "y")]}
+        grid = {"level": step.level, "corner": self._corner()}
         sources = {}
         if step.scene.enlarge is not None and shown.effective is not None:
             sources = {"source_pressure": shown.pressure, "source": shown.effective}
@@ -73,7 +73,10 @@ class Rows:
     def dataset(self, scene: Scene, method: str) -> xr.Dataset:
         """All rows, on the grid of the final scene; fields in a file are read when they are asked for."""
         height = self._ground.height
-        rows = [self._settled(scene, i)[0] for i in range(len(self))]
+        rows = [
+            plain["row"] | ({} if self._is_settled(i) else self._settled(scene, i)[0])
+            for i, plain in enumerate(self._store.plain)
+        ]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
@@ -99,21 +102,28 @@ class Rows:
         return annotate(dataset)
 
     def _frame(self, scene: Scene, name: str, index: int) -> Array:
-        return np.asarray(self._settled(scene, index, frames=True)[1][name])
+        """A field of a row."""
+        if self._is_settled(index):
+            return self._store.arrays(index, name)[name]
+        return self._settled(scene, index)[1][name]
 
-    def _settled(self, scene: Scene, index: int, frames: bool = False) -> tuple[dict[str, Any], Mapping[str, Array]]:
-        """A row, and its fields if wanted, brought to the final grid where it is of a smaller one."""
-        plain = self._store.plain[index]
-        x, y = self._ground.height["x"].values, self._ground.height["y"].values
-        corner = plain["grid"]["corner"]
-        if corner == [x[0], y[0]]:  # every growth moves it
-            return plain["row"], self._store.arrays(index) if frames else {}
-        arrays, shape = self._store.arrays(index), scene.halfspace.shape
-        offset = (int(np.searchsorted(x, corner[0])), int(np.searchsorted(y, corner[1])))
+    def _is_settled(self, index: int) -> bool:
+        """Whether a row is on the final grid: every growth moves the corner."""
+        return bool(self._store.plain[index]["grid"]["corner"] == self._corner())
+
+    def _settled(self, scene: Scene, index: int) -> tuple[dict[str, float], dict[str, Array]]:
+        """What is counted on the fields of a row of a smaller grid, and these, on the final one."""
+        grid, arrays = self._store.plain[index]["grid"], self._store.arrays(index, "source_pressure", "source")
+        axes = (self._ground.height[axis].values for axis in ("x", "y"))
+        first = [int(np.searchsorted(axis, corner)) for axis, corner in zip(axes, grid["corner"], strict=True)]
+        shape, offset = scene.halfspace.shape, (first[0], first[1])
         pressure = padded(arrays["source_pressure"], shape, offset)
         displacement = scene.halfspace.displacement(padded(arrays["source"], shape, offset))
-        counted, fields = self._fields_of(scene, pressure, displacement, plain["grid"]["level"])
-        return plain["row"] | counted, fields
+        return self._fields_of(scene, pressure, displacement, grid["level"])
+
+    def _corner(self) -> list[float]:
+        """Centre of the first cell of the present grid. [m]"""
+        return [float(self._ground.height[axis].values[0]) for axis in ("x", "y")]
 
     def _fields_of(
         self, scene: Scene, pressure: Array, displacement: Array, level: float
