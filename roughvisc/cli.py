@@ -111,12 +111,13 @@ def run(study: Path, out: Path | None, no_plots: bool, quiet: bool) -> None:
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
-    from roughvisc.study.run import compute, keep, unconverged
+    from roughvisc.study.run import run_case, unconverged
+    from roughvisc.study.store import open_result
     from roughvisc.views.console import progress, result_table
 
     with progress(console, label) as report:
-        dataset = compute(case, progress=report)
-    path = keep(dataset, case, folder)
+        path = run_case(case, folder, progress=report)
+    dataset = open_result(path)
     console.print(result_table(dataset))
     _say(console, "Result", path)
     if plots:
