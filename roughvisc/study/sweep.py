@@ -118,7 +118,7 @@ def sweep(
     for outcome in bad:
         log.warning("%s: %s: %s", outcome.key, outcome.kind, outcome.message)
     if not any(outcome.entry for outcome in outcomes.values()):
-        kind = InputError if all(o.error.endswith("InputError") for o in bad) else RoughviscError
+        kind = InputError if all(o.error in ("InputError", "EdgeContactError") for o in bad) else RoughviscError
         raise kind(f"none of {len(outcomes)} cases could be finished; the first: {bad[0].message}")
     return open_results(folder, cases=cases)
 
@@ -151,7 +151,7 @@ def run_cases(
     if workers is not None and (client is not None or workers < 0):
         problem = "a client has workers of its own" if client is not None else "expected 0 or more"
         raise InputError(f"workers is {workers}: {problem}")
-    if getattr(client, "asynchronous", False):
+    if client is not None and client.asynchronous:
         raise InputError("client is asynchronous: expected a Client(asynchronous=False)")
     distinct = {case.key: case for case in cases}
     folder = folder.absolute()
@@ -350,6 +350,37 @@ def _local_client(processes: int) -> Iterator[Client]:
         Client(cluster, set_as_default=False) as client,
     ):
         client.run(_leave_interrupts_to_the_sweep)
+        yield client
+
+
+@contextmanager
+def connect(address: str | None = None, file: Path | None = None) -> Iterator[Client]:
+    """Client of a scheduler that runs already.
+
+    Parameters
+    ----------
+    address : str, optional
+        As ``tcp://host:8786``.
+    file : path, optional
+        What ``dask scheduler --scheduler-file`` wrote; this or the address is given.
+
+    Raises
+    ------
+    InputError
+        If it does not answer.
+    """
+    from distributed import Client
+
+    if (address is None) == (file is None):
+        raise InputError("found both an address and a file of the scheduler: expected one of them")
+    if file is not None and not file.is_file():
+        raise InputError(f"{file}: does not exist: expected what dask scheduler --scheduler-file wrote")
+    try:
+        where = {"address": address} if file is None else {"scheduler_file": str(file)}
+        client = Client(**where, set_as_default=False, timeout="20s")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
+    with client:
         yield client
 
 

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import fft
 
-from roughvisc.errors import RoughviscError
+from roughvisc.errors import InUseError, RoughviscError
 from roughvisc.study.case import Case
 from roughvisc.study.index import Entry, read_entry
 from roughvisc.study.run import run_case
@@ -95,7 +95,8 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
             path = run_case(case, folder, progress=progress, stop=stop)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
-        outcome = Outcome(case.key, _kind(error), str(error), type(error).__name__)
+        kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
+        outcome = Outcome(case.key, kind, str(error), type(error).__name__)
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""
         outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", type(error).__name__)
@@ -116,10 +117,6 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
         f"(residual up to {residual:.2g}): try a looser tolerance or shorter steps"
     )
     return Outcome(entry.key, "unconverged", message, entry=entry, reused=reused)
-
-
-def _kind(error: RoughviscError) -> Kind:
-    return "hindered" if getattr(error, "passing", False) else "failed"
 
 
 def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:

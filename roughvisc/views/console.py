@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.views.axes import unit_for
+
+if TYPE_CHECKING:
+    from roughvisc.study.task import Outcome
 
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
@@ -85,6 +88,34 @@ def result_table(dataset: xr.Dataset) -> Group:
     return _two_columns(rows, dataset.attrs.get("title"))
 
 
+def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        One a distinct case.
+    asked : int
+        Number of cases, those alike counted each.
+    title : str
+        Of the study.
+    """
+    kinds = [outcome.kind for outcome in outcomes]
+    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
+    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
+    alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
+        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
+    for name, label in (("residual", "Accuracy: worst residual"), ("time_error", "Accuracy: worst time error")):
+        if entries:
+            rows.append((label, _number(np.concatenate([entry.histories[name] for entry in entries]))))
+    if spent:
+        rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
+    return _two_columns(rows, title)
+
+
 def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     """What is in a scan: its size, what is missing, how rough it is.
 
@@ -117,8 +148,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     return _two_columns([row for row in rows if row[1]], name)
 
 
-def _number(values: xr.DataArray) -> str:
-    found = values.values[np.isfinite(values.values)]
+def _number(values: Any) -> str:
+    found = np.asarray(values)
+    found = found[np.isfinite(found)]
     return f"{found.max():.2g}" if found.size else "not known"
 
 
