@@ -172,6 +172,31 @@ def _run_all(
         raise _Failure(f"{len(bad)} of {len(outcomes)} cases failed", 1)
 
 
+@main.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
+@click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
+def plan(study: Path, out: Path | None, workers: int | None) -> None:
+    """Say what a study will model and what it will cost, before anything is spent.
+
+    Nothing is written. Steps and transforms are those of coarse marches, seconds those of a solve that is timed here;
+    a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+
+    \b
+    Example:
+      roughvisc plan workflows/load_sweep.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.plan import plan as planned
+    from roughvisc.views.console import plan_tables
+
+    costs = planned(study, out, workers=workers)
+    Console().print(plan_tables(costs))
+    if costs.attrs["refusal"]:
+        raise _Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
+
+
 def _say(console: Console, what: str, path: Path) -> None:
     """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)

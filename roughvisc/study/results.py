@@ -70,7 +70,7 @@ def open_results(out, *, cases="last", ragged=False):
     entries = _chosen(index.entries, index.sweep, cases)
     if not entries:
         raise InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
-    parameters = _parameters(entries)
+    parameters = parameters_of([entry.case for entry in entries])
     if ragged:
         return _tree(folder, entries, parameters)
     _check_common(folder, entries)
@@ -107,15 +107,15 @@ def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
 # what was varied
 
 
-def _parameters(entries: Sequence[Entry]) -> dict[str, NDArray[Any]]:
-    """Varied parameters: those that a sweep set, and any other in which the cases differ."""
-    keys = dict.fromkeys(key for entry in entries for key in entry.case.get("varied", {}))
-    leaves = [dict(_leaves({k: v for k, v in e.case.items() if k not in _NOT_A_PARAMETER})) for e in entries]
+def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
+    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
     for key in dict.fromkeys(key for leaf in leaves for key in leaf):
         below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
         if not below and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
             keys[key] = None
-    values = {key: [_value(entry.case, leaf, key) for entry, leaf in zip(entries, leaves, strict=True)] for key in keys}
+    values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
     return {key: _column(found) for key, found in values.items()}
 
 
