@@ -187,8 +187,10 @@ def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution:
     stepping = found.steps * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
     dense = sum(name != "pressure" for name in case.settings.keep.fields)
     sparse = len(case.settings.keep.fields) - dense
-    return found.convolutions * convolution + stepping + found.rows * cells * 8 * (
-        sparse * _WRITE_SPARSE + dense * _WRITE_DENSE
+    return (
+        found.convolutions * convolution
+        + stepping
+        + found.rows * cells * 8 * (sparse * _WRITE_SPARSE + dense * _WRITE_DENSE)
     )
 
 
@@ -196,7 +198,7 @@ def memory(case: Case, cells: int, found: March, engine: Engine) -> float:
     """Memory of the process that computes a case, at its peak. [bytes]"""
     field = 8.0 * cells
     transforms = 6.0 if case.settings.solve.boundary == "free" else 3.0  # symbols, spectra
-    solver, states = 16.0, 12.0
+    solver, states = 10.0, 10.0
     past = 0.0
     if isinstance(engine.memory, Modes):
         past = (3 * (len(engine.memory.material.times) + bool(engine.memory.material.fluidity)) + 2) * field

@@ -102,7 +102,9 @@ def read_entry(path: Path) -> Entry:
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
-        raise InputError(f"{path}: is damaged, or no result of roughvisc ({error}): remove it, and run again") from error
+        raise InputError(
+            f"{path}: is damaged, or no result of roughvisc ({error}): remove it, and run again"
+        ) from error
     absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
     if absent or "case" not in attributes:
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")

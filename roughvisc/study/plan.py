@@ -59,7 +59,9 @@ class _Surface:
     problem: str
 
 
-def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None) -> xr.Dataset:
+def plan(
+    cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None
+) -> xr.Dataset:
     """What will be modelled in each case, and what it will cost on this machine; nothing is computed or written.
 
     Parameters
@@ -104,7 +106,9 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     for number, case in enumerate(cases):
         like = _most_like(number, [n for n in marches], parameters)
         surface = surfaces[_surface_name(stated[number])] if _surface_name(stated[number]) in surfaces else None
-        rows.append(_row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch))
+        rows.append(
+            _row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch)
+        )
     columns = {name: ("case", np.array([row[name] for row in rows]), _attributes(name)) for name in _COLUMNS}
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
     coords |= {key: ("case", values, {"long_name": key}) for key, values in parameters.items()}

@@ -232,9 +232,7 @@ class _Book:
         save_index(self.folder, Index(entries, tuple(self.cases)))
 
 
-def _compute(
-    todo: Mapping[str, Case], folder: Path, book: _Book, client: Client | None, workers: int | None
-) -> None:
+def _compute(todo: Mapping[str, Case], folder: Path, book: _Book, client: Client | None, workers: int | None) -> None:
     from dask.system import CPU_COUNT
 
     if client is not None and todo:
