@@ -34,8 +34,8 @@ class HalfSpace:
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic"}
         Free space (nothing outside the grid is loaded) or one period of an endless surface.
-    workers : int
-        Threads of the transforms.
+    workers : int, optional
+        Threads of the transforms; None: as ``scipy.fft.set_workers`` has it, one where nobody has set it.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class HalfSpace:
         shape: tuple[int, int],
         spacing: tuple[float, float],
         boundary: Boundary = "free",
-        workers: int = 1,
+        workers: int | None = None,
     ) -> None:
         if boundary not in ("free", "periodic"):
             raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")

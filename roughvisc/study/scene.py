@@ -40,7 +40,7 @@ class Ground:
         values = self.height.values
         return np.where(self.present, np.max(values[self.present]) - values, 0.0)
 
-    def halfspace(self, boundary: Boundary, workers: int = 1) -> HalfSpace:
+    def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
         """Half-space on the surface's grid."""
         sides = (_side(self.height, "x"), _side(self.height, "y"))
         return HalfSpace(self.height.shape, sides, boundary, workers)
