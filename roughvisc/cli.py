@@ -206,41 +206,87 @@ def _say(console: Console, what: str, path: Path) -> None:
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--plot", type=click.Path(path_type=Path), help="Quick-look picture. [default: FILE's name.png, here]")
+@click.option("--to", type=click.Path(path_type=Path), help="Convert: write the heights to a .nc, .x3p or .sdf file.")
+@click.option(
+    "--card",
+    type=click.Path(path_type=Path),
+    is_flag=False,
+    flag_value=Path(),
+    metavar="[OUT.toml]",
+    help="Write a surface card for FILE. [name: FILE's name.toml, beside it]",
+)
 @click.option("--unit", help="Unit of length, where the file states none: um.")
 @click.option("--channel", help="Name or number of the channel. [default: the height]")
 @click.option("--spacing", help="Distance of the points, where the file states none: 1um, or 1um,2um.")
 @click.option("--format", help="Format, where the suffix does not tell.")
 def scan(
-    file: Path, plot: Path | None, unit: str | None, channel: str | None, spacing: str | None, format: str | None
+    file: Path,
+    plot: Path | None,
+    to: Path | None,
+    card: Path | None,
+    unit: str | None,
+    channel: str | None,
+    spacing: str | None,
+    format: str | None,
 ) -> None:
-    """Say what is in a scan, and draw it.
+    """Say what is in a scan, and draw it; convert it, or write a surface card for it.
 
-    Size, shape, spacing, missing points, Sq and rms slope; FILE is an instrument file or a surface card.
+    Size, channels, missing points, areal parameters; FILE is an instrument file or a surface card.
 
     \b
     Example:
       roughvisc scan ground.sur --plot ground.png
+      roughvisc scan ground.sur --to ground.x3p --card
     """
     from rich.console import Console
 
-    from roughvisc.topography.conditioning import level
+    from roughvisc.topography.bandwidth import level
     from roughvisc.topography.parameters import parameters
-    from roughvisc.topography.readers import open_scan
+    from roughvisc.topography.readers import list_channels, open_scan
+    from roughvisc.topography.writers import card_text, known_suffix
     from roughvisc.views.console import scan_table
     from roughvisc.views.plot import surface
 
-    height = open_scan(
-        file,
-        format=format,
-        unit=unit,
-        channel=int(channel) if channel is not None and channel.isdecimal() else channel,
-        spacing=_sides(spacing),
-    )
+    options = {
+        "format": format,
+        "unit": unit,
+        "channel": int(channel) if channel is not None and channel.isdecimal() else channel,
+        "spacing": _sides(spacing),
+    }
+    height = open_scan(file, **options)
+    channels = () if "card" in height.attrs else list_channels(file, format=format)
+    picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
+    text = card_text(file, card.parent, options) if card else ""
+    if to:
+        known_suffix(to)
+    for out in filter(None, (to, card, picture)):
+        if out.exists() and (out == card or out.samefile(file)):
+            raise InputError(f"{out}: exists already, and is not written over: expected another name")
     console = Console()
-    console.print(scan_table(height, parameters(level(height)), file.name))
-    picture = plot or Path(f"{file.stem}.png")
+    console.print(scan_table(height, parameters(level(height)), file.name, channels))
     _draw(surface(height), picture)
     _say(console, "Picture", picture)
+    if to:
+        _convert(height, to)
+        _say(console, "Converted", to)
+    if card:
+        _write_card(text, card)
+        _say(console, "Card", card)
+
+
+def _convert(height: Any, path: Path) -> None:
+    from roughvisc.study.store import whole_file
+    from roughvisc.topography.writers import save_scan
+
+    with whole_file(path) as temporary:
+        save_scan(height, temporary)
+
+
+def _write_card(text: str, path: Path) -> None:
+    from roughvisc.study.store import whole_file
+
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _sides(text: str | None) -> Any:

@@ -126,7 +126,7 @@ def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, m
         ('radius = "10 mm"', 'radios = "10 mm"', "surface.radios: unknown key; did you mean 'radius'?"),
         ('"3 MPa"', '"-3 MPa"', "material.shear_modulus: found '-3 MPa': expected a number in Pa"),
         ('"0.1 MPa s"', '"0.1 MPa s"\npoisson = 0.51', "material.poisson: found 0.51: expected a number above -1"),
-        ("[24, 21]", "[0, 21]", "surface.shape.0: found 0: expected a whole number at least 2"),
+        ("[24, 21]", "[0, 21]", "surface.shape.0: found 0: expected a whole number at least 1"),
         ('"5 mN"', "nan", "program.0.load: found nan: expected a number"),
         ('"5 mN"', '"50 N"', "boundary"),
     ],

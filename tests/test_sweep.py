@@ -221,7 +221,7 @@ def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):
         pass
     with pytest.raises(InputError, match="expected one of them"), connect():
         pass
-    with pytest.raises(InputError, match="tpc:.*no Dask scheduler answers"), connect("tpc://127.0.0.1:1"):
+    with pytest.raises(InputError, match=r"tpc:.*no Dask scheduler answers"), connect("tpc://127.0.0.1:1"):
         pass
 
 

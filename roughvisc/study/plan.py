@@ -104,8 +104,8 @@ def plan(
     stopwatch, engines = Stopwatch(), _Engines()
     rows = []
     for number, case in enumerate(cases):
-        like = _most_like(number, [n for n in marches], parameters)
-        surface = surfaces[_surface_name(stated[number])] if _surface_name(stated[number]) in surfaces else None
+        like = _most_like(number, list(marches), parameters)
+        surface = surfaces.get(_surface_name(stated[number]))
         rows.append(
             _row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch)
         )

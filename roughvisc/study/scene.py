@@ -17,7 +17,7 @@ from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
 from roughvisc.topography.grid import axis_step
-from roughvisc.topography.synthesis import grown
+from roughvisc.topography.indenters import grown
 
 #: An analytic profile's grid grows by this factor a time, and no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2

@@ -209,8 +209,8 @@ def size(count: float) -> str:
     return f"{count / 1e3:.3g} kB"
 
 
-def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
-    """What is in a scan: its size, what is missing, how rough it is.
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
+    """What is in a scan: its channels, its size, what is missing, how rough it is.
 
     Parameters
     ----------
@@ -220,6 +220,8 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
         Of :func:`roughvisc.parameters`.
     name : str
         Of the file.
+    channels : sequence, optional
+        Of :func:`roughvisc.list_channels`; told where there are several.
     """
     sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
     counts = [height.sizes[axis] for axis in ("x", "y")]
@@ -227,8 +229,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
-        ("Channel", str(height.attrs.get("channel", ""))),
-        ("Other channels", str(height.attrs.get("other_channels", ""))),
+        ("Channel", str(height.attrs.get("channel", "")) + (", of these:" if len(channels) > 1 else "")),
+        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
+        *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),
         ("Spacing", " x ".join(readable(d, "m") for d in sides)),
@@ -236,9 +239,18 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
         ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
         ("Height range", readable(float(height.max() - height.min()), "m")),
     ]
-    for parameter, label in (("Sq", "Sq, levelled"), ("Sdq", "rms slope, levelled")):
-        rows.append((label, readable(float(measures[parameter]), str(measures[parameter].attrs["units"]))))
+    named = {**{parameter: parameter for parameter in ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdr")}, "Sdq": "rms slope"}
+    for parameter, label in named.items():
+        unit = str(measures[parameter].attrs["units"])
+        rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
     return _two_columns([row for row in rows if row[1]], name)
+
+
+def _channel_row(channel: Any) -> tuple[str, str]:
+    kind = f"height in {channel.unit}" if channel.unit else "height, of no stated unit"
+    shape = " x ".join(map(str, channel.shape))
+    described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
+    return f"Channel {channel.index}", described
 
 
 def _number(values: Any) -> str:
@@ -252,5 +264,5 @@ def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for label, value in rows:
-        table.add_row(label, value)
+        table.add_row(label, Text(str(value)))  # names in files may look like markup
     return Group(Text(title or "untitled", style="bold"), table)
