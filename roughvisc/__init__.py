@@ -32,6 +32,9 @@ _PUBLIC = {
         "roughvisc.study.case": "read_study read_cases vary study_schema",
         "roughvisc.study.store": "open_result",
         "roughvisc.study.run": "run",
+        "roughvisc.study.sweep": "sweep",
+        "roughvisc.study.results": "open_results",
+        "roughvisc.study.plan": "plan",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
     }.items()
     for name in names.split()

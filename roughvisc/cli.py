@@ -1,4 +1,4 @@
-"""The command line: ``roughvisc run | scan | plot``.
+"""The command line: ``roughvisc run | plan | scan | plot``.
 
 Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted. Heavy imports
 are made inside the commands, so that ``--help`` is quick.
@@ -71,16 +71,23 @@ def main() -> None:
     "--out", type=click.Path(path_type=Path), help="Folder of the results. [default: results/STUDY beside it]"
 )
 @click.option("--no-plots", is_flag=True, help="Write no figures.")
+@click.option("--workers", type=click.IntRange(0), help="Processes; 0: none but this one. [default: one a core]")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
+@click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
+@click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-def run(study: Path, out: Path | None, no_plots: bool, quiet: bool) -> None:
+def run(study: Path, out: Path | None, no_plots: bool, quiet: bool, **where: Any) -> None:
     """Compute all cases of a study file.
 
-    Each case ends in one NetCDF file, named by what determines its numbers, and in figures beside it. With a [sweep]
-    the cases are computed one after another; one that fails does not stop the others.
+    Each case ends in one NetCDF file, named by what determines its numbers; a single one also in figures beside it.
+    With a [sweep] the cases run side by side, on all cores of this machine or wherever a Dask scheduler has workers.
+    One that fails does not stop the others, and is not tried again without --retry-failed. Interrupted, the same
+    command goes on: what is finished is not computed again.
 
     \b
     Example:
       roughvisc run workflows/quickstart.toml --out /tmp/quickstart
+      roughvisc run workflows/load_sweep.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
 
@@ -90,42 +97,104 @@ def run(study: Path, out: Path | None, no_plots: bool, quiet: bool) -> None:
     cases = read_cases(study)
     folder = result_folder(cases[0], out)
     console = Console(quiet=quiet)
-    refusals, failures = [], []
-    for number, case in enumerate(cases, 1):
-        label = f"case {number} of {len(cases)}" if len(cases) > 1 else study.stem
-        try:
-            complaint = _run_one(case, folder, label, console, not no_plots)
-        except RoughviscError as error:
-            if len(cases) == 1:
-                raise
-            complaint = str(error)
-            refusals += [complaint] if isinstance(error, InputError) else []
+    if len(cases) == 1 and not (where["scheduler"] or where["scheduler_file"]):
+        complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
         if complaint:
-            failures.append(f"{label}: {complaint}")
-            click.echo(f"roughvisc: {failures[-1]}", err=True)
-    if len(refusals) == len(cases):
-        raise _Failure("no case could be computed: the input is wrong", 2)
-    if failures:
-        raise _Failure(f"{len(failures)} of {len(cases)} cases failed", 1)
+            click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
+            raise _Failure("1 of 1 cases failed", 1)
+    else:
+        _run_all(cases, folder, console, **where)
 
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
-    from roughvisc.study.run import compute, keep, unconverged
+    from dask.system import CPU_COUNT
+    from scipy import fft
+
+    from roughvisc.study.run import run_case, unconverged
+    from roughvisc.study.store import open_result
     from roughvisc.views.console import progress, result_table
 
-    with progress(console, label) as report:
-        dataset = compute(case, progress=report)
-    path = keep(dataset, case, folder)
-    console.print(result_table(dataset))
-    _say(console, "Result", path)
-    if plots:
-        from roughvisc.views.plot import save_figures
+    with progress(console, label) as report, fft.set_workers(CPU_COUNT):
+        path = run_case(case, folder, progress=report)
+    with open_result(path) as dataset:
+        console.print(result_table(dataset))
+        _say(console, "Result", path)
+        if plots:
+            from roughvisc.views.plot import save_figures
 
-        for figure in save_figures(dataset, folder, case.key):
-            _say(console, "Figure", figure)
-    console.print()
-    return unconverged(dataset)
+            for figure in save_figures(dataset, folder, case.key):
+                _say(console, "Figure", figure)
+        return unconverged(dataset)
+
+
+def _run_all(
+    cases: list[Case],
+    folder: Path,
+    console: Console,
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    scheduler_file: Path | None,
+    retry_failed: bool,
+) -> None:
+    """Compute and sum up a sweep."""
+    from contextlib import ExitStack
+
+    from roughvisc.study.sweep import LOG, connect, run_cases
+    from roughvisc.study.watch import watcher
+    from roughvisc.views.console import sweep_table
+
+    with ExitStack() as stack:
+        client = None
+        if scheduler or scheduler_file:
+            client = stack.enter_context(connect(scheduler, scheduler_file))
+        outcomes = run_cases(
+            cases,
+            folder,
+            client=client,
+            workers=workers,
+            retry_failed=retry_failed,
+            watch=watcher(not console.quiet, console),
+        )
+    console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
+    _say(console, "Results", folder)
+    _say(console, "Log", folder / LOG)
+    bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
+    number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
+    for outcome in bad:
+        again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
+        where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
+        click.echo(f"roughvisc: {where}: {outcome.message}", err=True)
+    if all(outcome.error in ("InputError", "EdgeContactError") for outcome in outcomes.values()):
+        raise _Failure("no case could be computed: the input is wrong", 2)
+    if bad:
+        raise _Failure(f"{len(bad)} of {len(outcomes)} cases failed", 1)
+
+
+@main.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
+@click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
+def plan(study: Path, out: Path | None, workers: int | None) -> None:
+    """Say what a study will model and what it will cost, before anything is spent.
+
+    Nothing is written. Steps and transforms are those of coarse marches, seconds those of a solve that is timed here;
+    a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+
+    \b
+    Example:
+      roughvisc plan workflows/load_sweep.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.plan import plan as planned
+    from roughvisc.views.console import plan_tables
+
+    costs = planned(study, out, workers=workers)
+    Console().print(plan_tables(costs))
+    if costs.attrs["refusal"]:
+        raise _Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
 
 
 def _say(console: Console, what: str, path: Path) -> None:

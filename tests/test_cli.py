@@ -54,21 +54,64 @@ def test_run__quiet_says_nothing(invoke, tmp_path):
 
 def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     sweep = '[sweep]\n"program.0.load" = ["5 mN", "50 N", "6 mN"]'
-    status, out, err = invoke("run", write_study(BALL + sweep), "--no-plots")
+    status, out, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
     assert status == 1
-    assert len(list((tmp_path / "results" / "ball").iterdir())) == 2
-    assert "roughvisc: case 2 of 3: ball.toml: " in err
+    folder = tmp_path / "results" / "ball"
+    assert len(list(folder.glob("*.nc"))) == 2
+    assert len(list(folder.glob("*.failed.json"))) == 1
+    assert err.startswith("roughvisc: case 2 of 3: ball.toml: ") or "case 2 of 3: " in err
     assert err.endswith("roughvisc: 1 of 3 cases failed\n")
-    assert out.count("Result: ") == 2
+    for words in (
+        "case 2 of 3 (program.0.load = 50.0): failed: ",
+        "2 of 3 cases done, 1 failed",
+        "2, 0 of them before",
+    ):
+        assert words in out
+    assert "Results: results/ball\nLog: results/ball/sweep.log\n" in out
+
+    status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
+    assert (status, out) == (1, "")
+    assert "case 2 of 3, as before (--retry-failed tries again): " in err
+    assert "as before" not in invoke("run", "ball.toml", "--workers", 0, "--retry-failed")[2]
+
+
+def test_run__sweep_in_which_all_is_wrong_is_status_2(invoke):
+    sweep = '[sweep]\n"program.0.load" = ["50 N", "60 N"]'
+    status, _, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
+    assert status == 2
+    assert err.endswith("roughvisc: no case could be computed: the input is wrong\n")
+
+
+def test_run__scheduler_that_is_not_there_is_status_2(invoke, tmp_path):
+    status, _, err = invoke("run", write_study(), "--scheduler-file", "gone.json")
+    assert (status, err[:22]) == (2, "roughvisc: gone.json: ")
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"]
+
+
+def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
+    sweep = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]'
+    status, out, err = invoke("plan", write_study(BALL + sweep))
+    assert (status, err) == (0, "")
+    for words in ("2, ", "free, transforms padded", "1 exponential", "24 x 21 cells", "Convolutions", "Disk", "0.004"):
+        assert words in out
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
+    status, _, err = invoke(
+        "plan", write_study(BALL, ("[24, 21]", "[16384, 8192]"), ("times = [0", "times = [0, 0.01"))
+    )
+    assert status == 0 or "bytes of" in err
+    status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
+    assert status == 2
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, monkeypatch):
+    press = run_module.press
+
     def stubborn(*args, **settings):
-        ds = rv.simulate(*args, **settings)
+        ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "simulate", stubborn)
+    monkeypatch.setattr(run_module, "press", stubborn)
     status, out, err = invoke("run", write_study(), "--no-plots")
     assert status == 1
     assert "1 of 3 kept times did not converge" in err
@@ -100,7 +143,7 @@ def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
     def interrupted(*args, **settings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run_module, "simulate", interrupted)
+    monkeypatch.setattr(run_module, "press", interrupted)
     status, _, err = invoke("run", write_study())
     assert status == 130
     assert err == "roughvisc: interrupted; what was finished is kept\n"
@@ -113,7 +156,9 @@ def test_run__disk_full_is_status_1(invoke, monkeypatch):
 
     monkeypatch.setattr(run_module, "write_result", full)
     status, _, err = invoke("run", write_study())
-    assert (status, err) == (1, "roughvisc: result.nc: No space left on device\n")
+    assert status == 1
+    assert err.count("\n") == 1
+    assert ".nc: No space left on device; what was computed up to the last checkpoint is kept: make room and" in err
 
 
 @pytest.fixture

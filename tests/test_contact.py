@@ -207,3 +207,24 @@ def test_hertz__converges_at_order_two_in_approach_and_three_halves_in_pressure(
     assert 1.35 < orders[1] < 1.8, f"L1 pressure: {orders[1]:.2f}, errors {errors[:, 1]}"
     assert errors[-1, 0] < 1e-4
     assert errors[-1, 1] < 2e-3
+
+
+@given(
+    approach=st.floats(1e-9, 0.5),
+    shape=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    boundary=st.sampled_from(["free", "periodic"]),
+    tolerance=st.sampled_from([1e-3, 1e-14]),
+)
+@settings(max_examples=200, deadline=None)
+def test_given_approach__is_finite_down_to_rounding(approach, shape, boundary, tolerance):
+    """A step that has already arrived has neither slope nor curvature left."""
+    gap = rough_gap((9, 9), seed=1)[: shape[0], : shape[1]]
+    gap = gap - gap.min()
+    if boundary == "periodic" and approach >= gap.mean():
+        return
+    with np.errstate(all="raise", under="ignore"):
+        halfspace = HalfSpace(shape, (1.0, 1.3), boundary)
+        state = solve_contact(halfspace, gap, approach=approach, tolerance=tolerance)
+        state = solve_contact(halfspace, gap, approach=approach, tolerance=tolerance / 1e6, start=state.pressure)
+    assert np.isfinite(state.pressure).all()
+    assert state.load > 0

@@ -78,8 +78,10 @@ def test_power_law_series__does_not_see_units_or_time_scale():
     plain = power_law_series(PowerLaw(0.1, 1.0, 0.4), 1e-3, 1e3, 1e-5)
     scaled = power_law_series(PowerLaw(1e-7, 1e-6, 0.4, time_scale=3600.0), 3.6, 3.6e6, 1e-5)
     assert len(plain.prony.times) == len(scaled.prony.times)
-    assert np.array(scaled.prony.compliances) == pytest.approx(1e-6 * np.array(plain.prony.compliances))
-    assert scaled.error == pytest.approx(plain.error, rel=1e-6)
+    assert np.array(scaled.prony.compliances) == pytest.approx(
+        1e-6 * np.array(plain.prony.compliances), rel=1e-9, abs=0
+    )
+    assert scaled.error == pytest.approx(plain.error, rel=1e-6, abs=0)
 
 
 def test_power_law_series__says_when_a_tolerance_is_out_of_reach():
@@ -98,7 +100,8 @@ CURVES = {
 
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize(
-    ("decades", "tolerance", "most"), [(3, 1e-2, 5), (3, 1e-4, 9), (6, 1e-2, 8), (6, 1e-4, 16), (6, 1e-5, 25)]
+    ("decades", "tolerance", "most"),
+    [(3, 1e-2, 5), (3, 1e-4, 9), (6, 1e-2, 8), (6, 1e-4, 16), (6, 1e-5, 25), (3, 1e-5, 13)],
 )
 def test_table_series__of_smooth_creep_has_few_terms(curve, decades, tolerance, most):
     """Up to 1.2 terms a decade for 1e-2 and 2.5 for 1e-4, with a term or so for the ends."""
@@ -116,7 +119,7 @@ def test_table_series__finds_one_relaxation_between_the_lattice():
     found = table_series(table, 1e-3, 1e3, 1e-4)
     assert found.error <= 1e-4
     assert len(found.prony.times) <= 4
-    assert found.prony.times[0] == pytest.approx(0.37, rel=0.1)
+    assert found.prony.times[0] == pytest.approx(0.37, rel=0.1, abs=0)
 
 
 def test_table_series__of_noise_tells_its_distance():

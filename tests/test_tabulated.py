@@ -13,8 +13,8 @@ TABLE = Tabulated((0.0, 1.0, 100.0), (1.0, 3.0, 7.0), poisson=0.0)
 
 def test_creep_compliance__between_the_rows():
     t = [0.0, 0.25, 1.0, 10.0, 100.0]
-    assert TABLE.creep_compliance(t) == pytest.approx([1.0, 1.5, 3.0, 5.0, 7.0], rel=1e-15)
-    assert TABLE.contact_compliance(t) == pytest.approx(TABLE.creep_compliance(t) / 2, rel=1e-15)
+    assert TABLE.creep_compliance(t) == pytest.approx([1.0, 1.5, 3.0, 5.0, 7.0], rel=1e-15, abs=0)
+    assert TABLE.contact_compliance(t) == pytest.approx(TABLE.creep_compliance(t) / 2, rel=1e-15, abs=0)
     assert TABLE.notes == ()
     assert TABLE.note == ""
 
@@ -22,8 +22,16 @@ def test_creep_compliance__between_the_rows():
 def test_contact_integral__is_exact():
     # int (3 + 2 log10 t) dt = 3 t + 2 (t log t - t) / log 10 beyond the first row
     expected = (1.0 + 3.0) / 2 + 3 * 99 + 2 * (100 * np.log(100) - 99) / np.log(10)
-    assert TABLE.contact_integral(100.0) == pytest.approx(expected / 2, rel=1e-14)
-    assert TABLE.contact_integral(0.5) == pytest.approx((1 * 0.5 + 0.5**2) / 2, rel=1e-15)
+    assert TABLE.contact_integral(100.0) == pytest.approx(expected / 2, rel=1e-14, abs=0)
+    assert TABLE.contact_integral(0.5) == pytest.approx((1 * 0.5 + 0.5**2) / 2, rel=1e-15, abs=0)
+
+
+def test_mean__over_spans_of_any_kind_at_once():
+    """Steps within one piece of the table and across all of them, early and late, in one array."""
+    s, h = np.array([0.0, 99.0, 0.5, 100.0, 1.0]), np.array([100.0, 1.0, 1.0, 0.0, 99.0])
+    found = TABLE.mean_contact_compliance(s, h)
+    assert found == pytest.approx([float(TABLE.mean_contact_compliance(*one)) for one in zip(s, h, strict=True)])
+    assert found[0] * 100 == pytest.approx(float(TABLE.contact_integral(1.0)) + found[4] * 99, rel=1e-14, abs=0)
 
 
 def test_first_row__holds_before_it_and_says_so():
@@ -88,8 +96,8 @@ def test_noise__is_evened_out_and_recorded():
     assert table.compliances == raw
     # the mean of the two rows with relative weights 1/J^2
     level = (2.0 / 2.0**2 + 1.98 / 1.98**2) / (1 / 2.0**2 + 1 / 1.98**2)
-    assert table.repaired == pytest.approx((1.0, level, level, 3.0, 3.1), rel=1e-14)
-    assert table.creep_compliance(1.5) == pytest.approx(level, rel=1e-14)
+    assert table.repaired == pytest.approx((1.0, level, level, 3.0, 3.1), rel=1e-14, abs=0)
+    assert table.creep_compliance(1.5) == pytest.approx(level, rel=1e-14, abs=0)
     assert table.note == "2 of 5 rows were made to ascend by isotonic regression, by 0.51% at most"
     with pytest.raises(InputError, match=r"table row 2: .* 1\.00% below an earlier row, noise is 0\.0099"):
         Tabulated(table.times, raw, noise=0.0099)

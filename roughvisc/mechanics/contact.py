@@ -30,11 +30,14 @@ from roughvisc.mechanics.halfspace import HalfSpace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Cells = NDArray[np.intp]
 
 # Iterations in which the gap must halve; otherwise a projected-gradient step is taken.
 _PATIENCE = 30
 # The step length may grow by this factor where the last step ended at the border of the feasible set.
 _GROWTH = 1.3
+# No step goes farther than this many times its trial: along a uniform pressure the periodic kernel has no curvature.
+_FARTHEST = 30.0
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -144,61 +147,76 @@ class _Problem:
         self.gap = gap - self.lowest
         self.gap /= self.length
         self.convolutions = 0
+        self._scratch: NDArray[np.float32] | None = None
 
     def solve(self, start: Array | None, max_iterations: int) -> ContactState:
-        """Safeguarded, preconditioned conjugate gradients; see the module's notes."""
+        """Safeguarded, preconditioned conjugate gradients; see the module's notes.
+
+        Vectors live on the face (the cells that may change pressure), as flat indices into the grid; only what the
+        transforms take and give, and the search for cells that enter, runs over the whole grid.
+        """
         pressure = self.feasible(start)
+        grid = pressure.reshape(-1)
         displacement = self.displacement(pressure)
-        direction: Array | None = None  # the last step and what it changed, for conjugation
-        change = self.gap
-        curvature = 0.0
+        before, curvature = displacement, 0.0  # of the last step, for conjugation
+        last_step: Array | None = None
         length = 1 / self.scale  # the preconditioner is the inverse up to boundaries and the contact's outline
-        best, since = math.inf, 0
-        spacer = False
+        best, since, spacer = math.inf, 0, False
+        cells = np.flatnonzero(grid)
         for iteration in range(max_iterations + 1):
             total = self.gap + displacement
-            contact = pressure > 0
-            duality_gap, energy = self.duality_gap(pressure, displacement, total)
-            floor = 8 * _EPSILON * float(np.sum(pressure)) * float(np.max(np.abs(total[contact]), initial=1.0))
-            converged = duality_gap <= self.tolerance * energy + floor
+            duality_gap, energy, level, converged = self.judge(cells, grid[cells], displacement, total)
             if converged or iteration == max_iterations:
                 break
             best, since = (duality_gap, 0) if duality_gap < best / 2 else (best, since + 1)
-
-            face, level = self.face(contact, total)
-            residual = np.where(face, total - level, 0.0)
             if since >= _PATIENCE:
                 spacer, since, best = True, 0, duality_gap
+
+            face = self.face(cells, total, level)
+            residual = total.reshape(-1)[face]
+            residual -= level if self.load is None else float(np.mean(residual))
+            held = grid[face]
             if spacer:
-                trial = self.projected_gradient(pressure, total)
+                trial, face, held, residual = self.projected_gradient(pressure, total, level)
             else:
                 search = self.precondition(residual, face)
-                if direction is not None:
-                    beta = float(np.sum(search * change)) / curvature
+                if last_step is not None:
+                    changed = displacement.reshape(-1)[face] - before.reshape(-1)[face]
+                    beta = float(np.sum(search * changed)) / curvature
                     if beta > 0:
-                        conjugate = search + beta * self.tangent(direction, face)
+                        conjugate = search - beta * self.tangent(last_step.reshape(-1)[face])
                         if float(np.sum(residual * conjugate)) > 0:
                             search = conjugate
-                trial = self.cut(pressure - length * search)
-            step = trial - pressure
-            slope = float(np.sum(step * (total - level)))  # the step keeps a given load: `level` only saves digits
+                trial = self.cut(held - length * search)
+            step = trial - held
+            slope = float(np.sum(step * residual))
             if not slope < 0:  # no descent: forget the history, then the preconditioner too
                 if spacer:
                     break  # the projected gradient does not descend either: this is the minimum, to rounding
-                spacer, direction, length = direction is None, None, 1 / self.scale
+                spacer, last_step, length = last_step is None, None, 1 / self.scale
                 continue
-            change = self.displacement(trial) - displacement
-            curvature = float(np.sum(step * change))
-            best_fraction = -slope / curvature if curvature > 0 else math.inf
-            fraction, cut = self.fraction(pressure, step, best_fraction)
-            pressure = trial if fraction == 1 else np.maximum(pressure + fraction * step, 0)
-            displacement = displacement + fraction * change
-            if spacer:
-                spacer, direction = False, None
+            grid[face] = trial
+            moved = self.displacement(pressure)
+            changed = moved.reshape(-1)[face] - displacement.reshape(-1)[face]
+            curvature = float(np.sum(step * changed))
+            full = min(-slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
+            fraction, cut = self.fraction(held, trial, step, full)
+            before = displacement
+            if fraction == 1:
+                displacement = moved
             else:
-                direction = -step
-                length *= min(max(best_fraction, 0.3), _GROWTH if cut else 3.0)
-        return self.state(pressure, displacement, total, duality_gap, energy, converged, iteration)
+                trial = np.maximum(held + fraction * step, 0)
+                grid[face] = trial
+                displacement = displacement + fraction * (moved - displacement)
+                curvature *= fraction  # of the whole step with the change by its part
+            cells = face[trial > 0]
+            if spacer:
+                spacer, last_step = False, None
+            else:
+                last_step = np.zeros_like(pressure)
+                last_step.reshape(-1)[face] = step
+                length *= min(max(full, 0.3), _GROWTH if cut else 3.0)
+        return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration)
 
     def feasible(self, start: Array | None) -> Array:
         if start is None or not np.any(start > 0):
@@ -219,27 +237,41 @@ class _Problem:
         displacement *= self.scale
         return displacement
 
-    def duality_gap(self, pressure: Array, displacement: Array, total: Array) -> tuple[float, float]:
-        """Bound on ``f(p) - min f``, and ``p.Kp``."""
-        energy = float(np.sum(pressure * displacement))
-        lowest = float(np.min(total if self.present is None else total[self.present]))
+    def judge(
+        self, cells: Cells, pressure: Array, displacement: Array, total: Array
+    ) -> tuple[float, float, float, bool]:
+        """Bound on ``f(p) - min f``, ``p.Kp``, the level of the contact, and whether the bound is small enough."""
+        own = displacement.reshape(-1)[cells]
+        here = total.reshape(-1)[cells]
+        energy = float(np.sum(pressure * own))
+        lowest = (
+            float(np.min(total)) if self.present is None else float(np.min(total, where=self.present, initial=math.inf))
+        )
+        load = float(np.sum(pressure))
         if self.load is not None:
-            return float(np.sum(pressure * (total - lowest))), energy
-        excess = float(np.sum(pressure * (total - self.target)))
+            level = float(np.mean(here))
+            gap = float(np.sum(pressure * (here - lowest)))
+        else:
+            level = self.target
+            gap = self.gap_under_approach(pressure, displacement, here, lowest)
+        # with rounding of the sums above; a pressure of nothing has no error to speak of
+        floor = 8 * _EPSILON * load * float(np.max(np.abs(here), initial=1.0))
+        return gap, energy, level, gap <= self.tolerance * energy + floor and load > 0
+
+    def gap_under_approach(self, pressure: Array, displacement: Array, here: Array, lowest: float) -> float:
+        """The duality gap where the approach is given."""
+        excess = float(np.sum(pressure * (here - self.target)))
         missing = max(0.0, self.target - lowest)
         if self.halfspace.boundary == "free":
             # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform
             uniform, response = self.uniform
             gap = excess + missing * uniform * float(np.sum(displacement))
-            return gap + 0.5 * missing**2 * uniform**2 * response, energy
+            return gap + 0.5 * missing**2 * uniform**2 * response
         # The periodic kernel is singular, no such q exists. The pressure is certified under its own load, and its
         # own approach must be the one asked for.
         load = float(np.sum(pressure))
-        if load == 0:
-            return math.inf, energy
-        own_gap = float(np.sum(pressure * (total - lowest)))
-        mismatch = abs(excess) + load * missing
-        return max(own_gap, mismatch), energy
+        own_gap = float(np.sum(pressure * (here - lowest)))
+        return max(own_gap, abs(excess) + load * missing) if load > 0 else math.inf
 
     @property
     def uniform(self) -> tuple[float, float]:
@@ -251,23 +283,28 @@ class _Problem:
             self._uniform = (1 / float(np.min(inside)), float(np.sum(inside)))
         return self._uniform
 
-    def face(self, contact: Mask, total: Array) -> tuple[Mask, float]:
-        """Cells that may change pressure, and the level that ``total`` has on them at the solution."""
-        level = self.target if self.load is None else float(np.mean(total[contact]))
-        face = contact | (total < level)
+    def face(self, cells: Cells, total: Array, level: float) -> Cells:
+        """Cells that may change pressure: those in contact and those that would penetrate."""
+        mask = total < level
         if self.present is not None:
-            face &= self.present
-        return face, level if self.load is None else float(np.mean(total[face]))
+            mask &= self.present
+        mask.reshape(-1)[cells] = True
+        return np.flatnonzero(mask)
 
-    def tangent(self, field: Array, face: Mask) -> Array:
-        """Part of a field that keeps the cells outside the face, and the load where it is given."""
-        if self.load is None:
-            return np.where(face, field, 0.0)
-        return np.where(face, field - float(np.sum(field, where=face)) / np.count_nonzero(face), 0.0)
+    def tangent(self, vector: Array) -> Array:
+        """Part of a vector on the face that keeps a given load."""
+        return vector if self.load is None else vector - float(np.mean(vector))
 
-    def precondition(self, residual: Array, face: Mask) -> Array:
+    def precondition(self, residual: Array, face: Cells) -> Array:
         self.convolutions += 1
-        return self.tangent(self.halfspace.approximate_inverse(residual), face)
+        if self._scratch is None:
+            self._scratch = np.zeros(self.halfspace.shape, np.float32)
+        scratch = self._scratch.reshape(-1)
+        size = float(np.max(np.abs(residual), initial=0.0)) or 1.0  # the range of single precision is small
+        scratch[face] = residual / size
+        pressure = self.halfspace.approximate_inverse(self._scratch).reshape(-1)[face]
+        scratch[face] = 0
+        return self.tangent(pressure.astype(float) * size)
 
     def cut(self, pressure: Array) -> Array:
         """Nearest admissible pressure in the manner of Polonsky and Keer: cut at zero, then scaled to the load."""
@@ -276,36 +313,42 @@ class _Problem:
             pressure *= self.load / float(np.sum(pressure))
         return pressure
 
-    def projected_gradient(self, pressure: Array, total: Array) -> Array:
+    def projected_gradient(self, pressure: Array, total: Array, level: float) -> tuple[Array, Cells, Array, Array]:
+        """Trial pressure on the cells that it changes, with these cells, what they hold and their residual."""
         stiffest = self.halfspace.largest_influence * self.scale
-        moved = pressure - (total - (self.target if self.load is None else 0.0)) / stiffest
+        moved = pressure - (total - level) / stiffest
         if self.present is not None:
             moved = np.where(self.present, moved, -math.inf)
-        return np.maximum(moved, 0) if self.load is None else _onto_simplex(moved, self.load)
+        trial = np.maximum(moved, 0) if self.load is None else _onto_simplex(moved, self.load)
+        face = np.flatnonzero((trial > 0) | (pressure > 0))
+        return trial.reshape(-1)[face], face, pressure.reshape(-1)[face], (total - level).reshape(-1)[face]
 
     @staticmethod
-    def fraction(pressure: Array, step: Array, best: float) -> tuple[float, bool]:
+    def fraction(held: Array, trial: Array, step: Array, full: float) -> tuple[float, bool]:
         """Fraction of the step to take, and whether the border of the feasible set cut it."""
+        if np.any((held > 0) & (trial == 0)):
+            # whole if f falls by it, so that these cells leave the contact
+            return (1.0, full > 1) if full > 0.5 else (full, False)
+        if full <= 1:
+            return full, False
         falling = step < 0
-        limit = float(np.min(pressure[falling] / -step[falling], initial=math.inf))
-        if limit <= 1 and best > 0.5:
-            return 1.0, best > 1  # whole: cells leave the contact, and f falls for any best fraction above a half
-        return min(best, limit), best > limit
+        limit = float(np.min(held[falling] / -step[falling], initial=math.inf))
+        return min(full, limit), full > limit
 
     def state(
         self,
         pressure: Array,
         displacement: Array,
-        total: Array,
+        level: float,
         duality_gap: float,
         energy: float,
         converged: bool,
         iterations: int,
     ) -> ContactState:
         load = float(np.sum(pressure))
-        approach = self.target
+        approach = level
         if self.load is not None:  # weighted by pressure: its error is of second order
-            approach = float(np.sum(pressure * total)) / load
+            approach = level + float(np.sum(pressure * (self.gap + displacement - level))) / load
         bound = math.sqrt(2 * max(duality_gap, 0.0) / energy) if energy > 0 else 0.0
         return ContactState(
             pressure=pressure * self.unit,

@@ -25,6 +25,8 @@ Kind = Literal["shear", "tensile"]
 _PER_DECADE = (1, 1.5, 2, 3, 4, 6)
 #: how much larger the misfit may be than the smallest found, for the sake of fewer terms
 _ALLOWED = 1.1
+#: rms misfit below which nothing is gained: no rheometer measures so well
+_ACCURATE = 2e-4
 #: how far beyond the measured times terms are offered: a slower one is a plateau, a faster one is not seen
 _BEYOND = 3.0
 
@@ -223,5 +225,5 @@ def _sparsest(columns: Callable[[Array], Array], within: tuple[float, float], ta
         matrix = columns(theta)
         moduli = nonnegative(matrix, target, scale)
         found.append(_Spectrum(moduli, theta, (matrix @ moduli - target) / scale))
-    enough = _ALLOWED * min(one.rms for one in found) + 1e-9
+    enough = max(_ALLOWED * min(one.rms for one in found), _ACCURATE)
     return min((one for one in found if one.rms <= enough), key=lambda one: one.terms)

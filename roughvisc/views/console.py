@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.views.axes import unit_for
+
+if TYPE_CHECKING:
+    from roughvisc.study.task import Outcome
 
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
@@ -85,6 +88,127 @@ def result_table(dataset: xr.Dataset) -> Group:
     return _two_columns(rows, dataset.attrs.get("title"))
 
 
+def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        One a distinct case.
+    asked : int
+        Number of cases, those alike counted each.
+    title : str
+        Of the study.
+    """
+    kinds = [outcome.kind for outcome in outcomes]
+    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
+    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
+    alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
+        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
+    for name, label in (("residual", "Accuracy: worst residual"), ("time_error", "Accuracy: worst time error")):
+        if entries:
+            rows.append((label, _number(np.concatenate([entry.histories[name] for entry in entries]))))
+    if spent:
+        rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
+    return _two_columns(rows, title)
+
+
+def plan_tables(costs: xr.Dataset) -> Group:
+    """What a study will model and what it will cost.
+
+    Parameters
+    ----------
+    costs : xarray.Dataset
+        Of :func:`roughvisc.plan`.
+    """
+    total, attrs = costs.sizes["case"], costs.attrs
+    varied = [str(name) for name in costs.coords if name != "case_key"]
+    whole = [
+        ("Cases", f"{total}, {attrs['processes']} side by side"),
+        *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
+        ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
+        ("Steps a case", _span(costs["steps"], "")),
+        ("Convolutions a case", _span(costs["convolutions"], "")),
+        ("Wall time a case", _span(costs["wall_time"], "s")),
+        ("Wall time of all", f"about {readable(attrs['wall_time'], 's')}"),
+        ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
+        ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
+        ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
+    ]
+    parts: list[Any] = [_two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    if total > 1:
+        parts += [Text(), _case_table(costs, varied)]
+    return Group(*parts)
+
+
+#: What is modelled, shown once if it is the same in all cases.
+_MODELLED = {
+    "boundary": "Boundary",
+    "memory_model": "Memory of the material",
+    "scheme": "Time",
+    "left_out": "Left out",
+}
+#: Cases that a plan lists one by one.
+_LISTED = 20
+
+
+def _alike(costs: xr.Dataset, name: str) -> str:
+    found = list(dict.fromkeys(str(value) for value in costs[name].values if value))
+    text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
+    if name == "boundary":
+        text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"
+        text += ", the grid may grow" if costs["grows"].any() else ""
+    return text
+
+
+def _range_of(costs: xr.Dataset, text: Callable[[Any], str]) -> str:
+    found = dict.fromkeys(text(costs.isel(case=i)) for i in range(costs.sizes["case"]))
+    return ", ".join([*found][:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+
+
+def _span(values: xr.DataArray, unit: str) -> str:
+    known = values.values[np.isfinite(values.values)]
+    if not known.size:
+        return "not known"
+    ends = [f"{value:.0f}" if not unit else readable(float(value), unit) for value in (known.min(), known.max())]
+    return f"about {ends[0]}" if ends[0] == ends[1] else f"about {ends[0]} to {ends[1]}"
+
+
+def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in (*varied, "steps", "convolutions", "wall time", "memory", "disk"):
+        table.add_column(heading, justify="right")
+    for i in range(min(costs.sizes["case"], _LISTED)):
+        row = costs.isel(case=i)
+        cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
+        if row["refusal"].item():
+            table.add_row(*cells, Text("refused"))
+            continue
+        counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
+        sizes = [size(float(row[name])) for name in ("memory", "disk")]
+        table.add_row(*cells, *counts, readable(float(row["wall_time"]), "s"), *sizes)
+    if costs.sizes["case"] > _LISTED:
+        table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))
+    return table
+
+
+def size(count: float) -> str:
+    """A number of bytes as one reads it.
+
+    Examples
+    --------
+    >>> size(2131948), size(24.5e9)
+    ('2.13 MB', '24.5 GB')
+    """
+    for factor, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
+        if count >= factor:
+            return f"{count / factor:.3g} {name}"
+    return f"{count / 1e3:.3g} kB"
+
+
 def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
     """What is in a scan: its channels, its size, what is missing, how rough it is.
 
@@ -129,8 +253,9 @@ def _channel_row(channel: Any) -> tuple[str, str]:
     return f"Channel {channel.index}", described
 
 
-def _number(values: xr.DataArray) -> str:
-    found = values.values[np.isfinite(values.values)]
+def _number(values: Any) -> str:
+    found = np.asarray(values)
+    found = found[np.isfinite(found)]
     return f"{found.max():.2g}" if found.size else "not known"
 
 

@@ -1,0 +1,127 @@
+"""Orders of convergence in time, as rates, and the histories that have an exact answer."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.mechanics.engine import engine_for
+from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.stepper import Scene, march
+
+DURATION = 2.0
+COMMON = np.array([0.5, 1.0, 1.5, 2.0])
+MATERIALS = {
+    "maxwell": rv.maxwell(1.0, 1.0),
+    "zener_equal": rv.zener(1.0, 1.0, 1.0),
+    "zener_soft": rv.zener(1.0, 0.01, 0.01),
+    "power_law": rv.PowerLaw(0.5, 1.0, 0.4),
+    "two_branches": rv.Prony(1.0, 0.0, (1.0, 2.0), (0.3, 3.0)),
+    "kelvin_voigt": rv.kelvin_voigt(1.0, 1.0),
+    "pure_power_law": rv.PowerLaw(0.0, 1.0, 0.5),
+}
+PROGRAMS = {
+    "triangle": rv.Program().load(1.0, over=1.0).load(0.3, over=1.0),
+    "jump": rv.Program().load(0.4, over=0.5).load(1.0, over=0).hold(0.5).load(0.6, over=0).hold(1.0),
+    "opening": rv.Program().load(1.0, over=0.5).load(0.0, over=0.5).hold(0.5).load(1.0, over=0.5),
+}
+
+
+def scaled(program, load):
+    segments = [type(s)(s.control, s.duration, None if s.end is None else s.end * load) for s in program.segments]
+    return rv.Program(tuple(segments))
+
+
+def run(material, program, times, shape=(19, 17)):
+    """States at the common times, stepping exactly onto the given times and no others."""
+    size, radius = 1.0, 1.0
+    load = 4 * 0.36**3 / (3 * radius) / float(material.contact_compliance(DURATION))
+    spacing = (size / shape[0], size / shape[1])
+    x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
+    gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * radius)
+    program = scaled(program, load)
+    memory = engine_for(material, DURATION, 1e-7).memory
+    scene = Scene(HalfSpace(shape, spacing), gap, material, memory, program, tuple(times), 1e-9, time_step=1e9)
+    steps = [s for s in march(scene) if np.isclose(s.shown.time, COMMON, rtol=0, atol=1e-9).any()]
+    assert all(s.converged for s in steps)
+    unique = {round(s.shown.time, 9): s.shown for s in steps}
+    assert len(unique) == COMMON.size
+    return [(s.pressure / load, s.approach, s.force / load) for s in unique.values()]
+
+
+def uniform(n):
+    return np.linspace(0, DURATION, n + 1)[1:]
+
+
+def random(n):
+    """Mildly random steps between the common times."""
+    rng = np.random.default_rng(n)
+    parts = []
+    for start in COMMON - 0.5:
+        steps = rng.uniform(0.7, 1.3, n // 4)
+        parts.append(start + 0.5 * np.cumsum(steps) / steps.sum())
+        parts[-1][-1] = start + 0.5
+    return np.concatenate(parts)
+
+
+def graded(n):
+    """Steps that shrink towards both ends of each half second, where jumps, corners, opening and closing are."""
+    x = np.arange(1, n // 4 + 1) / (n // 4)
+    return np.concatenate([start + 0.5 * (3 * x**2 - 2 * x**3) for start in COMMON - 0.5])
+
+
+def orders(material, program, grid, counts):
+    """Orders of the largest errors of the pressure (L1) and of the approach over the common times.
+
+    While contact grows the approach is exact for any steps: errors at rounding count as any order.
+    """
+    exact = run(material, program, grid(8 * counts[-1]))
+    pressure, approach = [], []
+    for n in counts:
+        found = run(material, program, grid(n))
+        pressure.append(max(np.abs(p - q).sum() for (p, _, _), (q, _, _) in zip(found, exact, strict=True)))
+        approach.append(max(abs(a / b - 1) for (_, a, _), (_, b, _) in zip(found, exact, strict=True)))
+    fits = [-np.polyfit(np.log(counts), np.log(errors), 1)[0] for errors in (pressure, approach)]
+    if max(approach) < 5e-6:
+        fits[1] = np.inf
+    print(f"order in pressure {fits[0]:.2f}, in approach {fits[1]:.2f}; errors {pressure}, {approach}")
+    return fits
+
+
+@pytest.mark.parametrize("name", ["maxwell", "zener_equal", "power_law", "two_branches"])
+@pytest.mark.parametrize("program", ["triangle", "jump"])
+@pytest.mark.parametrize("grid", [uniform, pytest.param(random, marks=pytest.mark.long)], ids=["uniform", "random"])
+def test_instantaneous_compliance__second_order(name, program, grid):
+    # through a jump the rate of creep of a power law is singular: uniform steps approach second order slowly
+    least = 1.5 if (name, program) == ("power_law", "jump") else 1.7
+    assert (
+        min(orders(MATERIALS[name], PROGRAMS[program], grid, (32, 64, 128, 256)[: 3 if program == "jump" else 4]))
+        > least
+    )
+
+
+def test_power_law_through_a_jump__second_order_on_graded_steps():
+    assert min(orders(MATERIALS["power_law"], PROGRAMS["jump"], graded, (32, 64, 128))) > 1.7
+
+
+@pytest.mark.parametrize("name", ["maxwell", "power_law"])
+def test_random_steps__second_order(name):
+    assert min(orders(MATERIALS[name], PROGRAMS["triangle"], random, (32, 64, 128))) > 1.7
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("program", ["triangle", "jump"])
+@pytest.mark.parametrize("grid", [uniform, random], ids=["uniform", "random"])
+def test_zener_1_to_100__second_order(program, grid):
+    assert min(orders(MATERIALS["zener_soft"], PROGRAMS[program], grid, (320, 640, 1280))) > 1.7
+
+
+@pytest.mark.parametrize("name", ["kelvin_voigt", "pure_power_law"])
+@pytest.mark.parametrize("program", ["triangle", pytest.param("jump", marks=pytest.mark.long)])
+def test_no_instantaneous_compliance__approach_of_second_order_on_graded_steps(name, program):
+    counts = (128, 256, 512) if name == "kelvin_voigt" else (64, 128, 256)
+    assert orders(MATERIALS[name], PROGRAMS[program], graded, counts)[1] > 1.7
+
+
+@pytest.mark.parametrize("name", ["maxwell", "zener_equal", "kelvin_voigt"])
+def test_opening_and_closing__approach_of_second_order(name):
+    assert orders(MATERIALS[name], PROGRAMS["opening"], graded, (32, 64, 128))[1] > 1.7
