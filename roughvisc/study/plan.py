@@ -89,7 +89,8 @@ def plan(
     -----
     The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
     tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
-    that is timed for at most two seconds in all. Expect a quarter either way, more where the contact is small.
+    that is timed for at most two seconds in all. Expect a quarter either way, and half where a soft material makes
+    the pressure jump with each cell that enters.
     """
     from dask.system import CPU_COUNT
 
@@ -104,8 +105,8 @@ def plan(
     stopwatch, engines = Stopwatch(), _Engines()
     rows = []
     for number, case in enumerate(cases):
-        like = _most_like(number, [n for n in marches], parameters)
-        surface = surfaces[_surface_name(stated[number])] if _surface_name(stated[number]) in surfaces else None
+        like = _most_like(number, list(marches), parameters)
+        surface = surfaces.get(_surface_name(stated[number]))
         rows.append(
             _row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch)
         )

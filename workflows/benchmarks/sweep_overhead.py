@@ -28,9 +28,9 @@ def main(count: int = 200, workers: int = CPU_COUNT, alone: int = 20) -> dict[st
     Returns
     -------
     dict
-        ``wall`` of the sweep, ``bare`` of one case that is only computed and ``case`` of one in the sweep [s]; ``busy``, the
-        part of the processes' time that is spent on cases, and ``overhead``, what storing, scheduling and starting
-        add to the bare computation, measured on ``alone`` of the cases.
+        ``wall`` of the sweep, ``bare`` of one case that is only computed and ``case`` of one in the sweep [s];
+        ``busy``, the part of the processes' time that is spent on cases; and ``overhead``, what storing, scheduling
+        and starting add to the bare computation, which is measured on ``alone`` of the cases.
     """
     base = Case.from_json(STUDY)
     cases = [vary(base, {"surface.seed": seed}) for seed in range(count)]
@@ -43,7 +43,7 @@ def main(count: int = 200, workers: int = CPU_COUNT, alone: int = 20) -> dict[st
         began = time.perf_counter()
         outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
         wall = time.perf_counter() - began
-    assert all(outcome.kind == "done" for outcome in outcomes.values())
+    assert all(outcome.entry for outcome in outcomes.values())
     spent = sum(outcome.seconds for outcome in outcomes.values())
     figures = {"wall": wall, "bare": bare, "case": spent / count}
     return figures | {"busy": spent / wall / workers, "overhead": wall * workers / (bare * count) - 1}
