@@ -194,6 +194,69 @@ def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
     assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
 
 
+@pytest.mark.parametrize("suffix", ["nc", "x3p", "sdf"])
+def test_scan__converts(invoke, tmp_path, scan_file, suffix):
+    status, out, err = invoke("scan", scan_file, "--to", f"out/scan.{suffix}")
+    assert (status, err) == (0, "")
+    assert f"Converted: out/scan.{suffix}" in out
+    np.testing.assert_array_equal(rv.open_scan(tmp_path / "out" / f"scan.{suffix}"), rv.open_scan(scan_file))
+
+
+def test_scan__writes_a_card(invoke, tmp_path, scan_file):
+    status, out, err = invoke("scan", scan_file, "--card", "cards/mine.toml")
+    assert (status, err) == (0, "")
+    assert "Card: cards/mine.toml" in out
+    expected = rv.open_scan(scan_file)
+    np.testing.assert_array_equal(rv.open_scan(tmp_path / "cards" / "mine.toml"), expected)
+    assert invoke("scan", scan_file, "--card")[0] == 0
+    card = tmp_path / "tilted.toml"
+    np.testing.assert_array_equal(rv.open_scan(card), expected)
+    assert invoke("scan", card)[0] == 0
+    before = card.read_text()
+    status, _, err = invoke("scan", scan_file, "--card")
+    assert status == 2
+    assert "tilted.toml: exists already" in err
+    assert card.read_text() == before
+
+
+def test_scan__lists_channels_and_parameters(invoke, tmp_path):
+    x3pio = pytest.importorskip("x3pio")
+    z = 1e-6 * np.random.default_rng(0).normal(size=(2, 20, 30))
+    x3pio.write(tmp_path / "two.x3p", z, x_scale=1e-6, y_scale=2e-6)
+    status, out, err = invoke("scan", "two.x3p")
+    assert (status, err) == (0, "")
+    for words in (
+        "layer 0, of these:",
+        "layer 1: height in m, 30 x 20 points",
+        "Sa, ",
+        "Ssk, ",
+        "Sku, ",
+        "Sz, ",
+        "Sdr, ",
+    ):
+        assert words in out
+    np.save(tmp_path / "plain.npy", z[0])
+    status, _, err = invoke("scan", "plain.npy")
+    assert status == 2
+    assert "unit=" in err
+    assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
+    assert rv.open_scan(tmp_path / "plain.toml").shape == (20, 30)
+
+
+def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_path, scan_file):
+    content = scan_file.read_bytes()
+    for arguments, words in (
+        (["--to", "tilted.nc"], "exists already"),
+        (["--to", "scan.stl"], "expected one of .nc, .x3p, .sdf"),
+        (["--plot", "tilted.nc"], "exists already"),
+    ):
+        status, _, err = invoke("scan", scan_file, *arguments)
+        assert status == 2
+        assert words in err
+    assert scan_file.read_bytes() == content
+    assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
+
+
 def test_plot__draws_a_file_or_a_folder(invoke, tmp_path):
     from sample_results import rough_creep
 

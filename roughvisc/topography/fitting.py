@@ -17,6 +17,10 @@ from roughvisc.topography.grid import checked, like, spacing
 
 #: Rings a decade of wavevector, and Hurst exponents tried.
 _RINGS, _HURSTS = 24, np.linspace(0.02, 1.0, 99)
+#: Most that a texture may be drawn out.
+_LONGEST = 20.0
+#: Modes that are enough to find a direction by.
+_ENOUGH = 200_000
 #: Modes that a ring counts for at most, since no measured spectrum is a power law to a few per cent; and what a ring
 #: costs that is not on the power law.
 _MOST, _PRICE = 200.0, 6.0
@@ -140,25 +144,32 @@ class _Modes:
 
     def anisotropy(self, cutoff_q: float) -> float:
         """How many times longer the texture is along x: stretched back, the rings have no preferred direction."""
-        relevant = self.power > 1e-12 * self.power.max()  # not rounding
+        relevant = np.flatnonzero(self.power > 1e-12 * self.power.max())  # not rounding
+        if relevant.size > _ENOUGH:
+            relevant = np.random.default_rng(0).choice(relevant, _ENOUGH, replace=False)
+        row, column = np.unravel_index(relevant, self.power.shape)
+        x2, y2 = self.q_x[row, 0] ** 2, self.q_y[0, column] ** 2
+        count, power = self.count[row, column], (self.count * self.power)[row, column]
 
         def preference(logarithm: float) -> float:
             ratio = math.exp(logarithm)
-            q = self.stretched(ratio)
+            q2 = ratio * x2 + y2 / ratio
             edges = _edges(self, ratio)
-            ring = np.digitize(q.ravel(), edges)
-            ring[(ring == len(edges)) | ~relevant.ravel() | (q.ravel() > cutoff_q)] = 0
-            power, count = (self.count * self.power).ravel(), self.count.ravel()
+            ring = np.digitize(q2, edges**2)
+            ring[(ring == len(edges)) | (q2 > cutoff_q**2)] = 0
             mean = np.bincount(ring, power, len(edges)) / np.maximum(np.bincount(ring, count, len(edges)), 1)
             # cos of twice the angle, each ring weighed by its modes: the few strong long waves would drown the rest
-            cosine = 2 * ratio * (self.q_x / np.maximum(q, edges[0])) ** 2 - 1
-            weight = np.where((ring > 0) & (mean[ring] > 0), power / np.where(mean > 0, mean, 1.0)[ring], 0.0)
-            return float((weight * cosine.ravel()).sum() / weight.sum())
+            weight = np.where(ring > 0, power / np.where(mean > 0, mean, 1.0)[ring], 0.0)
+            total = float(weight.sum())  # zero where no ring lies in the ellipse
+            return float((weight * (2 * ratio * x2 / q2 - 1)).sum()) / total if total else math.nan
 
-        limit = math.log(20.0)
-        if not preference(-limit) < 0 < preference(limit):
+        tried = np.linspace(-math.log(_LONGEST), math.log(_LONGEST), 13)
+        found = np.array([preference(logarithm) for logarithm in tried])
+        rises = np.flatnonzero((found[:-1] < 0) & (found[1:] >= 0))
+        if not rises.size:
             raise InputError("fit_self_affine: the surface is lines along one axis: expected roughness both ways")
-        return math.exp(scipy.optimize.brentq(preference, -limit, limit, xtol=1e-3))
+        low = rises[np.argmin(np.abs(tried[rises] + tried[rises + 1]))]  # the least stretched, where noise has several
+        return math.exp(scipy.optimize.brentq(preference, tried[low], tried[low + 1], xtol=1e-3))
 
 
 @dataclass(frozen=True)
