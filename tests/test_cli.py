@@ -59,7 +59,7 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     folder = tmp_path / "results" / "ball"
     assert len(list(folder.glob("*.nc"))) == 2
     assert len(list(folder.glob("*.failed.json"))) == 1
-    assert err.startswith("roughvisc: case 2 of 3: ball.toml: ") or "case 2 of 3: " in err
+    assert err.startswith("roughvisc: case 2 of 3: ")
     assert err.endswith("roughvisc: 1 of 3 cases failed\n")
     for words in (
         "case 2 of 3 (program.0.load = 50.0): failed: ",
@@ -95,10 +95,6 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     for words in ("2, ", "free, transforms padded", "1 exponential", "24 x 21 cells", "Convolutions", "Disk", "0.004"):
         assert words in out
     assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
-    status, _, err = invoke(
-        "plan", write_study(BALL, ("[24, 21]", "[16384, 8192]"), ("times = [0", "times = [0, 0.01"))
-    )
-    assert status == 0 or "bytes of" in err
     status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
     assert status == 2
 

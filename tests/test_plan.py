@@ -1,5 +1,7 @@
 """What a plan says before anything runs, against what the run then takes."""
 
+import pathlib
+
 import numpy as np
 import pytest
 from test_run import BALL
@@ -51,29 +53,24 @@ def study(tmp_path):
     return write
 
 
-def spent(case):
-    """Steps, convolutions and size of what a case really takes."""
-    ds = rv.run(case, progress=False)
-    return ds.sizes["time"], int(ds.convolutions.sum()), ds
-
-
 @pytest.mark.parametrize(
     "changes",
     [
         {},
         {"solve.boundary": "free", "solve.edge": "accept"},
-        {"material": {"model": "kelvin_voigt", "shear_modulus": 1e6, "viscosity": 2e4}, "solve.tolerance": 1e-2},
+        {"material": {"model": "kelvin_voigt", "shear_modulus": 1e6, "viscosity": 2e4}, "keep.times": 9},
         {"solve.time_step": 0.01},
     ],
 )
 def test_plan__expects_about_the_steps_and_convolutions_that_are_taken(study, changes):
     case = vary(study(ROUGH)[0], changes)
     planned = rv.plan([case])
-    steps, convolutions, ds = spent(case)
-    assert float(planned.steps[0]) == pytest.approx(steps, rel=0.2)
-    assert float(planned.convolutions[0]) == pytest.approx(convolutions, rel=0.4)
-    size = (ds.encoding["source"] and __import__("os").path.getsize(ds.encoding["source"])) / float(planned.disk[0])
-    assert 0.4 < size < 2
+    ds = rv.run(case, progress=False)
+    if case.settings.keep.times == "all":
+        assert float(planned.steps[0]) == pytest.approx(ds.sizes["time"], rel=0.2)
+    assert 0.6 < float(planned.convolutions[0]) / int(ds.convolutions.sum()) < 1.8
+    size = pathlib.Path(ds.encoding["source"]).stat().st_size
+    assert 0.4 < size / float(planned.disk[0]) < 2
     seconds = float(ds.wall_time[-1]) / float(planned.wall_time[0])
     assert 0.1 < seconds < 10, "a loose bound: other programs run beside the tests"
 

@@ -38,6 +38,16 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+def test_benchmarks__run_small(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
+    assert (tmp_path / "table.nc").exists()
+    for row in tables["seed"] + tables["tamaas"]:
+        assert row["error"] <= row["peer_error"]
+    for row in tables["scaling"]:
+        assert 0 < row["transform_share"] < 1
+
+
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}
@@ -62,13 +72,3 @@ def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, m
         ends = ds.contact_area[[0, -1]] * 1e6  # the axis is in mm2
         np.testing.assert_allclose(ends, areas[[0, -1], i], rtol=0.01)
         assert "filled" in ds.variables, "what was invented stays marked in the result"
-
-
-def test_benchmarks__run_small(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
-    tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
-    assert (tmp_path / "table.nc").exists()
-    for row in tables["seed"] + tables["tamaas"]:
-        assert row["error"] <= row["peer_error"]
-    for row in tables["scaling"]:
-        assert 0 < row["transform_share"] < 1

@@ -27,6 +27,8 @@ _COARSE = (17, 33)
 _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
 #: Seconds for one coarse march, and for timing solves.
 _MARCH, _CALIBRATION = 3.0, 2.0
+#: Largest grid that a solve is timed on; larger ones are taken to cost as N log N. [cells]
+_TIMED = 1024**2
 #: What the interpreter and the libraries take, measured. [bytes]
 _PROCESS = 230e6
 #: Bytes on disk for a byte of a field that is dense; seconds to compress a byte of a sparse and of a dense one [M].
@@ -113,7 +115,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
     )
     steps = rows = damped = 0
     reached = contact = 0.0
-    work = 0
+    work, instants = 0, [0.0]
     until = time.perf_counter() + _MARCH
     kept = set(scene.times or ())
     for step in march(scene) if settings.solve.method == "fast" else march_seed(scene):
@@ -123,12 +125,15 @@ def _march(case: Case, height: xr.DataArray) -> March:
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, float(np.mean(step.shown.pressure > 0)))
         work, reached = step.state.convolutions, now
+        instants.append(now)
         if time.perf_counter() > until:
             break
-    # what is left is taken to go on as it went, per unit of time: too much where steps grow
-    part = reached / program.duration if program.duration else 1.0
-    whole = part >= 1
-    stretch = 1.0 if whole or not part else 1 / part
+    whole = reached >= program.duration
+    stretch = 1.0
+    if not whole:  # what is left is taken to go on as the later half of the steps went
+        half = len(instants) // 2
+        pace = (reached - instants[half]) / max(steps - half, 1)
+        stretch += (program.duration - reached) / pace / steps if pace else 0.0
     return March(
         steps * stretch, len(kept) or rows * stretch, work * stretch, damped / max(steps, 1), contact, bool(whole)
     )
@@ -157,6 +162,9 @@ class Stopwatch:
         if self._left <= 0 and alike:  # as N log N from the grid nearest in size
             nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
             return self._found[nearest] * _work(height.size) / _work(math.prod(nearest[0]))
+        cells = height.size
+        if cells > _TIMED:
+            height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
         ground = Ground(height, "absent")
         halfspace: HalfSpace = ground.halfspace("free" if boundary == "free" else "periodic")
@@ -173,7 +181,7 @@ class Stopwatch:
             if now - began > min(0.5, self._left) or gap.max() == 0:
                 break
         self._left -= time.perf_counter() - began
-        return seconds
+        return seconds * _work(cells) / _work(height.size)
 
 
 def _work(cells: float) -> float:

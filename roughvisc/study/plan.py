@@ -89,7 +89,8 @@ def plan(
     -----
     The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
     tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
-    that is timed for at most two seconds in all. Expect a quarter either way, more where the contact is small.
+    that is timed for at most two seconds in all. Expect a quarter either way, and half where a soft material makes
+    the pressure jump with each cell that enters.
     """
     from dask.system import CPU_COUNT
 

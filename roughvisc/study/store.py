@@ -133,9 +133,9 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             dataset[name] = _rounded(dataset[name], precision)
         dataset[name].attrs = plain_attributes(dataset[name].attrs)
         dataset[name].encoding = {}
-    encoding = {str(name): _encoding(dataset[name]) for name in dataset.variables}
     # one thread: netCDF4 is not safe with more, and inside a worker the cluster must not be asked
-    with whole_file(path) as temporary, dask.config.set(scheduler="synchronous"):
+    with dask.config.set(scheduler="synchronous"), whole_file(path) as temporary:
+        encoding = {str(name): _encoding(dataset[name]) for name in dataset.variables}
         try:
             dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
