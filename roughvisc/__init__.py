@@ -28,6 +28,8 @@ _PUBLIC = {
         "roughvisc.study.case": "read_study read_cases vary study_schema",
         "roughvisc.study.store": "open_result",
         "roughvisc.study.run": "run",
+        "roughvisc.views.report": "report",
+        "roughvisc.views.handover": "to_csv deformed",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
     }.items()
     for name in names.split()
