@@ -1,4 +1,4 @@
-"""The command line: ``roughvisc run | scan | plot``.
+"""The command line: ``roughvisc run | plan | scan | plot``.
 
 Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted. Heavy imports
 are made inside the commands, so that ``--help`` is quick.
@@ -71,16 +71,23 @@ def main() -> None:
     "--out", type=click.Path(path_type=Path), help="Folder of the results. [default: results/STUDY beside it]"
 )
 @click.option("--no-plots", is_flag=True, help="Write no figures.")
+@click.option("--workers", type=click.IntRange(0), help="Processes; 0: none but this one. [default: one a core]")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
+@click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
+@click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-def run(study: Path, out: Path | None, no_plots: bool, quiet: bool) -> None:
+def run(study: Path, out: Path | None, no_plots: bool, quiet: bool, **where: Any) -> None:
     """Compute all cases of a study file.
 
-    Each case ends in one NetCDF file, named by what determines its numbers, and in figures beside it. With a [sweep]
-    the cases are computed one after another; one that fails does not stop the others.
+    Each case ends in one NetCDF file, named by what determines its numbers; a single one also in figures beside it.
+    With a [sweep] the cases run side by side, on all cores of this machine or wherever a Dask scheduler has workers.
+    One that fails does not stop the others, and is not tried again without --retry-failed. Interrupted, the same
+    command goes on: what is finished is not computed again.
 
     \b
     Example:
       roughvisc run workflows/quickstart.toml --out /tmp/quickstart
+      roughvisc run workflows/load_sweep.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
 
@@ -90,42 +97,104 @@ def run(study: Path, out: Path | None, no_plots: bool, quiet: bool) -> None:
     cases = read_cases(study)
     folder = result_folder(cases[0], out)
     console = Console(quiet=quiet)
-    refusals, failures = [], []
-    for number, case in enumerate(cases, 1):
-        label = f"case {number} of {len(cases)}" if len(cases) > 1 else study.stem
-        try:
-            complaint = _run_one(case, folder, label, console, not no_plots)
-        except RoughviscError as error:
-            if len(cases) == 1:
-                raise
-            complaint = str(error)
-            refusals += [complaint] if isinstance(error, InputError) else []
+    if len(cases) == 1 and not (where["scheduler"] or where["scheduler_file"]):
+        complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
         if complaint:
-            failures.append(f"{label}: {complaint}")
-            click.echo(f"roughvisc: {failures[-1]}", err=True)
-    if len(refusals) == len(cases):
-        raise _Failure("no case could be computed: the input is wrong", 2)
-    if failures:
-        raise _Failure(f"{len(failures)} of {len(cases)} cases failed", 1)
+            click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
+            raise _Failure("1 of 1 cases failed", 1)
+    else:
+        _run_all(cases, folder, console, **where)
 
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
-    from roughvisc.study.run import compute, keep, unconverged
+    from dask.system import CPU_COUNT
+    from scipy import fft
+
+    from roughvisc.study.run import run_case, unconverged
+    from roughvisc.study.store import open_result
     from roughvisc.views.console import progress, result_table
 
-    with progress(console, label) as report:
-        dataset = compute(case, progress=report)
-    path = keep(dataset, case, folder)
-    console.print(result_table(dataset))
-    _say(console, "Result", path)
-    if plots:
-        from roughvisc.views.plot import save_figures
+    with progress(console, label) as report, fft.set_workers(CPU_COUNT):
+        path = run_case(case, folder, progress=report)
+    with open_result(path) as dataset:
+        console.print(result_table(dataset))
+        _say(console, "Result", path)
+        if plots:
+            from roughvisc.views.plot import save_figures
 
-        for figure in save_figures(dataset, folder, case.key):
-            _say(console, "Figure", figure)
-    console.print()
-    return unconverged(dataset)
+            for figure in save_figures(dataset, folder, case.key):
+                _say(console, "Figure", figure)
+        return unconverged(dataset)
+
+
+def _run_all(
+    cases: list[Case],
+    folder: Path,
+    console: Console,
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    scheduler_file: Path | None,
+    retry_failed: bool,
+) -> None:
+    """Compute and sum up a sweep."""
+    from contextlib import ExitStack
+
+    from roughvisc.study.sweep import LOG, connect, run_cases
+    from roughvisc.study.watch import watcher
+    from roughvisc.views.console import sweep_table
+
+    with ExitStack() as stack:
+        client = None
+        if scheduler or scheduler_file:
+            client = stack.enter_context(connect(scheduler, scheduler_file))
+        outcomes = run_cases(
+            cases,
+            folder,
+            client=client,
+            workers=workers,
+            retry_failed=retry_failed,
+            watch=watcher(not console.quiet, console),
+        )
+    console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
+    _say(console, "Results", folder)
+    _say(console, "Log", folder / LOG)
+    bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
+    number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
+    for outcome in bad:
+        again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
+        where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
+        click.echo(f"roughvisc: {where}: {outcome.message}", err=True)
+    if all(outcome.error in ("InputError", "EdgeContactError") for outcome in outcomes.values()):
+        raise _Failure("no case could be computed: the input is wrong", 2)
+    if bad:
+        raise _Failure(f"{len(bad)} of {len(outcomes)} cases failed", 1)
+
+
+@main.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
+@click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
+def plan(study: Path, out: Path | None, workers: int | None) -> None:
+    """Say what a study will model and what it will cost, before anything is spent.
+
+    Nothing is written. Steps and transforms are those of coarse marches, seconds those of a solve that is timed here;
+    a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+
+    \b
+    Example:
+      roughvisc plan workflows/load_sweep.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.plan import plan as planned
+    from roughvisc.views.console import plan_tables
+
+    costs = planned(study, out, workers=workers)
+    Console().print(plan_tables(costs))
+    if costs.attrs["refusal"]:
+        raise _Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
 
 
 def _say(console: Console, what: str, path: Path) -> None:
@@ -137,41 +206,87 @@ def _say(console: Console, what: str, path: Path) -> None:
 @main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--plot", type=click.Path(path_type=Path), help="Quick-look picture. [default: FILE's name.png, here]")
+@click.option("--to", type=click.Path(path_type=Path), help="Convert: write the heights to a .nc, .x3p or .sdf file.")
+@click.option(
+    "--card",
+    type=click.Path(path_type=Path),
+    is_flag=False,
+    flag_value=Path(),
+    metavar="[OUT.toml]",
+    help="Write a surface card for FILE. [name: FILE's name.toml, beside it]",
+)
 @click.option("--unit", help="Unit of length, where the file states none: um.")
 @click.option("--channel", help="Name or number of the channel. [default: the height]")
 @click.option("--spacing", help="Distance of the points, where the file states none: 1um, or 1um,2um.")
 @click.option("--format", help="Format, where the suffix does not tell.")
 def scan(
-    file: Path, plot: Path | None, unit: str | None, channel: str | None, spacing: str | None, format: str | None
+    file: Path,
+    plot: Path | None,
+    to: Path | None,
+    card: Path | None,
+    unit: str | None,
+    channel: str | None,
+    spacing: str | None,
+    format: str | None,
 ) -> None:
-    """Say what is in a scan, and draw it.
+    """Say what is in a scan, and draw it; convert it, or write a surface card for it.
 
-    Size, shape, spacing, missing points, Sq and rms slope; FILE is an instrument file or a surface card.
+    Size, channels, missing points, areal parameters; FILE is an instrument file or a surface card.
 
     \b
     Example:
       roughvisc scan ground.sur --plot ground.png
+      roughvisc scan ground.sur --to ground.x3p --card
     """
     from rich.console import Console
 
-    from roughvisc.topography.conditioning import level
+    from roughvisc.topography.bandwidth import level
     from roughvisc.topography.parameters import parameters
-    from roughvisc.topography.readers import open_scan
+    from roughvisc.topography.readers import list_channels, open_scan
+    from roughvisc.topography.writers import card_text, known_suffix
     from roughvisc.views.console import scan_table
     from roughvisc.views.plot import surface
 
-    height = open_scan(
-        file,
-        format=format,
-        unit=unit,
-        channel=int(channel) if channel is not None and channel.isdecimal() else channel,
-        spacing=_sides(spacing),
-    )
+    options = {
+        "format": format,
+        "unit": unit,
+        "channel": int(channel) if channel is not None and channel.isdecimal() else channel,
+        "spacing": _sides(spacing),
+    }
+    height = open_scan(file, **options)
+    channels = () if "card" in height.attrs else list_channels(file, format=format)
+    picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
+    text = card_text(file, card.parent, options) if card else ""
+    if to:
+        known_suffix(to)
+    for out in filter(None, (to, card, picture)):
+        if out.exists() and (out == card or out.samefile(file)):
+            raise InputError(f"{out}: exists already, and is not written over: expected another name")
     console = Console()
-    console.print(scan_table(height, parameters(level(height)), file.name))
-    picture = plot or Path(f"{file.stem}.png")
+    console.print(scan_table(height, parameters(level(height)), file.name, channels))
     _draw(surface(height), picture)
     _say(console, "Picture", picture)
+    if to:
+        _convert(height, to)
+        _say(console, "Converted", to)
+    if card:
+        _write_card(text, card)
+        _say(console, "Card", card)
+
+
+def _convert(height: Any, path: Path) -> None:
+    from roughvisc.study.store import whole_file
+    from roughvisc.topography.writers import save_scan
+
+    with whole_file(path) as temporary:
+        save_scan(height, temporary)
+
+
+def _write_card(text: str, path: Path) -> None:
+    from roughvisc.study.store import whole_file
+
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def _sides(text: str | None) -> Any:

@@ -19,3 +19,7 @@ class EdgeContactError(InputError):
 
 class ConvergenceError(RoughviscError, RuntimeError):
     """A step did not reach its tolerance: the message names the time, the residual and what to try."""
+
+
+class InUseError(RoughviscError, RuntimeError):
+    """Another run is at work on the same thing: the message names it."""

@@ -379,7 +379,7 @@ over = "50 ms"  =>  # gone
 | material.poisson: found -1: expected a number above -1 and up to 0.5
 
 [32, 24]  =>  [0, 24]
-| surface.shape.0: found 0: expected a whole number at least 2
+| surface.shape.0: found 0: expected a whole number at least 1
 
 [32, 24]  =>  [32]
 | surface.shape: found [32]: expected a whole number of cells, or a list of two, along x and along y

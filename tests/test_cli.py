@@ -54,21 +54,60 @@ def test_run__quiet_says_nothing(invoke, tmp_path):
 
 def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     sweep = '[sweep]\n"program.0.load" = ["5 mN", "50 N", "6 mN"]'
-    status, out, err = invoke("run", write_study(BALL + sweep), "--no-plots")
+    status, out, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
     assert status == 1
-    assert len(list((tmp_path / "results" / "ball").iterdir())) == 2
-    assert "roughvisc: case 2 of 3: ball.toml: " in err
+    folder = tmp_path / "results" / "ball"
+    assert len(list(folder.glob("*.nc"))) == 2
+    assert len(list(folder.glob("*.failed.json"))) == 1
+    assert err.startswith("roughvisc: case 2 of 3: ")
     assert err.endswith("roughvisc: 1 of 3 cases failed\n")
-    assert out.count("Result: ") == 2
+    for words in (
+        "case 2 of 3 (program.0.load = 50.0): failed: ",
+        "2 of 3 cases done, 1 failed",
+        "2, 0 of them before",
+    ):
+        assert words in out
+    assert "Results: results/ball\nLog: results/ball/sweep.log\n" in out
+
+    status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
+    assert (status, out) == (1, "")
+    assert "case 2 of 3, as before (--retry-failed tries again): " in err
+    assert "as before" not in invoke("run", "ball.toml", "--workers", 0, "--retry-failed")[2]
+
+
+def test_run__sweep_in_which_all_is_wrong_is_status_2(invoke):
+    sweep = '[sweep]\n"program.0.load" = ["50 N", "60 N"]'
+    status, _, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
+    assert status == 2
+    assert err.endswith("roughvisc: no case could be computed: the input is wrong\n")
+
+
+def test_run__scheduler_that_is_not_there_is_status_2(invoke, tmp_path):
+    status, _, err = invoke("run", write_study(), "--scheduler-file", "gone.json")
+    assert (status, err[:22]) == (2, "roughvisc: gone.json: ")
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"]
+
+
+def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
+    sweep = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]'
+    status, out, err = invoke("plan", write_study(BALL + sweep))
+    assert (status, err) == (0, "")
+    for words in ("2, ", "free, transforms padded", "1 exponential", "24 x 21 cells", "Convolutions", "Disk", "0.004"):
+        assert words in out
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
+    status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
+    assert status == 2
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, monkeypatch):
+    press = run_module.press
+
     def stubborn(*args, **settings):
-        ds = rv.simulate(*args, **settings)
+        ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "simulate", stubborn)
+    monkeypatch.setattr(run_module, "press", stubborn)
     status, out, err = invoke("run", write_study(), "--no-plots")
     assert status == 1
     assert "1 of 3 kept times did not converge" in err
@@ -83,7 +122,7 @@ def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, m
         ('radius = "10 mm"', 'radios = "10 mm"', "surface.radios: unknown key; did you mean 'radius'?"),
         ('"3 MPa"', '"-3 MPa"', "material.shear_modulus: found '-3 MPa': expected a number in Pa"),
         ('"0.1 MPa s"', '"0.1 MPa s"\npoisson = 0.51', "material.poisson: found 0.51: expected a number above -1"),
-        ("[24, 21]", "[0, 21]", "surface.shape.0: found 0: expected a whole number at least 2"),
+        ("[24, 21]", "[0, 21]", "surface.shape.0: found 0: expected a whole number at least 1"),
         ('"5 mN"', "nan", "program.0.load: found nan: expected a number"),
         ('"5 mN"', '"50 N"', "boundary"),
     ],
@@ -100,7 +139,7 @@ def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
     def interrupted(*args, **settings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run_module, "simulate", interrupted)
+    monkeypatch.setattr(run_module, "press", interrupted)
     status, _, err = invoke("run", write_study())
     assert status == 130
     assert err == "roughvisc: interrupted; what was finished is kept\n"
@@ -113,7 +152,9 @@ def test_run__disk_full_is_status_1(invoke, monkeypatch):
 
     monkeypatch.setattr(run_module, "write_result", full)
     status, _, err = invoke("run", write_study())
-    assert (status, err) == (1, "roughvisc: result.nc: No space left on device\n")
+    assert status == 1
+    assert err.count("\n") == 1
+    assert ".nc: No space left on device; what was computed up to the last checkpoint is kept: make room and" in err
 
 
 @pytest.fixture
@@ -150,6 +191,69 @@ def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
         status, _, err = invoke("scan", *arguments)
         assert status == 2
         assert words in err
+    assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
+
+
+@pytest.mark.parametrize("suffix", ["nc", "x3p", "sdf"])
+def test_scan__converts(invoke, tmp_path, scan_file, suffix):
+    status, out, err = invoke("scan", scan_file, "--to", f"out/scan.{suffix}")
+    assert (status, err) == (0, "")
+    assert f"Converted: out/scan.{suffix}" in out
+    np.testing.assert_array_equal(rv.open_scan(tmp_path / "out" / f"scan.{suffix}"), rv.open_scan(scan_file))
+
+
+def test_scan__writes_a_card(invoke, tmp_path, scan_file):
+    status, out, err = invoke("scan", scan_file, "--card", "cards/mine.toml")
+    assert (status, err) == (0, "")
+    assert "Card: cards/mine.toml" in out
+    expected = rv.open_scan(scan_file)
+    np.testing.assert_array_equal(rv.open_scan(tmp_path / "cards" / "mine.toml"), expected)
+    assert invoke("scan", scan_file, "--card")[0] == 0
+    card = tmp_path / "tilted.toml"
+    np.testing.assert_array_equal(rv.open_scan(card), expected)
+    assert invoke("scan", card)[0] == 0
+    before = card.read_text()
+    status, _, err = invoke("scan", scan_file, "--card")
+    assert status == 2
+    assert "tilted.toml: exists already" in err
+    assert card.read_text() == before
+
+
+def test_scan__lists_channels_and_parameters(invoke, tmp_path):
+    x3pio = pytest.importorskip("x3pio")
+    z = 1e-6 * np.random.default_rng(0).normal(size=(2, 20, 30))
+    x3pio.write(tmp_path / "two.x3p", z, x_scale=1e-6, y_scale=2e-6)
+    status, out, err = invoke("scan", "two.x3p")
+    assert (status, err) == (0, "")
+    for words in (
+        "layer 0, of these:",
+        "layer 1: height in m, 30 x 20 points",
+        "Sa, ",
+        "Ssk, ",
+        "Sku, ",
+        "Sz, ",
+        "Sdr, ",
+    ):
+        assert words in out
+    np.save(tmp_path / "plain.npy", z[0])
+    status, _, err = invoke("scan", "plain.npy")
+    assert status == 2
+    assert "unit=" in err
+    assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
+    assert rv.open_scan(tmp_path / "plain.toml").shape == (20, 30)
+
+
+def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_path, scan_file):
+    content = scan_file.read_bytes()
+    for arguments, words in (
+        (["--to", "tilted.nc"], "exists already"),
+        (["--to", "scan.stl"], "expected one of .nc, .x3p, .sdf"),
+        (["--plot", "tilted.nc"], "exists already"),
+    ):
+        status, _, err = invoke("scan", scan_file, *arguments)
+        assert status == 2
+        assert words in err
+    assert scan_file.read_bytes() == content
     assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
 
 

@@ -147,7 +147,7 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
 
 
 def test_mask_outliers__median_is_that_of_the_finite_points():
-    from roughvisc.topography.conditioning import _local_median
+    from roughvisc.topography.gaps import _local_median
 
     values = rough((13, 11), missing=0.4).values
     values[:6, :6] = np.nan
@@ -370,3 +370,45 @@ def test_conditioning__is_the_same_in_nanometres():
     small = (h * 1e-3).assign_coords(x=h.x * 1e-3, y=h.y * 1e-3)
     done, tiny = (taper(gaussian_filter(fill(mask_outliers(level(g, 2))), c), c) for g, c in ((h, 2e-5), (small, 2e-8)))
     np.testing.assert_allclose(tiny * 1e3, done.values, rtol=1e-9, atol=1e-16)
+
+
+def test_filled__goes_with_its_points_through_later_steps():
+    h = rough((20, 16), missing=0.1)
+    done = fill(h)
+    x, y = slice(3e-6, 2.5e-5), slice(0, 3e-5)
+    part = crop(done, x=(x.start, x.stop), y=(y.start, y.stop))
+    np.testing.assert_array_equal(part["filled"], np.isnan(h.sel(x=x, y=y)))
+    np.testing.assert_array_equal(rotate90(done)["filled"], np.isnan(np.rot90(h.values)))
+    doubled = mirror(done)
+    np.testing.assert_array_equal(doubled["filled"], np.isnan(mirror(h)))
+    coarse = resample(done, (10, 8))
+    np.testing.assert_array_equal(coarse["filled"], np.isnan(h.values).reshape(10, 2, 8, 2).any(axis=(1, 3)))
+    for step in (part, doubled, coarse, rotate90(done), level(done), taper(done, 1e-5), gaussian_filter(done, 2e-5)):
+        assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
+        assert step.attrs["fill_method"] == "harmonic"
+
+
+def test_filled__of_either_face_stays_in_the_combination():
+    a, b = rough((20, 16), missing=0.1), rough((20, 16), missing=0.1, seed=1)
+    both = combine(fill(a), fill(b, "nearest"), flip="x")
+    np.testing.assert_array_equal(both["filled"], np.isnan(a.values) | np.isnan(b.values)[::-1])
+    assert both.attrs["filled_points"] == int(both["filled"].sum())
+    assert both.attrs["fill_method"] == "harmonic, nearest"
+    np.testing.assert_array_equal(combine(a.fillna(0), fill(b))["filled"], np.isnan(b))
+    assert "filled" not in combine(a, b).coords
+
+
+def test_level__cubic_takes_off_what_quadratic_leaves():
+    h = rough((60, 50))
+    bent = h + 1e-5 * (h.x / 1e-4) ** 3 - 3e-5 * (h.x / 1e-4) * (h.y / 1e-4) ** 2
+    np.testing.assert_allclose(level(bent, 3), level(h, 3), atol=1e-13)
+    assert float((level(bent, 2) - level(h, 2)).std()) > 2e-7
+
+
+@pytest.mark.parametrize("keep", ["long", "short"])
+def test_gaussian_filter__both_filters_pass_half_at_the_cutoff(keep):
+    """S- and L-filter of one nesting index are complements: both let half of the amplitude pass there."""
+    flat = from_array(np.zeros((240, 7)), CELL)
+    wave = flat + 1e-6 * np.cos(2 * np.pi * flat.x / 2.4e-5)
+    passed = gaussian_filter(wave, 2.4e-5, keep, periodic=True)
+    np.testing.assert_allclose(passed, 0.5 * wave, atol=1e-16)

@@ -302,3 +302,9 @@ def test_note__is_no_part_of_a_comparison():
 def test_bad_power_law__is_named(make, message):
     with pytest.raises(rv.InputError, match=message):
         make()
+
+
+def test_contact_compliance__of_a_solid_has_its_rubbery_limit():
+    rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
+    assert float(rubber.contact_compliance(np.inf)) == pytest.approx((1 / 3e6 + 1 / 1e6) / 4, rel=1e-14)
+    assert float(rv.maxwell(1e6, 1e6).contact_compliance(np.inf)) == np.inf

@@ -102,12 +102,14 @@ def test_run__writes_nothing_where_the_input_is_wrong(study):
 
 
 def test_run__keeps_what_did_not_converge_and_says_so(study, monkeypatch, caplog):
+    press = run_module.press
+
     def stubborn(*args, **settings):
-        ds = rv.simulate(*args, **settings)
+        ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "simulate", stubborn)
+    monkeypatch.setattr(run_module, "press", stubborn)
     with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
         run(study, progress=False)
     (path,) = (study.parent / "results" / "ball").iterdir()

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -229,3 +231,53 @@ def test_recipe__refuses_with_parameter_found_and_expected(call, fragments):
         call()
     assert all(fragment in str(refused.value) for fragment in fragments), refused.value
     assert "expected" in str(refused.value)
+
+
+def test_strip__of_one_cell_begins_at_zero():
+    h = wavy(1e-6, 1e-3, (3e-3, 1e-4), (257, 1), waves=1)
+    assert h.shape == (257, 1)
+    assert float(h.y[0]) == pytest.approx(5e-5)
+    np.testing.assert_allclose(h[:, 0], 1e-6 * np.cos(2 * np.pi * h.x / 1e-3), atol=1e-18)
+    for strip in (sphere(1e-2, (1e-3, 1e-5), (33, 1)), cone(0.1, (1e-3, 1e-5), (33, 1))):
+        np.testing.assert_allclose(strip[:, 0], strip[::-1, 0], rtol=1e-12)
+        assert float(strip.max()) == pytest.approx(0, abs=1e-18)  # the middle cell is at the apex
+        assert grown(strip).sizes["x"] > 33
+    assert flat_punch(1e-4, (1e-5, 1e-3), (1, 33)).shape == (1, 33)
+    with pytest.raises(InputError, match=r"shape is \(33, 1\).*at least 2"):
+        self_affine(1e-3, (33, 1), hurst=0.8, rms_slope=0.1, seed=0)
+
+
+def test_strip__presses_like_the_wave_that_it_stands_for():
+    import roughvisc as rv
+
+    pressed = []
+    for cells in (1, 5):
+        h = wavy(1e-6, 1e-3, (1e-3, cells * 1e-4), (65, cells), waves=1)
+        program = rv.Program().load(1e-4 * cells, over=0)
+        pressed.append(rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", times=1, progress=False))
+    np.testing.assert_allclose(pressed[0].pressure[-1, :, 0], pressed[1].pressure[-1, :, 2], rtol=0.02, atol=30)
+    assert 0.02 < float(pressed[0].contact_fraction[-1]) < 0.9
+
+
+def test_self_affine__takes_little_more_memory_than_its_result():
+    """The peak in a process of its own, at 2048 squared: below 1.6 of the result. At 4096 squared: 1.08 times."""
+    code = (
+        "import resource; from roughvisc.topography.synthesis import self_affine; "
+        "peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; "
+        "self_affine(1e-3, 64, hurst=0.8, rms_slope=0.1, seed=0); before = peak(); "
+        "h = self_affine(1e-3, 2048, hurst=0.8, rms_slope=0.1, seed=0); print((peak() - before) * 1024 / h.nbytes)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    if sys.platform == "linux":
+        assert float(done.stdout) < 1.6
+
+
+def test_self_affine__transform_in_place_is_the_inverse_of_the_whole_one():
+    from roughvisc.topography.synthesis import _synthesised
+
+    rng = np.random.default_rng(0)
+    for nx, ny in [(2, 2), (3, 2), (2, 5), (65, 64), (130, 129), (64, 193)]:
+        heights = rng.normal(size=(nx, ny))
+        found = _synthesised(np.fft.rfft2(heights, norm="forward"), ny)
+        np.testing.assert_allclose(found, heights, atol=1e-13)
+        assert found.flags.c_contiguous

@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from roughvisc.study.case import read_cases
+from roughvisc.study.case import read_cases, vary
 from roughvisc.study.run import run
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
@@ -36,3 +36,39 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             r, p = points.get_data()
             inside = r < 0.8 * line.get_xdata()[np.flatnonzero(line.get_ydata())[-1]]
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
+
+
+def test_benchmarks__run_small(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
+    assert (tmp_path / "table.nc").exists()
+    for row in tables["seed"] + tables["tamaas"]:
+        assert row["error"] <= row["peer_error"]
+    for row in tables["scaling"]:
+        assert 0 < row["transform_share"] < 1
+
+
+def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}
+    figure = importlib.import_module("scan_to_area").main(tmp_path, coarse)
+    assert (tmp_path / "area_against_load.png").stat().st_size > 10_000
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    assert list(lines) == [
+        "elastic, glassy",
+        "after 20 ms",
+        "after 60 ms",
+        "after 200 ms",
+        "elastic, rubbery",
+        "low loads, glassy",
+        "low loads, rubbery",
+    ]
+    areas = np.array([line.get_ydata() for name, line in lines.items() if "low" not in name])
+    assert areas.shape == (5, 3)
+    assert (np.diff(areas, axis=0) > 0).all(), "the contact grows with time"
+    assert (np.diff(areas, axis=1) > 0).all(), "and with load"
+    results = [run(vary(case, coarse), tmp_path, progress=False) for case in read_cases(FOLDER / "scan_to_area.toml")]
+    for i, ds in enumerate(results):
+        ends = ds.contact_area[[0, -1]] * 1e6  # the axis is in mm2
+        np.testing.assert_allclose(ends, areas[[0, -1], i], rtol=0.01)
+        assert ds.attrs["filled_points"] > 0 if "filled_points" in ds.attrs else "filled" in ds.variables

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import x3pio
 
-from roughvisc.topography.synthesis import self_affine
+import roughvisc as rv
 
 SIZE, SHAPE = (1.0e-3, 0.9e-3), (256, 224)  # cells of 3.906 x 4.018 um
 
@@ -22,7 +22,8 @@ def measured() -> np.ndarray:
     """Heights over (x, y) [m] with tilt, noise, missing points and spikes."""
     rng = np.random.default_rng(20_25)
     # long lays and their fine structure, both periodic: pressed as one period after levelling
-    h = self_affine(SIZE, SHAPE, hurst=0.8, rms_height=0.5e-6, rolloff=60e-6, shortcut=17e-6, anisotropy=4.0, seed=rng)
+    texture = {"hurst": 0.8, "rms_height": 0.5e-6, "rolloff": 60e-6, "shortcut": 17e-6, "anisotropy": 4.0}
+    h = rv.self_affine(SIZE, SHAPE, **texture, seed=rng)
     z = h.values - 0.06e-6 * (h.values / 0.5e-6) ** 2  # grinding leaves deeper grooves than ridges
     steep = np.hypot(*np.gradient(z, *(size / n for size, n in zip(SIZE, SHAPE, strict=True))))
     lost = (steep > np.quantile(steep, 0.97)) & (rng.random(SHAPE) < 0.25)

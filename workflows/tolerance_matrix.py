@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import roughvisc as rv
 
 TOLERANCES = (1e-2, 1e-3, 1e-4)
-GRID, SIZE, RADIUS, SPAN = (21, 23), 1.0, 1.0, 4.0
+GRID, SIZE, RADIUS, SPAN = (33, 35), 1.0, 1.0, 4.0
 ROWS = np.geomspace(1e-4, 4 * SPAN, 40)
 NOISE = 1 + 0.01 * np.random.default_rng(7).standard_normal(40)
 MATERIALS = {

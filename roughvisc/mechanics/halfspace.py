@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -33,8 +34,8 @@ class HalfSpace:
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic"}
         Free space (nothing outside the grid is loaded) or one period of an endless surface.
-    workers : int
-        Threads of the transforms.
+    workers : int, optional
+        Threads of the transforms; None: as ``scipy.fft.set_workers`` has it, one where nobody has set it.
     """
 
     def __init__(
@@ -42,7 +43,7 @@ class HalfSpace:
         shape: tuple[int, int],
         spacing: tuple[float, float],
         boundary: Boundary = "free",
-        workers: int = 1,
+        workers: int | None = None,
     ) -> None:
         if boundary not in ("free", "periodic"):
             raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
@@ -131,6 +132,11 @@ class HalfSpace:
         field_q = fft.rfft2(field, workers=self.workers)
         field_q *= symbol
         return fft.irfft2(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+
+
+def transform_engine() -> str:
+    """What the last digits depend on: results are equal to the last bit only where this is the same."""
+    return f"scipy.fft {scipy.__version__}, numpy {np.__version__}"
 
 
 def _both_signs(symbol: Array, length: int) -> Array:

@@ -64,7 +64,7 @@ class Prony:
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""
         t = np.asarray(t, dtype=float)
-        total = self.glassy + self.fluidity * t
+        total = self.glassy + (self.fluidity * t if self.fluidity else np.zeros_like(t))  # a solid has a limit at inf
         for compliance, time in zip(self.compliances, self.times, strict=True):
             total = total - compliance * np.expm1(-t / time)
         return np.asarray(total)

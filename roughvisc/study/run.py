@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
 import re
 from collections.abc import Callable
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -14,10 +16,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
+from roughvisc.mechanics.halfspace import transform_engine
 from roughvisc.study.case import Case, read_study
-from roughvisc.study.simulate import simulate
-from roughvisc.study.store import write_result
+from roughvisc.study.checkpoint import Keeper
+from roughvisc.study.lock import held
+from roughvisc.study.simulate import press
+from roughvisc.study.store import open_result, write_result
 from roughvisc.variables import STATUS_MEANINGS
 
 if TYPE_CHECKING:
@@ -51,7 +56,9 @@ def run(case: Case | str | Path, out: str | Path | None = None, *, progress: boo
     Returns
     -------
     xarray.Dataset
-        The result, ``(time, x, y)``; the file is ``ds.encoding["source"]``, named by the case's key.
+        The result, ``(time, x, y)``, whose fields are read from its file when they are asked for; the file is
+        ``ds.encoding["source"]``, named by the case's key. A case that was finished before is not computed again, one
+        that was interrupted goes on; see :func:`run_case`.
 
     Raises
     ------
@@ -62,9 +69,8 @@ def run(case: Case | str | Path, out: str | Path | None = None, *, progress: boo
     """
     if not isinstance(case, Case):
         case = read_study(case)
-    folder = result_folder(case, out)
-    dataset = compute(case, progress=progress)
-    path = keep(dataset, case, folder)
+    path = run_case(case, result_folder(case, out), progress=progress)
+    dataset = open_result(path)
     complaint = unconverged(dataset)
     if complaint:
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
@@ -93,8 +99,10 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     return folder
 
 
-def compute(case: Case, *, progress: bool | Progress = True) -> xr.Dataset:
+def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | None = None) -> xr.Dataset:
     """Result of a case, with all that is needed to run it again in its attributes.
+
+    With a keeper it goes on from what that has kept, and the fields of the result are read from there.
 
     Raises
     ------
@@ -104,7 +112,7 @@ def compute(case: Case, *, progress: bool | Progress = True) -> xr.Dataset:
     settings = case.settings
     height = case.height()
     try:
-        dataset = simulate(
+        dataset = press(
             height,
             case.material(),
             case.program(),
@@ -117,7 +125,10 @@ def compute(case: Case, *, progress: bool | Progress = True) -> xr.Dataset:
             missing=settings.surface.missing,
             edge=settings.solve.edge,
             progress=progress,
+            keeper=keeper,
         )
+    except InUseError:
+        raise
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
@@ -135,6 +146,7 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "title": case.title + varied,
         "source": f"roughvisc {version}",
+        "transforms": transform_engine(),
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
         "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "
@@ -147,39 +159,118 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
 
 
 def run_case(
-    case: Case, folder: Path, *, progress: bool | Progress = False, stop: Callable[[], bool] | None = None
+    case: Case,
+    folder: str | Path,
+    *,
+    progress: bool | Progress = False,
+    stop: Callable[[], bool] | None = None,
+    checkpoint_seconds: float = 30.0,
+    checkpoint_steps: int | None = None,
 ) -> Path:
     """Bring one case to its file in a folder, and give the file's path.
+
+    Finished already: nothing is computed. Interrupted, by whatever means: it goes on from its last checkpoint, and
+    ends with the same numbers, to the last bit, as if it had not been; ``wall_time`` leaves out what was lost. The
+    seed paper's method begins again.
 
     Parameters
     ----------
     case : Case
         What to compute.
     folder : path
-        Where the file goes; it is named by the case's key.
+        Where the file goes; it is named by the case's key. What an unfinished run keeps is in hidden files beside it.
     progress : bool or callable
         As in :func:`run`.
     stop : callable, optional
-        Asked at every accepted step; if it says so, :class:`KeyboardInterrupt` is raised.
+        Asked at every accepted step; if it says so, a checkpoint is written and :class:`KeyboardInterrupt` raised.
+    checkpoint_seconds : float
+        Time between checkpoints; longer where they would take a twentieth of the time. [s]
+    checkpoint_steps : int, optional
+        Accepted steps between checkpoints, whatever these take.
 
     Raises
     ------
     InputError, ConvergenceError
-        As :func:`run`; an unconverged result is kept all the same.
+        As :func:`run`; also if a checkpoint was written by other versions, whose last digits differ. An unconverged
+        result is kept and none of these.
+    InUseError
+        If another run is at work on this case in this folder.
+    OSError
+        If the disk is full; the last checkpoint stays.
     """
+    folder = Path(folder)
+    path = folder / f"{case.key}.nc"
+    if is_result_of(case, path) and not _leftovers(path):
+        return path
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with held(folder / f".{case.key}.lock") as lock:
+            for torn in folder.glob(f".{case.key}.*.part.nc"):
+                torn.unlink()
+            keeper = Keeper(
+                folder / f".{case.key}.unfinished",
+                case.key,
+                lock.check,
+                seconds=checkpoint_seconds,
+                steps=checkpoint_steps,
+                stop=stop,
+            )
+            with closing(keeper):
+                if not is_result_of(case, path):
+                    keeper.resume()
+                    _finish(case, folder, progress, keeper)
+                keeper.remove()
+    except InUseError:
+        if is_result_of(case, path):  # the other run has just finished
+            return path
+        raise
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        advice = "what was computed up to the last checkpoint is kept: make room and run it again"
+        raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
+    finally:
+        for place in made:  # empty only if nothing was kept
+            with suppress(OSError):
+                place.rmdir()
+    return path
 
-    def report(now: float, end: float) -> None:
-        if stop is not None and stop():
-            raise KeyboardInterrupt
-        if callable(progress):
-            progress(now, end)
 
-    return keep(compute(case, progress=report), case, folder)
+def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper) -> None:
+    """Compute what is missing of a case and write its file."""
+    try:
+        keep(compute(case, progress=progress, keeper=keeper), case, folder)
+    except InUseError:
+        raise
+    except RoughviscError:  # it would fail again in the same way
+        keeper.remove()
+        raise
+    except KeyboardInterrupt:
+        keeper.save()
+        raise
+
+
+def is_result_of(case: Case, path: Path) -> bool:
+    """Whether a file is the whole result of a case."""
+    if not path.exists():
+        return False
+    try:
+        with open_result(path) as dataset:
+            return bool(dataset.attrs.get("case_key") == case.key)
+    except InputError as error:
+        log.warning("%s", error)
+        return False
+
+
+def _leftovers(path: Path) -> bool:
+    """Whether a run has left behind what it needs no longer."""
+    return any(path.parent.glob(f".{path.stem}.*"))
 
 
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
-    path = write_result(dataset, folder / f"{case.key}.nc")
+    path = write_result(dataset, folder / f"{case.key}.nc", precision=case.settings.keep.precision)
     dataset.encoding["source"] = str(path)
     complaint = unconverged(dataset)
     if complaint:

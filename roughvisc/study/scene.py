@@ -17,14 +17,14 @@ from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
 from roughvisc.topography.grid import axis_step
-from roughvisc.topography.synthesis import grown
+from roughvisc.topography.indenters import grown
 
 #: An analytic profile's grid grows by this factor a time, and no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2
 
 
 class Ground:
-    """The labelled surface under a scene, which may grow while the scene is marched through."""
+    """The labelled surface under a scene, which may grow while that is marched through: ``growths`` times so far."""
 
     def __init__(self, height: xr.DataArray, missing: Literal["refuse", "absent"] = "refuse") -> None:
         self.height = _checked(height)
@@ -32,6 +32,7 @@ class Ground:
         self.present: NDArray[np.bool_] = np.isfinite(values)
         _check_missing(self.height, self.present, missing)
         self._missing = missing
+        self.growths = 0
 
     @property
     def gap(self) -> NDArray[np.float64]:
@@ -39,7 +40,7 @@ class Ground:
         values = self.height.values
         return np.where(self.present, np.max(values[self.present]) - values, 0.0)
 
-    def halfspace(self, boundary: Boundary, workers: int = 1) -> HalfSpace:
+    def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
         """Half-space on the surface's grid."""
         sides = (_side(self.height, "x"), _side(self.height, "y"))
         return HalfSpace(self.height.shape, sides, boundary, workers)
@@ -54,7 +55,9 @@ class Ground:
         if larger is None or larger.size > MOST_CELLS:
             return None
         first = [int(np.searchsorted(larger[axis].values, self.height[axis].values[0])) for axis in ("x", "y")]
+        growths = self.growths + 1
         self.__init__(larger, self._missing)  # type: ignore[misc]
+        self.growths = growths
         halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
         present = None if self.present.all() else self.present
         settings = {**vars(scene), "halfspace": halfspace, "gap": self.gap, "present": present}

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Literal
 
-import numpy as np
 import xarray as xr
 
 from roughvisc.errors import ConvergenceError, InputError
@@ -17,7 +14,9 @@ from roughvisc.mechanics.halfspace import Boundary
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.seed import march_seed
-from roughvisc.mechanics.stepper import Scene, Step, march
+from roughvisc.mechanics.stepper import march
+from roughvisc.study.checkpoint import Keeper, Reached
+from roughvisc.study.records import RowsInMemory
 from roughvisc.study.rows import Rows
 from roughvisc.study.scene import Ground, prepare
 from roughvisc.variables import FIELDS
@@ -106,6 +105,42 @@ def simulate(
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """
+    return press(
+        height,
+        material,
+        program,
+        boundary=boundary,
+        tolerance=tolerance,
+        time_step=time_step,
+        times=times,
+        fields=fields,
+        method=method,
+        missing=missing,
+        edge=edge,
+        progress=progress,
+    )
+
+
+def press(
+    height: xr.DataArray,
+    material: Material,
+    program: Program,
+    *,
+    boundary: Boundary,
+    tolerance: float,
+    time_step: float | Literal["auto"],
+    times: int | Sequence[float] | None,
+    fields: Sequence[str],
+    method: Method,
+    missing: Literal["refuse", "absent"],
+    edge: Literal["error", "accept"],
+    progress: bool | Progress,
+    keeper: Keeper | None = None,
+) -> xr.Dataset:
+    """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
+
+    The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
+    """
     began = time.perf_counter()
     ground = Ground(height, missing)
     scene, engine = prepare(
@@ -124,13 +159,30 @@ def simulate(
     if method not in ("fast", "seed"):
         raise InputError(f"method is {method!r}: expected 'fast' or 'seed'")
     log.info("memory: %s", engine.note)
-    steps = march(scene) if method == "fast" else march_seed(scene)
-    rows = Rows(ground, scene, fields)
-    for step in _shown(steps, scene, progress):
-        rows.add(step, time.perf_counter() - began)
+    reached = Reached() if keeper is None else keeper.saved
+    for _ in range(reached.growths):
+        larger = ground.enlarge(scene)
+        assert larger is not None, "it grew before"
+        scene = larger[0]
+    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows)
+    spent = reached.wall_time - began
+    kept = None if scene.times is None else set(scene.times)
+    report, close = _reporter(progress)
+    try:
+        for step in march(scene, reached.state) if method == "fast" else march_seed(scene):
+            scene = step.scene
+            reached = reached.after(step, ground.growths, spent + time.perf_counter())
+            if kept is None or step.shown.time in kept:
+                rows.add(step, reached.worst_error, reached.converged, reached.wall_time)
+                reached = reached.kept()
+            report(step.shown.time, scene.program.duration)
+            if keeper is not None and method == "fast":
+                keeper.passed(reached)
+    finally:
+        close()
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-    dataset = rows.dataset(method)
+    dataset = rows.dataset(scene, method)
     described = {
         "memory": engine.note,
         "series_error": engine.series_error,
@@ -139,23 +191,6 @@ def simulate(
     }
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset
-
-
-def _shown(steps: Iterator[Step], scene: Scene, progress: bool | Progress) -> Iterator[Step]:
-    """Steps at kept times, with the worst of what lies between folded in, reporting progress."""
-    report, close = _reporter(progress)
-    kept = None if scene.times is None else set(scene.times)
-    worst_error, converged = math.nan, True
-    try:
-        for step in steps:
-            report(step.shown.time, scene.program.duration)
-            worst_error = float(np.fmax(worst_error, step.time_error))
-            converged = converged and step.converged
-            if kept is None or step.shown.time in kept:
-                yield replace(step, time_error=worst_error, converged=converged)
-                worst_error, converged = math.nan, True
-    finally:
-        close()
 
 
 def _reporter(progress: bool | Progress) -> tuple[Progress, Callable[[], None]]:

@@ -95,7 +95,7 @@ def combine(h1: xr.DataArray, h2: xr.DataArray, flip: Literal["x", "y"] | None =
     Returns
     -------
     xarray.DataArray
-        Sum of heights, missing where either is. [m]
+        Sum of heights, missing where either is, marked as filled where either was. [m]
 
     Raises
     ------
@@ -116,7 +116,18 @@ def combine(h1: xr.DataArray, h2: xr.DataArray, flip: Literal["x", "y"] | None =
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (
         f", reversed along {flip}" if flip else ""
     )
-    return noted(like(h1, h1.values + second), line)
+    both = like(h1, h1.values + second)
+    marks = [_filled(h1), _filled(h2) if flip is None else np.flip(_filled(h2), "xy".index(flip))]
+    if marks[0].any() or marks[1].any():
+        attrs = next(h["filled"].attrs for h in (h1, h2) if "filled" in h.coords)
+        both = both.assign_coords(filled=(("x", "y"), marks[0] | marks[1], attrs))
+    methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
+    return noted(both, line, **({"fill_method": ", ".join(methods)} if methods else {}))
+
+
+def _filled(h: xr.DataArray) -> np.ndarray:
+    """Mask of the points that were filled in."""
+    return h["filled"].transpose("x", "y").values if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
 
 
 def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:

@@ -93,6 +93,8 @@ def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
     """The same grid with one more line in its history, and further attributes."""
     history = h.attrs.get("history")
     h = h.copy(deep=False)
+    if "filled" in h.coords:
+        attrs["filled_points"] = int(h["filled"].sum())
     h.attrs = {**h.attrs, **attrs, "history": f"{history}\n{line}" if history else line}
     return h
 

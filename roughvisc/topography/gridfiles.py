@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import with_coordinates
-from roughvisc.topography.instruments import Channel
+from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
 #: Names that heights go by, in order of preference.
@@ -23,13 +24,26 @@ def grid_channels(path: Path) -> tuple[Channel, ...]:
         return _channels(dataset)
 
 
-def open_grid(path: Path, channel: Channel, unit: float | None, spacing: tuple[float, float] | None) -> xr.DataArray:
+def is_labelled(path: Path) -> bool:
+    """Whether an HDF5 file holds a variable over x and y, as netCDF does."""
+    try:
+        return any(channel.is_height for channel in grid_channels(path))
+    except Exception:  # of another layout, or damaged: its own reader will say so
+        return False
+
+
+def open_grid(
+    path: Path, channel: Channel, unit: float | None, spacing: tuple[float, float] | None, heights: bool = True
+) -> xr.DataArray:
     """One variable as a labelled grid in metres, with the attributes and coordinates that it has.
 
-    Coordinates keep their origin; where they descend, the grid is turned round with them.
+    Coordinates keep their origin; where they descend, the grid is turned round with them. Without `heights`, those
+    are NaN that take no memory.
     """
     with _open(path) as dataset:
-        h = dataset[channel.name].load()
+        affordable(path, int(np.prod(channel.shape, dtype=object)), EXPANSION)
+        h = dataset[channel.name]
+        h = h.load() if heights else h.copy(data=np.broadcast_to(np.nan, h.shape)).compute()
     extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
     h = h.transpose("x", "y")
     metres = _metres(h.attrs.get("units"), unit, channel.name)
@@ -42,7 +56,7 @@ def open_grid(path: Path, channel: Channel, unit: float | None, spacing: tuple[f
         else:
             axes.append(h[axis].values.astype(float) * _metres(h[axis].attrs.get("units"), unit, axis))
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
-    grid = with_coordinates(h.values.astype(float) * metres, *axes, attrs)
+    grid = with_coordinates(h.values.astype(float) * metres if heights else h.values, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
@@ -51,8 +65,10 @@ def open_grid(path: Path, channel: Channel, unit: float | None, spacing: tuple[f
 
 
 def _open(path: Path) -> xr.Dataset:
-    engine = "zarr" if path.suffix == ".zarr" else None
-    return xr.open_dataset(path, engine=engine, decode_times=False)
+    zarr = path.suffix.lower() == ".zarr"
+    if zarr and find_spec("zarr") is None:
+        raise InputError("it is in Zarr, which needs the package zarr: install it, or convert the file to netCDF")
+    return xr.open_dataset(path, engine="zarr" if zarr else "netcdf4", decode_times=False)
 
 
 def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:

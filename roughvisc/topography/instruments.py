@@ -7,10 +7,10 @@ SurfaceTopography turns it over; of plain text, row j of the file is ``y[j]``, a
 
 from __future__ import annotations
 
-import os
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy as np
 from roughvisc.errors import InputError
 
 #: Formats that other libraries than SurfaceTopography read here.
-OWN_SUFFIXES = {"x3p": ("x3p",), "sdf": ("sdf",), "nc": ("nc", "nc4", "cdf", "zarr"), "card": ("toml",)}
+OWN_SUFFIXES = {"x3p": ("x3p",), "sdf": ("sdf",), "nc": ("nc", "nc4", "cdf", "hdf5", "zarr"), "card": ("toml",)}
 _TEXT = ("xyz", "asc")
 #: Where suffixes are shared by formats: those to try, in this order.
 _SHARED = {"txt": _TEXT, "asc": _TEXT, "csv": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
@@ -27,7 +27,7 @@ _SHARED = {"txt": _TEXT, "asc": _TEXT, "csv": _TEXT, "dat": ("metropro", *_TEXT)
 _PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metropro", "mi", "nms", "npy", "opd", "os3d"}
 _PLAIN |= {"plu", "tmd", "wsxm", "xyz"}
 #: No deflated stream expands further than this.
-_EXPANSION = 1040
+EXPANSION = 1040
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,8 @@ class Opened:
     load : callable
         ``load(channel, unit)`` with the metres in one unit of the file where it states none, gives heights over
         (x, y) and the cell sides, or None for these. [m]
+    sides : callable
+        ``sides(channel, unit)``: the cell sides as the header has them, None where it does not tell. [m]
     default : int or None
         Index of the channel that the library takes.
     instrument : str
@@ -81,6 +83,7 @@ class Opened:
     format: str
     channels: tuple[Channel, ...]
     load: Callable[[Channel, float | None], tuple[np.ndarray, tuple[float, float] | None]]
+    sides: Callable[[Channel, float | None], tuple[float, float] | None] = lambda *_: None
     default: int | None = None
     instrument: str = ""
     complaints: list[str] = field(default_factory=list)
@@ -150,7 +153,7 @@ def forget(error: BaseException | None) -> None:
 
 def affordable(path: Path, points: int, expansion: float) -> None:
     """Refuse a header that claims more points than the file can hold, before they are allocated."""
-    held = os.path.getsize(path)
+    held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
 
@@ -160,7 +163,7 @@ def _x3p(path: Path) -> Opened:
 
     info = x3pio.info(path, verify=False)
     surface = info.feature_type == x3pio.FeatureType.SURFACE and len(info.shape) == 2
-    affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)), _EXPANSION)
+    affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)), EXPANSION)
     channels = tuple(
         Channel(i, f"layer {i}", surface, tuple(reversed(info.shape)), "m") for i in range(info.layer_count)
     )
@@ -177,9 +180,12 @@ def _x3p(path: Path) -> Opened:
             raise InputError("its points lie on no regular grid (absolute axes): expected equal steps in x and y")
         return layer.z.T, (layer.header.x.increment, layer.header.y.increment)
 
+    axes = [info.header.x, info.header.y]
+    regular = all(axis.axis_type == x3pio.AxisType.INCREMENTAL for axis in axes)
+    sides = (axes[0].increment, axes[1].increment) if regular else None
     maker = info.metadata.instrument if info.metadata else None
     instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
-    return Opened("x3p", channels, load, 0, instrument, complaints)
+    return Opened("x3p", channels, load, lambda *_: sides, 0, instrument, complaints)
 
 
 def _sdf(path: Path) -> Opened:
@@ -189,7 +195,8 @@ def _sdf(path: Path) -> Opened:
     rows, columns = content.data.shape
     channel = Channel(0, "height", rows > 1, (columns, rows), "m")
     cell = (content.header.x_scale, content.header.y_scale)
-    return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), 0, content.header.manufacturer_id.strip())
+    maker = content.header.manufacturer_id.strip()
+    return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), lambda *_: cell, 0, maker)
 
 
 def _npy(path: Path) -> Opened:
@@ -220,23 +227,31 @@ def _surface_topography(path: Path, format: str) -> Opened:
 
     def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
         found = theirs[channel.index]
-        affordable(path, int(np.prod(channel.shape, dtype=object)), 1 if format in _PLAIN else _EXPANSION)
+        affordable(path, int(np.prod(channel.shape, dtype=object)), 1 if format in _PLAIN else EXPANSION)
         if found.is_uniform is False:
             raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
         sized = found.physical_sizes is not None
         topography = found.topography() if sized else found.topography(physical_sizes=channel.shape)
-        metres = unit if channel.unit is None else float(get_unit_conversion_factor(channel.unit, "m"))
-        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * metres
-        if not sized:
-            return heights, None
-        sides = zip(topography.physical_sizes, heights.shape, strict=True)
-        return heights, tuple(float(f"{float(size) * metres:.15g}") / n for size, n in sides)
+        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * metres(channel, unit)
+        return heights, cells(topography.physical_sizes, heights.shape, channel, unit) if sized else None
+
+    def sides(channel: Channel, unit: float | None) -> tuple[float, float] | None:
+        sizes = theirs[channel.index].physical_sizes
+        known = sizes is not None and all(isinstance(size, Real) for size in sizes)
+        return cells(sizes, channel.shape, channel, unit) if known else None
+
+    def metres(channel: Channel, unit: float | None) -> float:
+        return unit if channel.unit is None else float(get_unit_conversion_factor(channel.unit, "m"))
+
+    def cells(sizes: Any, shape: tuple[int, ...], channel: Channel, unit: float | None) -> tuple[float, ...]:
+        scale = metres(channel, unit)
+        return tuple(float(f"{float(size) * scale:.15g}") / n for size, n in zip(sizes, shape, strict=True))
 
     default = getattr(reader, "_default_channel_index", None)
     described = theirs[0].info.get("instrument", {}) if theirs else {}
     instrument = described.get("name", "") if isinstance(described, dict) else ""
     channels = tuple(_channel(found) for found in theirs)
-    return Opened(format, channels, load, default, str(instrument or ""), close=reader.close)
+    return Opened(format, channels, load, sides, default, str(instrument or ""), close=reader.close)
 
 
 def _channel(found: Any) -> Channel:

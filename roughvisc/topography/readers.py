@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,7 @@ from roughvisc.units import quantity
 
 #: No scan is wider, no spacing finer, no height further from zero. [m] Scans of 150 mm exist; absolute heights too.
 WIDEST, FINEST, FARTHEST = 1.0, 1e-11, 1e3
+_READER = threading.RLock()
 
 
 def open_scan(
@@ -71,17 +73,37 @@ def open_scan(
     UserWarning
         If the checksum in an X3P file is wrong.
     """
+    h = outline(path, heights=True, format=format, channel=channel, unit=unit, spacing=spacing)
+    finite(h, str(path))
+    return h
+
+
+def outline(
+    path: str | os.PathLike[str],
+    *,
+    heights: bool = False,
+    format: str | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    spacing: float | tuple[float, float] | None = None,
+) -> xr.DataArray:
+    """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
+
+    The heights are NaN that take no memory. A surface card is conditioned, which needs its heights: they are there.
+    """
     path = _existing(path)
     if format == "card" or (format is None and path.suffix.lower() == ".toml"):
         from roughvisc.topography.cards import open_card  # which opens scans in turn
 
+        given = {"channel": channel, "unit": unit, "spacing": spacing}
+        if set(given.values()) != {None}:
+            named = ", ".join(f"{key}=" for key, value in given.items() if value is not None)
+            raise InputError(f"{path}: found {named} beside a surface card: expected it in the card")
         return open_card(path)
     metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     sides = None if spacing is None else pair("spacing", spacing)
-    if _is_grid(path, format):
-        h, opened, chosen = _from_grid(path, channel, metres, sides)
-    else:
-        h, opened, chosen = _from_instrument(path, format, channel, metres, sides)
+    read = _from_grid if _is_grid(path, format) else _from_instrument
+    h, opened, chosen = read(path, format, channel, metres, sides, heights)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
     others = [other.name for other in opened.channels if other.index != chosen.index]
@@ -119,7 +141,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     if values.ndim != 2 or min(values.shape) < 2:
         raise InputError(f"heights has shape {values.shape}: expected (nx, ny) of at least 2 x 2")
     h = labelled(values, pair("spacing", spacing))
-    _finite(h, "heights")
+    finite(h, "heights")
     return noted(h, "from an array")
 
 
@@ -169,32 +191,45 @@ def sha256(path: Path) -> str:
 
 
 def _from_instrument(
-    path: Path, format: str | None, channel: Any, unit: float | None, sides: tuple[float, float] | None
+    path: Path,
+    format: str | None,
+    channel: Any,
+    unit: float | None,
+    sides: tuple[float, float] | None,
+    heights: bool,
 ) -> tuple[xr.DataArray, Opened, Channel]:
     with _reading(path):
         opened = instruments.open_instrument(path, format)
         try:
             chosen = _chosen(opened, channel)
             _unit_known(chosen, unit)
-            heights, found = opened.load(chosen, unit)
+            found = None if heights else sides or opened.sides(chosen, unit)
+            values = np.broadcast_to(np.nan, chosen.shape)
+            if found is None:  # a few headers do not tell: their files are read for it
+                values, found = opened.load(chosen, unit)
         finally:
             opened.close()
         if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
             raise InputError("it states no size: pass spacing=(dx, dy) [m]")
-        h = labelled(heights, sides or found)
+        h = labelled(values, sides or found)
     for complaint in opened.complaints:
-        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=3)
+        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=4)
     return h, opened, chosen
 
 
 def _from_grid(
-    path: Path, channel: Any, unit: float | None, sides: tuple[float, float] | None
+    path: Path,
+    format: str | None,
+    channel: Any,
+    unit: float | None,
+    sides: tuple[float, float] | None,
+    heights: bool,
 ) -> tuple[xr.DataArray, Opened, Channel]:
     with _reading(path):
         opened = Opened("nc", gridfiles.grid_channels(path), load=lambda *_: None)
         chosen = _chosen(opened, channel)
         _unit_known(chosen, unit)
-        h = gridfiles.open_grid(path, chosen, unit, sides)
+        h = gridfiles.open_grid(path, chosen, unit, sides, heights)
         return checked(h, "grid"), opened, chosen
 
 
@@ -238,17 +273,22 @@ def _existing(path: Any) -> Path:
 
 
 def _is_grid(path: Path, format: str | None) -> bool:
-    return format == "nc" or (
-        format is None and path.suffix.lower().removeprefix(".") in instruments.OWN_SUFFIXES["nc"]
-    )
+    suffix = path.suffix.lower().removeprefix(".")
+    if format is None and suffix == "h5":  # a grid written by way of HDF5, or an instrument's
+        with _reading(path):
+            return gridfiles.is_labelled(path)
+    return format == "nc" or (format is None and suffix in instruments.OWN_SUFFIXES["nc"])
 
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Name the file in every error, and keep the libraries' warnings to ourselves."""
+    """Name the file in every error, and keep the libraries' warnings to ourselves.
+
+    One reader at a time in a process: netCDF is not safe in threads, nor are the filters of warnings.
+    """
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty")
-    with warnings.catch_warnings():
+    with _READER, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             yield
@@ -270,10 +310,10 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
                 f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
                 f"(at most {WIDEST:g} m, at least {FINEST:g} m): pass spacing=(dx, dy) [m]"
             )
-    _finite(h, str(path))
 
 
-def _finite(h: xr.DataArray, source: str) -> None:
+def finite(h: xr.DataArray, source: str) -> None:
+    """Refuse heights that are all missing, or that are numbers standing for missing points."""
     values = h.values
     if np.isnan(values).all():
         raise InputError(f"{source}: all {h.size} points are missing: expected heights")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,9 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.views.axes import unit_for
+
+if TYPE_CHECKING:
+    from roughvisc.study.task import Outcome
 
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
@@ -85,8 +88,129 @@ def result_table(dataset: xr.Dataset) -> Group:
     return _two_columns(rows, dataset.attrs.get("title"))
 
 
-def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
-    """What is in a scan: its size, what is missing, how rough it is.
+def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        One a distinct case.
+    asked : int
+        Number of cases, those alike counted each.
+    title : str
+        Of the study.
+    """
+    kinds = [outcome.kind for outcome in outcomes]
+    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
+    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
+    alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
+        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
+    for name, label in (("residual", "Accuracy: worst residual"), ("time_error", "Accuracy: worst time error")):
+        if entries:
+            rows.append((label, _number(np.concatenate([entry.histories[name] for entry in entries]))))
+    if spent:
+        rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
+    return _two_columns(rows, title)
+
+
+def plan_tables(costs: xr.Dataset) -> Group:
+    """What a study will model and what it will cost.
+
+    Parameters
+    ----------
+    costs : xarray.Dataset
+        Of :func:`roughvisc.plan`.
+    """
+    total, attrs = costs.sizes["case"], costs.attrs
+    varied = [str(name) for name in costs.coords if name != "case_key"]
+    whole = [
+        ("Cases", f"{total}, {attrs['processes']} side by side"),
+        *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
+        ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
+        ("Steps a case", _span(costs["steps"], "")),
+        ("Convolutions a case", _span(costs["convolutions"], "")),
+        ("Wall time a case", _span(costs["wall_time"], "s")),
+        ("Wall time of all", f"about {readable(attrs['wall_time'], 's')}"),
+        ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
+        ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
+        ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
+    ]
+    parts: list[Any] = [_two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    if total > 1:
+        parts += [Text(), _case_table(costs, varied)]
+    return Group(*parts)
+
+
+#: What is modelled, shown once if it is the same in all cases.
+_MODELLED = {
+    "boundary": "Boundary",
+    "memory_model": "Memory of the material",
+    "scheme": "Time",
+    "left_out": "Left out",
+}
+#: Cases that a plan lists one by one.
+_LISTED = 20
+
+
+def _alike(costs: xr.Dataset, name: str) -> str:
+    found = list(dict.fromkeys(str(value) for value in costs[name].values if value))
+    text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
+    if name == "boundary":
+        text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"
+        text += ", the grid may grow" if costs["grows"].any() else ""
+    return text
+
+
+def _range_of(costs: xr.Dataset, text: Callable[[Any], str]) -> str:
+    found = dict.fromkeys(text(costs.isel(case=i)) for i in range(costs.sizes["case"]))
+    return ", ".join([*found][:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+
+
+def _span(values: xr.DataArray, unit: str) -> str:
+    known = values.values[np.isfinite(values.values)]
+    if not known.size:
+        return "not known"
+    ends = [f"{value:.0f}" if not unit else readable(float(value), unit) for value in (known.min(), known.max())]
+    return f"about {ends[0]}" if ends[0] == ends[1] else f"about {ends[0]} to {ends[1]}"
+
+
+def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in (*varied, "steps", "convolutions", "wall time", "memory", "disk"):
+        table.add_column(heading, justify="right")
+    for i in range(min(costs.sizes["case"], _LISTED)):
+        row = costs.isel(case=i)
+        cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
+        if row["refusal"].item():
+            table.add_row(*cells, Text("refused"))
+            continue
+        counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
+        sizes = [size(float(row[name])) for name in ("memory", "disk")]
+        table.add_row(*cells, *counts, readable(float(row["wall_time"]), "s"), *sizes)
+    if costs.sizes["case"] > _LISTED:
+        table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))
+    return table
+
+
+def size(count: float) -> str:
+    """A number of bytes as one reads it.
+
+    Examples
+    --------
+    >>> size(2131948), size(24.5e9)
+    ('2.13 MB', '24.5 GB')
+    """
+    for factor, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
+        if count >= factor:
+            return f"{count / factor:.3g} {name}"
+    return f"{count / 1e3:.3g} kB"
+
+
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
+    """What is in a scan: its channels, its size, what is missing, how rough it is.
 
     Parameters
     ----------
@@ -96,6 +220,8 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
         Of :func:`roughvisc.parameters`.
     name : str
         Of the file.
+    channels : sequence, optional
+        Of :func:`roughvisc.list_channels`; told where there are several.
     """
     sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
     counts = [height.sizes[axis] for axis in ("x", "y")]
@@ -103,8 +229,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
-        ("Channel", str(height.attrs.get("channel", ""))),
-        ("Other channels", str(height.attrs.get("other_channels", ""))),
+        ("Channel", str(height.attrs.get("channel", "")) + (", of these:" if len(channels) > 1 else "")),
+        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
+        *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),
         ("Spacing", " x ".join(readable(d, "m") for d in sides)),
@@ -112,13 +239,23 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
         ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
         ("Height range", readable(float(height.max() - height.min()), "m")),
     ]
-    for parameter, label in (("Sq", "Sq, levelled"), ("Sdq", "rms slope, levelled")):
-        rows.append((label, readable(float(measures[parameter]), str(measures[parameter].attrs["units"]))))
+    named = {**{parameter: parameter for parameter in ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdr")}, "Sdq": "rms slope"}
+    for parameter, label in named.items():
+        unit = str(measures[parameter].attrs["units"])
+        rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
     return _two_columns([row for row in rows if row[1]], name)
 
 
-def _number(values: xr.DataArray) -> str:
-    found = values.values[np.isfinite(values.values)]
+def _channel_row(channel: Any) -> tuple[str, str]:
+    kind = f"height in {channel.unit}" if channel.unit else "height, of no stated unit"
+    shape = " x ".join(map(str, channel.shape))
+    described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
+    return f"Channel {channel.index}", described
+
+
+def _number(values: Any) -> str:
+    found = np.asarray(values)
+    found = found[np.isfinite(found)]
     return f"{found.max():.2g}" if found.size else "not known"
 
 
@@ -127,5 +264,5 @@ def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for label, value in rows:
-        table.add_row(label, value)
+        table.add_row(label, Text(str(value)))  # names in files may look like markup
     return Group(Text(title or "untitled", style="bold"), table)

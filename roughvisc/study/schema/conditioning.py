@@ -34,8 +34,8 @@ class Crop(Section):
 class Outliers(Section):
     """Points masked that lie far from the median of their neighbours."""
 
-    window: whole(3) = 7
-    threshold: measured("1", above=0) = 6.0
+    window: whole(3) = 9
+    threshold: measured("1", above=0) = 8.0
 
 
 class Filter(Section):

@@ -81,3 +81,4 @@ class KeepSection(Section):
         WithJsonSchema({"type": ["integer", "array", "string"], "items": {"type": ["number", "string"]}}),
         Field(description=_TIMES_WANTED),
     ] = "all"
+    precision: measured("1", above=0, below=1) | None = None

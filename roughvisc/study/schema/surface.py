@@ -10,14 +10,15 @@ from pydantic import Field, WrapValidator, create_model
 
 from roughvisc.errors import InputError
 from roughvisc.study.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, either
-from roughvisc.study.schema.entries import FilePath, Flag, Text, measured, optional, shown, whole
+from roughvisc.study.schema.entries import FilePath, Flag, Text, measured, optional, paired, shown, whole
 from roughvisc.study.schema.section import close, nearest, refuse
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PURE = measured("1", above=0)
-_GRID = {"size": (SIZE, ...), "shape": (SHAPE, ...)}
+#: One cell along an axis is a strip; self-affine roughness needs waves both ways.
+_GRID = {"size": (SIZE, ...), "shape": (paired(whole(1), "a whole number of cells"), ...)}
 
 #: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
 RECIPES: dict[str, dict[str, Any]] = {
@@ -27,6 +28,7 @@ RECIPES: dict[str, dict[str, Any]] = {
     "wavy": {"amplitude": (LENGTH, ...), "wavelength": (LENGTH, ...), **_GRID, "waves": (whole(1, 2), 2)},
     "self_affine": {
         **_GRID,
+        "shape": (SHAPE, ...),
         "hurst": (measured("1", above=0, most=1), ...),
         "rms_slope": (optional(PURE), None),
         "rms_height": (optional(LENGTH), None),

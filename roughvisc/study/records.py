@@ -1,0 +1,202 @@
+"""Numbers on the disk, exactly, for as long as a run lasts: records of plain values and arrays, with checksums.
+
+A file of records is only ever appended to, and whoever reads it knows how many to expect: what was torn off or
+written beyond that is cut away. So it survives what kills a process, a machine or a disk's free space.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import struct
+import zlib
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.study.store import frames_together
+
+Array = NDArray[Any]
+
+# mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
+_HEAD = struct.Struct("<4sIII")
+_MARK = b"rvr1"
+_KINDS = "fiub"
+
+
+class Damaged(Exception):
+    """What is on the disk is not what was written."""
+
+
+def write_record(stream: IO[bytes], plain: Any, arrays: Mapping[str, Array]) -> int:
+    """Write plain values, as JSON knows them, and arrays; give the number of bytes.
+
+    The stream must not be buffered: a full disk is then found here and nowhere else.
+    """
+    payload = {name: np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for name, array in arrays.items()}
+    listed = [[name, a.dtype.str, a.shape, zlib.crc32(payload[name])] for name, a in arrays.items()]
+    text = json.dumps([plain, listed]).encode()  # the shortest text that gives a float back exactly
+    head = _HEAD.pack(_MARK, len(text), zlib.crc32(text), 0)[:-4]
+    written = 0
+    for part in (head + zlib.crc32(head).to_bytes(4, "little") + text, *payload.values()):
+        left = memoryview(part)
+        while len(left):
+            left = left[stream.write(left) :]
+        written += len(part)
+    return written
+
+
+def read_record(stream: IO[bytes], only: Collection[str] | None = None) -> tuple[Any, dict[str, Array]]:
+    """Plain values and arrays of the record that begins here; its end is then reached.
+
+    Parameters
+    ----------
+    stream : file
+        Open for reading.
+    only : collection of str, optional
+        Names of the arrays wanted. Default: all.
+
+    Raises
+    ------
+    Damaged
+        If it is not whole.
+    """
+    head = stream.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        raise Damaged("no record begins here")
+    mark, length, checksum, own = _HEAD.unpack(head)
+    if mark != _MARK or zlib.crc32(head[:-4]) != own:
+        raise Damaged("a record's head is damaged")
+    text = stream.read(length)
+    if len(text) < length or zlib.crc32(text) != checksum:
+        raise Damaged("a record is torn or damaged")
+    plain, listed = json.loads(text)
+    arrays = {}
+    for name, kind, shape, checksum in listed:
+        dtype = np.dtype(kind)
+        if dtype.kind not in _KINDS:
+            raise Damaged(f"a record holds {kind}")
+        size = math.prod(shape) * dtype.itemsize
+        if only is not None and name not in only:
+            stream.seek(size, os.SEEK_CUR)
+            continue
+        array = np.empty(shape, dtype)
+        left = array.reshape(-1).view(np.uint8).data
+        while len(left) and (count := stream.readinto(left)):  # type: ignore[attr-defined]
+            left = left[count:]
+        if len(left) or zlib.crc32(array.reshape(-1).view(np.uint8).data) != checksum:
+            raise Damaged("a record is torn or damaged")
+        arrays[name] = array
+    return plain, arrays
+
+
+class RowStore(Protocol):
+    """Where the rows of a run are kept."""
+
+    plain: list[dict[str, Any]]
+
+    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Take up a row: plain values and arrays."""
+        ...
+
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
+        ...
+
+    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
+        """Array (time, x, y) of what ``frame`` gives for each row."""
+        ...
+
+
+class RowsInMemory:
+    """Rows of a run that leaves no file."""
+
+    def __init__(self) -> None:
+        self.plain: list[dict[str, Any]] = []
+        self._arrays: list[Mapping[str, Array]] = []
+
+    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Take up a row."""
+        self.plain.append(plain)
+        self._arrays.append(arrays)
+
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
+        return self._arrays[row]
+
+    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Array:
+        """All frames."""
+        return np.array([frame(row) for row in range(len(self.plain))])
+
+
+class RowFile:
+    """Rows of a run in a file: in memory are their plain values only.
+
+    Parameters
+    ----------
+    path : path
+        Opened as it is; say by :meth:`keep_first` how much of it counts.
+    check : callable
+        Called before anything is written.
+    """
+
+    def __init__(self, path: Path, check: Callable[[], None]) -> None:
+        self._check = check
+        self.plain: list[dict[str, Any]] = []
+        self._begins = [0]
+        self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+
+    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Take up a row; if that fails it is as if it had not been tried."""
+        self._check()
+        self._stream.seek(self._begins[-1])
+        size = write_record(self._stream, plain, arrays)
+        self._begins.append(self._begins[-1] + size)
+        self.plain.append(plain)
+
+    def keep_first(self, rows: int) -> bool:
+        """Cut away all but the first rows; whether these are there and whole. If not, nothing is cut."""
+        plain, begins = [], [0]
+        self._stream.seek(0)
+        try:
+            for _ in range(rows):
+                plain.append(read_record(self._stream)[0])
+                begins.append(self._stream.tell())
+        except Damaged:
+            return False
+        self._check()
+        self._stream.truncate(begins[-1])
+        self.plain, self._begins = plain, begins
+        return True
+
+    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
+        """Arrays of a row, those of these names at least."""
+        self._stream.seek(self._begins[row])
+        return read_record(self._stream, names)[1]
+
+    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
+        """All frames, read when they are asked for, as many at a time as lie in one chunk of the result's file."""
+        import dask.array as da
+
+        rows = len(self.plain)
+        together = frames_together((rows, *shape))
+        heights = [min(together, rows - first) for first in range(0, rows, together)]
+
+        def block(block_info: Any) -> Array:
+            first, last = block_info[None]["array-location"][0]
+            return np.stack([frame(row) for row in range(first, last)])
+
+        name = f"rows-{id(self)}-{id(frame)}"
+        return da.map_blocks(block, chunks=(tuple(heights), *((n,) for n in shape)), dtype=float, name=name)
+
+    def sync(self) -> None:
+        """Have all rows on the disk."""
+        os.fsync(self._stream.fileno())
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()

@@ -1,0 +1,48 @@
+"""The accessor ``h.roughvisc``: conditioning and numbers of a height grid as methods, so that steps can be chained.
+
+``h.roughvisc.level().roughvisc.fill()`` is ``rv.fill(rv.level(h))``. Registering it imports nothing but xarray.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import xarray as xr
+
+#: method -> module of the function that it is
+METHODS = {
+    name: f"roughvisc.topography.{module}"
+    for module, names in {
+        "conditioning": "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror",
+        "parameters": "parameters psd",
+        "fitting": "fit_self_affine",
+    }.items()
+    for name in names.split()
+}
+
+
+@xr.register_dataarray_accessor("roughvisc")
+class HeightAccessor:
+    """Steps of conditioning and numbers of this height grid; each is the function of that name with the grid given.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Height over (x, y). [m]
+    """
+
+    def __init__(self, height: xr.DataArray) -> None:
+        self._height = height
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in METHODS:
+            raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(METHODS)}")
+        function = getattr(import_module(METHODS[name]), name)
+        method = partial(function, self._height)
+        method.__doc__ = function.__doc__
+        return method
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *METHODS]

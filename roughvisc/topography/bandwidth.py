@@ -1,0 +1,188 @@
+"""Bandwidth of scans: the form taken off, the waves that a filter passes, the cells that they are seen on."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+import scipy.fft
+import scipy.sparse
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import checked, counts, like, noted, number, spacing, valid_values, with_coordinates
+
+
+def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
+    """Height less its least-squares polynomial over the points present.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    order : {0, 1, 2, 3}, default 1
+        Total degree: mean, plane, quadratic, cubic.
+
+    Returns
+    -------
+    xarray.DataArray
+        Levelled height, of zero mean. [m]
+
+    Raises
+    ------
+    InputError
+        If the order is none of these, or the points present do not determine the polynomial.
+    """
+    h = checked(h, "level")
+    if order not in (0, 1, 2, 3) or isinstance(order, bool):
+        raise InputError(f"level: order is {order!r}: expected 0 (mean), 1 (plane), 2 or 3")
+    valid_values(h, "level")
+    heights = h.values - np.nanmean(h.values)  # absolute heights of instruments would cost digits
+    for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
+        heights = heights - _polynomial(heights, order)
+    return noted(like(h, heights), f"levelled: polynomial of order {order} removed")
+
+
+def gaussian_filter(
+    h: xr.DataArray, cutoff: float, keep: Literal["long", "short"] = "long", periodic: bool = False
+) -> xr.DataArray:
+    r"""Areal Gaussian filter by normalised convolution.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    cutoff : float
+        Wavelength of which half the amplitude passes; at least three cells. [m]
+    keep : {"long", "short"}, default "long"
+        "long": waves longer than the cut-off (an S-filter). "short": the rest (an L-filter, the roughness).
+    periodic : bool, default False
+        Whether the surface repeats; otherwise the weights end at its border.
+
+    Returns
+    -------
+    xarray.DataArray
+        Filtered height; what is missing stays missing and weighs nothing. [m]
+
+    Raises
+    ------
+    InputError
+        If the cut-off is less than three cells, or `keep` is neither.
+
+    Notes
+    -----
+    The weight is :math:`\exp(-\pi (r / \alpha \lambda_c)^2)` with :math:`\alpha = \sqrt{\ln 2 / \pi}`, so that waves
+    of length :math:`\lambda` pass by :math:`\exp(-\pi (\alpha \lambda_c / \lambda)^2)`: 50 % at the cut-off. Where
+    points are missing or the scan ends, the weights of the points present are scaled to a sum of one.
+
+    References
+    ----------
+    .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
+    """
+    h = checked(h, "gaussian_filter")
+    cutoff, sides = number("cutoff", cutoff, "m"), spacing(h)
+    if cutoff < 3 * max(sides):
+        raise InputError(
+            f"gaussian_filter: cutoff is {cutoff!r}: expected at least three cells, {3 * max(sides):.6g} [m]"
+        )
+    if keep not in ("long", "short"):
+        raise InputError(f"gaussian_filter: keep is {keep!r}: expected 'long' or 'short'")
+    mean = valid_values(h, "gaussian_filter").mean()
+    present = np.isfinite(h.values)
+    long = np.where(present, h.values - mean, 0.0)
+    share = present.astype(float)
+    for axis, d in enumerate(sides):
+        long, share = (_smoothed(field, axis, cutoff / d, periodic) for field in (long, share))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        long = np.where(present, long / share + mean, np.nan)
+    heights = long if keep == "long" else h.values - long
+    return noted(like(h, heights), f"Gaussian filter (ISO 16610-61), {keep} waves kept, cut-off {cutoff:.6g} m")
+
+
+def resample(h: xr.DataArray, shape: int | tuple[int, int]) -> xr.DataArray:
+    """Height on another number of cells over the same domain.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    shape : int or pair of int
+        New number of cells ``(nx, ny)``.
+
+    Returns
+    -------
+    xarray.DataArray
+        Coarser: the average over the area of each new cell, which conserves the volume; missing where less than half
+        of it is present. Finer: linear between the cell centres. [m]
+
+    Raises
+    ------
+    InputError
+        If the shape is no pair of whole numbers of at least 2.
+    """
+    h = checked(h, "resample")
+    shape = counts("shape", shape)
+    present = np.isfinite(h.values)
+    along_x, along_y = (_weights(old, new) for old, new in zip(h.shape, shape, strict=True))
+    total = along_x @ np.where(present, h.values, 0.0) @ along_y.T
+    share = along_x @ present.astype(float) @ along_y.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        heights = np.where(share >= 0.5 - 1e-12, total / share, np.nan)
+    axes = []
+    for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
+        axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
+    grid = with_coordinates(heights, *axes, h.attrs)
+    if "filled" in h.coords:
+        touched = along_x @ h["filled"].transpose("x", "y").values.astype(float) @ along_y.T > 0
+        grid = grid.assign_coords(filled=(("x", "y"), touched, h["filled"].attrs))
+    return noted(grid, f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells")
+
+
+def _polynomial(heights: np.ndarray, order: int) -> np.ndarray:
+    """Least-squares polynomial over the finite points, from moments, so that no design matrix is stored."""
+    present = np.isfinite(heights)
+    bases = [np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order) for n in heights.shape]
+    terms = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+    products = [(b[:, :, None] * b[:, None, :]).reshape(len(b), -1) for b in bases]
+    moments = (products[0].T @ present.astype(float) @ products[1]).reshape([order + 1] * 4)
+    normal = np.array([[moments[i, k, j, m] for k, m in terms] for i, j in terms])
+    right = bases[0].T @ np.where(present, heights, 0.0) @ bases[1]
+    if np.linalg.cond(normal) > 1e12:
+        raise InputError(f"level: the {present.sum()} points present do not determine a polynomial of order {order}")
+    coefficients = np.zeros((order + 1, order + 1))
+    for (i, j), c in zip(terms, np.linalg.solve(normal, [right[i, j] for i, j in terms]), strict=True):
+        coefficients[i, j] = c
+    return bases[0] @ coefficients @ bases[1].T
+
+
+def _weights(old: int, new: int) -> scipy.sparse.csr_array:
+    """Rows that sum to one: shares of overlap where coarser, linear interpolation between centres where finer."""
+    if new > old:
+        at = np.clip((np.arange(new) + 0.5) * old / new - 0.5, 0, old - 1)
+        first = np.minimum(at.astype(int), old - 2)
+        share = at - first
+        rows = np.arange(new)
+        entries = (np.r_[1 - share, share], (np.r_[rows, rows], np.r_[first, first + 1]))
+        return scipy.sparse.csr_array(entries, shape=(new, old))
+    edges = np.unique(np.r_[np.arange(old + 1) * new, np.arange(new + 1) * old])  # exact, in units of 1 / (old new)
+    middle = (edges[1:] + edges[:-1]) / 2
+    entries = (np.diff(edges) / old, ((middle // old).astype(int), (middle // new).astype(int)))
+    return scipy.sparse.csr_array(entries, shape=(new, old))
+
+
+def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:
+    """Gaussian of a cut-off in cells along one axis, without normalisation at the border."""
+    alpha = math.sqrt(math.log(2) / math.pi)
+    if periodic:
+        transmission = np.exp(-np.pi * (alpha * cutoff * scipy.fft.rfftfreq(field.shape[axis])) ** 2)
+        field_q = scipy.fft.rfft(field, axis=axis)
+        field_q *= transmission[:, None] if axis == 0 else transmission
+        return scipy.fft.irfft(field_q, field.shape[axis], axis=axis)
+    from scipy.signal import oaconvolve  # slow to import
+
+    reach = min(math.ceil(1.5 * cutoff), field.shape[axis] - 1)  # the weight has fallen to 1e-14
+    at = np.arange(-reach, reach + 1)
+    weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
+    weights /= weights.sum()
+    return oaconvolve(field, weights[:, None] if axis == 0 else weights[None], mode="same", axes=axis)

@@ -1,0 +1,186 @@
+"""Single indenters, known beyond their grid too: sphere, cone and flat punch.
+
+Heights are the analytic functions at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``. The recipe stays in the
+attributes, so that the grid can grow (:func:`grown`).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import counts, labelled, noted, number, pair, spacing, with_coordinates
+
+
+def sphere(radius: float, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
+    r"""Spherical indenter, centred, apex at height zero.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of curvature. [m]
+    size : float or pair of float
+        Sides of the domain. [m]
+    shape : int or pair of int
+        Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
+    exact : bool, default False
+        False: the paraboloid :math:`-r^2 / 2R` of Hertz theory. True: the circular cap
+        :math:`\sqrt{R^2 - r^2} - R`; cells beyond the equator are absent.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), not above zero. [m] The apex is at ``size / 2``, which lies between the cells where
+        their number is even.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+    """
+    return _indenter("sphere", {"radius": number("radius", radius, "m"), "exact": bool(exact)}, size, shape)
+
+
+def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
+    """Conical indenter of height ``-slope * r``, centred, apex at height zero.
+
+    Parameters
+    ----------
+    slope : float
+        Tangent of the angle between the flank and the plane. [-]
+    size : float or pair of float
+        Sides of the domain. [m]
+    shape : int or pair of int
+        Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), not above zero. [m]
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+    """
+    return _indenter("cone", {"slope": number("slope", slope, "-")}, size, shape)
+
+
+def flat_punch(radius: float, size: Any, shape: Any) -> xr.DataArray:
+    """Flat-ended cylindrical punch, centred: height zero inside the radius, absent (NaN) outside.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the punch. [m]
+    size : float or pair of float
+        Sides of the domain. [m]
+    shape : int or pair of int
+        Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y) with ``attrs["missing"] == "absent"``: there is no material where it is NaN. [m]
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite, or no cell centre lies within the radius.
+    """
+    return _indenter("flat_punch", {"radius": number("radius", radius, "m")}, size, shape)
+
+
+def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
+    """The same indenter on a larger grid: further cells all around, those that exist unchanged.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    factor : float, default 1.5
+        How many times larger each side becomes, at least; never less than one cell more on each side.
+
+    Returns
+    -------
+    xarray.DataArray or None
+        None if `h` is no sphere, cone or flat punch. xarray keeps attributes through arithmetic, so the recipe is
+        believed only if it reproduces the heights given.
+    """
+    try:
+        recipe = json.loads(h.attrs["recipe"])
+        evaluate, parameters = _INDENTERS[recipe["name"]], recipe["parameters"]
+        cell, centre = cell_of(recipe["size"], recipe["shape"]), [side / 2 for side in recipe["size"]]
+        axes = [h[axis].values for axis in ("x", "y")]
+        first = [round(at[0] / d - 0.5) for at, d in zip(axes, cell, strict=True)]
+        expected = evaluate(axes[0][:, None] - centre[0], axes[1] - centre[1], **parameters)
+    except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
+        return None
+    h = h.transpose("x", "y")
+    near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
+    if not np.allclose(h.values, expected, rtol=0, atol=near, equal_nan=True):
+        return None
+    margin = [max(1, math.ceil(n * (factor - 1) / 2 - 1e-6)) for n in h.shape]
+    wider = []
+    for at, d, i, m in zip(axes, cell, first, margin, strict=True):
+        there = (np.arange(i - m, i + at.size + m) + 0.5) * d
+        if np.abs(there[m:-m] - at).max() > 1e-6 * d:
+            return None
+        there[m:-m] = at
+        wider.append(there)
+    heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1], **parameters)
+    heights[margin[0] : -margin[0], margin[1] : -margin[1]] = h.values
+    larger = with_coordinates(heights, *wider, h.attrs)
+    return noted(
+        larger, f"grown from {h.sizes['x']} x {h.sizes['y']} to {larger.sizes['x']} x {larger.sizes['y']} cells"
+    )
+
+
+def _sphere(x: np.ndarray, y: np.ndarray, radius: float, exact: bool) -> np.ndarray:
+    r2 = x**2 + y**2
+    if not exact:
+        return r2 / (-2 * radius)
+    # not sqrt(R^2 - r^2) - R, which loses the digits of a shallow cap
+    cap = -r2 / (radius + np.sqrt(np.maximum(radius**2 - r2, 0)))
+    return np.where(r2 <= radius**2, cap, np.nan)
+
+
+def _cone(x: np.ndarray, y: np.ndarray, slope: float) -> np.ndarray:
+    return -slope * np.hypot(x, y)
+
+
+def _flat_punch(x: np.ndarray, y: np.ndarray, radius: float) -> np.ndarray:
+    return np.where(np.hypot(x, y) <= radius, 0.0, np.nan)
+
+
+#: Profiles that are known outside their grid too: (x, y from the centre, parameters) -> height.
+_INDENTERS = {"sphere": _sphere, "cone": _cone, "flat_punch": _flat_punch}
+
+
+def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
+    size, shape = pair("size", size), counts("shape", shape, low=1)
+    h = labelled(np.empty(shape), cell_of(size, shape), recipe_of(name, parameters, size, shape))
+    x, y = h["x"].values[:, None] - size[0] / 2, h["y"].values - size[1] / 2
+    h.values = _INDENTERS[name](x, y, **parameters)
+    absent = np.isnan(h.values)
+    if absent.all():
+        raise InputError(f"radius is {parameters['radius']!r}: expected one that holds a cell of {spacing(h)} m")
+    if absent.any():
+        h.attrs["missing"] = "absent"
+    return h
+
+
+def cell_of(size: Any, shape: Any) -> tuple[float, float]:
+    """Cell sides (dx, dy) of a domain. [m]"""
+    return size[0] / shape[0], size[1] / shape[1]
+
+
+def recipe_of(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> dict[str, str]:
+    """Attributes from which the heights can be made again."""
+    recipe = {"name": name, "parameters": parameters, "size": list(size), "shape": list(shape)}
+    return {"recipe": json.dumps(recipe), "history": f"generated: {name}"}

@@ -1,0 +1,114 @@
+"""Scans out: a height grid to netCDF, X3P or SDF, and a surface card for a file.
+
+Libraries write, as they read.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.readers import sha256
+
+#: Suffixes that :func:`save_scan` knows.
+WRITABLE = (".nc", ".x3p", ".sdf")
+
+
+def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
+    """Write heights to a file that :func:`roughvisc.open_scan` gives back.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y), NaN where missing. [m]
+    path : path
+        ``.nc`` keeps everything: coordinates, attributes and the mask of filled points. ``.x3p`` and ``.sdf`` keep
+        heights in full precision and the spacing; their grids begin at zero. X3P keeps the history as its comment.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another, or `h` is no height grid.
+    """
+    h, path = checked(h, "save_scan"), Path(path)
+    known_suffix(path)
+    cell = spacing(h)
+    if path.suffix.lower() == ".nc":
+        compressed = {"zlib": True, "complevel": 1, "shuffle": True}
+        h.rename("height").to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
+    elif path.suffix.lower() == ".x3p":
+        import x3pio
+
+        metadata = x3pio.Metadata.for_software("roughvisc", version("roughvisc"))
+        metadata.comment = str(h.attrs.get("history", "")) or None
+        x3pio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
+    else:
+        import sdfio
+
+        metadata = sdfio.Metadata(manufacturer_id="roughvisc")
+        sdfio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
+
+
+def known_suffix(path: Path) -> None:
+    """Refuse a file name that :func:`save_scan` cannot write to."""
+    if path.suffix.lower() not in WRITABLE:
+        raise InputError(f"{path}: found the suffix {path.suffix!r}: expected one of {', '.join(WRITABLE)}")
+
+
+def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any]) -> str:
+    """Surface card of a scan file, as TOML: its checksum, and how it is read; it is not conditioned yet.
+
+    Parameters
+    ----------
+    file : path
+        The scan.
+    folder : path
+        Where the card is going to be: the file is named relative to it.
+    options : mapping
+        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+
+    Raises
+    ------
+    InputError
+        If the file is a surface card itself.
+    """
+    file = Path(file)
+    if file.suffix.lower() == ".toml":
+        raise InputError(f"{file}: is a surface card already: expected a scan file")
+    lines = [f"title = {_text(file.stem)}", f"file = {_text(Path(os.path.relpath(file, folder)).as_posix())}"]
+    lines.append(f"sha256 = {_text(sha256(file))}")
+    for key in ("format", "channel", "unit", "spacing"):
+        value = options.get(key)
+        if value is not None:
+            lines.append(f"{key} = {_text(value) if isinstance(value, str) else _numbers(value)}")
+    return "\n".join(lines) + _REST
+
+
+_REST = """
+# source = "..."                            # where it comes from
+# licence = "..."                           # who may use it
+# instrument = "..."
+
+# What is done to the heights whenever the card is opened; take the # away from what you want.
+# [conditioning]
+# level = 1                                 # a plane is taken off
+# outliers = true                           # spikes become missing points, before anything is filled in
+# fill = "harmonic"                         # missing points are filled in; the mask stays in the result
+"""
+
+
+def _text(value: str) -> str:
+    """A TOML string: JSON's, but for one character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _numbers(value: Any) -> str:
+    return json.dumps([float(v) for v in value] if isinstance(value, tuple | list) else value)

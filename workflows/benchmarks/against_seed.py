@@ -1,0 +1,40 @@
+"""Against the seed paper's own algorithm: a Maxwell step load, at equal or smaller error of the pressure."""
+
+from scenes import ball_under_step_load, seconds
+
+import roughvisc as rv
+
+
+def measure(sizes=((128, 60), (128, 200), (256, 200)), repeats=5):
+    material, duration, load = rv.maxwell(1.0, 1.0), 2.0, 0.05
+    for cells, steps in sizes:
+        ball, program, error = ball_under_step_load(material, load, duration, cells)
+        settings = {"times": [duration / 2, duration], "progress": False, "fields": ("pressure",)}
+
+        def worst(ds, error=error):
+            return max(error(ds.pressure[i].values, float(t)) for i, t in enumerate(ds.time))
+
+        theirs, seed = seconds(
+            lambda b=ball, p=program, n=steps, s=settings: rv.simulate(
+                b, material, p, method="seed", time_step=duration / n, edge="accept", **s
+            ),
+            1,  # minutes: once
+        )
+        for tolerance in (3e-2, 1e-2, 3e-3, 1e-3, 3e-4):
+            fast = rv.simulate(ball, material, program, tolerance=tolerance, **settings)
+            if worst(fast) <= worst(seed):
+                break
+        ours, fast = seconds(
+            lambda b=ball, p=program, t=tolerance, s=settings: rv.simulate(b, material, p, tolerance=t, **s), repeats
+        )
+        yield {
+            "case": f"Maxwell step load, {cells}^2, seed with {steps} steps",
+            "peer": "seed paper",
+            "peer_seconds": theirs,
+            "seconds": ours,
+            "ratio": theirs / ours,
+            "peer_error": worst(seed),
+            "error": worst(fast),
+            "convolutions": int(fast.convolutions.sum()),
+            "peer_convolutions": int(seed.convolutions.sum()),
+        }
