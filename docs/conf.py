@@ -6,10 +6,18 @@ project = "roughvisc"
 author = "The roughvisc developers"
 version = release = importlib.metadata.version("roughvisc")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
+templates_path = ["_templates"]
+suppress_warnings = ["ref.footnote"]  # sources named at the end of a docstring, not in its text
 
 autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings say it, with units

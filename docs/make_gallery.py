@@ -36,9 +36,7 @@ def by_load(results):
     loads = results["program.0.load"].values
     surface = {"height": results.height} if "height" in results else {}
     drop = [name for name in results.coords if name not in ("time", "x", "y")]
-    return {
-        f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface) for i, load in enumerate(loads)
-    }
+    return {f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface) for i, load in enumerate(loads)}
 
 
 def draw(name, folder):
