@@ -1,6 +1,7 @@
 """Sphinx: ``sphinx-build -W -b html docs docs/_build``."""
 
 import importlib.metadata
+import importlib.util
 
 project = "roughvisc"
 author = "The roughvisc developers"
@@ -13,6 +14,8 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
 ]
+if importlib.util.find_spec("sphinx-mathjax-offline"):  # equations without a network, where it is installed
+    extensions.append("sphinx-mathjax-offline")
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
@@ -30,13 +33,17 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"roughvisc {version}"
 html_theme_options = {
     "show_prev_next": True,
+    "header_links_before_dropdown": 8,
     "navbar_align": "left",
     "secondary_sidebar_items": ["page-toc"],
     "logo": {"text": "roughvisc"},
     "footer_start": ["copyright"],
     "footer_end": ["sphinx-version"],
 }
-html_sidebars = {"**": ["sidebar-nav-bs"]}
+html_sidebars = {
+    "**": ["sidebar-nav-bs"],
+    **{page: [] for page in ("index", "tutorial", "gallery", "theory", "limits", "nomenclature", "changelog")},
+}
 copyright = author
 
 
