@@ -22,6 +22,7 @@ _PUBLIC = {
         ),
         "roughvisc.topography.parameters": "parameters psd",
         "roughvisc.topography.fitting": "fit_self_affine",
+        "roughvisc.topography.writers": "save_scan",
         "roughvisc.topography.synthesis": "sphere cone flat_punch wavy self_affine",
         "roughvisc.mechanics.materials": (
             "Prony PowerLaw Tabulated elastic maxwell kelvin_voigt zener from_relaxation pair "
@@ -35,6 +36,8 @@ _PUBLIC = {
         "roughvisc.study.sweep": "sweep",
         "roughvisc.study.results": "open_results",
         "roughvisc.study.plan": "plan",
+        "roughvisc.views.report": "report",
+        "roughvisc.views.handover": "to_csv deformed",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
     }.items()
     for name in names.split()

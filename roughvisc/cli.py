@@ -336,5 +336,25 @@ def plot(result: Path, out: Path | None) -> None:
                 _say(console, "Figure", figure)
 
 
+@main.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Page. [default: report.html in the folder]")
+def report(results: Path, output: Path | None) -> None:
+    """Write one self-contained page (HTML) about a result, or about all results in a folder.
+
+    What was run, the surface and its conditioning, figures, cases with accuracy and cost, and how to run them again;
+    case and time can be picked. Nothing is fetched from anywhere when the page is looked at.
+
+    \b
+    Example:
+      roughvisc report results/quickstart -o quickstart.html
+    """
+    from rich.console import Console
+
+    from roughvisc.views.report import report as write
+
+    _say(Console(), "Report", write(results, output))
+
+
 if __name__ == "__main__":
     main()

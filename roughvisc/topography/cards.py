@@ -41,13 +41,15 @@ RECIPES: dict[str, dict[str, str | None]] = {
 }
 
 
-def open_card(path: Path) -> xr.DataArray:
+def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
     """Height over (x, y) as a surface card describes it, conditioned. [m]
 
     Parameters
     ----------
     path : Path
         The card; its ``file`` is relative to the card's folder.
+    conditioned : bool
+        Whether its conditioning is done; if not, the heights are as measured or made.
 
     Returns
     -------
@@ -73,7 +75,7 @@ def open_card(path: Path) -> xr.DataArray:
         about = {key: _text(card, key) for key in _PROVENANCE if key in card}
         rest = {key: value for key, value in card.items() if key not in _PROVENANCE}
         h = _scan(rest, path.parent) if "file" in rest else generate(rest)
-        h = condition(h, steps)
+        h = condition(h, steps) if conditioned else h
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     instrument = {"instrument": card["instrument"]} if "instrument" in card else {}

@@ -1,0 +1,66 @@
+"""Sphinx: ``sphinx-build -W -b html docs docs/_build``."""
+
+import importlib.metadata
+import importlib.util
+
+project = "roughvisc"
+author = "The roughvisc developers"
+version = release = importlib.metadata.version("roughvisc")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+]
+if importlib.util.find_spec("sphinx-mathjax-offline"):  # equations without a network, where it is installed
+    extensions.append("sphinx-mathjax-offline")
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+templates_path = ["_templates"]
+suppress_warnings = ["ref.footnote"]  # sources named at the end of a docstring, not in its text
+
+autosummary_generate = True
+autodoc_typehints = "none"  # the docstrings say it, with units
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"roughvisc {version}"
+html_theme_options = {
+    "show_prev_next": True,
+    "header_links_before_dropdown": 8,
+    "navbar_align": "left",
+    "secondary_sidebar_items": ["page-toc"],
+    "logo": {"text": "roughvisc"},
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+}
+html_sidebars = {
+    "**": ["sidebar-nav-bs"],
+    **{page: [] for page in ("index", "tutorial", "gallery", "theory", "limits", "nomenclature", "changelog")},
+}
+copyright = author
+
+
+def _with_variables(app, docname, source):
+    """Put the table of the vocabulary where the page asks for it."""
+    from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+
+    if docname == "nomenclature":
+        rows = ["| variable | dimensions | unit | meaning |", "|---|---|---|---|"]
+        for name, one in VARIABLES.items():
+            meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
+            if name == "status":
+                meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
+            rows.append(f"| `{name}` | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |")
+        source[0] = source[0].replace("VARIABLES_TABLE", "\n".join(rows))
+
+
+def setup(app):
+    """Hook of Sphinx."""
+    app.connect("source-read", _with_variables)

@@ -1,0 +1,85 @@
+"""The gallery: runs every study of workflows/ and draws a figure or two of each into docs/gallery/.
+
+    python docs/make_gallery.py [STUDY ...]
+
+writes gallery.md and small PNG files; the page is written whole, figures only of the studies named (default: all).
+"""
+
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import xarray as xr
+from PIL import Image
+
+import roughvisc as rv
+
+HERE = Path(__file__).parent
+WORKFLOWS = HERE.parent / "workflows"
+#: study -> figures drawn of it: of each case's result, or of all cases
+FIGURES = {
+    "quickstart": {"maps": lambda ds: rv.plot.maps(ds, fields=["pressure"]), "history": rv.plot.history},
+    "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
+    "load_sweep": {"area": lambda results: rv.plot.area_against_load(by_load(results))},
+    "scan_to_area": {
+        "area": lambda results: rv.plot.area_against_load(
+            by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}
+        ),
+    },
+}
+SCRIPTS = {"maxwell_step": "figures/maxwell_step.png", "zener_step": "figures/zener_step.png"}
+
+
+def by_load(results):
+    """One entry a case, named by its load."""
+    loads = results["program.0.load"].values
+    surface = {"height": results.height} if "height" in results else {}
+    drop = [name for name in results.coords if name not in ("time", "x", "y")]
+    return {f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface) for i, load in enumerate(loads)}
+
+
+def draw(name, folder):
+    """Run one study and write its figures, small."""
+    study = WORKFLOWS / f"{name}.toml"
+    with tempfile.TemporaryDirectory() as results:
+        swept = "sweep" in tomllib.loads(study.read_text())
+        if swept:
+            ds = rv.sweep(study, results, workers=0, progress=False)
+        else:
+            ds = rv.run(study, results, progress=False)
+        for kind, figure in FIGURES[name].items():
+            path = folder / f"{name}-{kind}.png"
+            figure(ds).savefig(path, dpi=100)
+            ds.close()
+            with Image.open(path) as picture:
+                picture.convert("RGB").save(path, optimize=True)
+    xr.backends.file_manager.FILE_CACHE.clear()
+
+
+def page():
+    """Text of the gallery."""
+    lines = ["# Gallery", "", "Made by `docs/make_gallery.py`, which runs the studies of `workflows/`.", ""]
+    for name in FIGURES:
+        study = WORKFLOWS / f"{name}.toml"
+        text = study.read_text()
+        lines += [f"## {tomllib.loads(text)['title']}", "", "```sh", f"roughvisc run workflows/{name}.toml", "```", ""]
+        lines += [f"![{kind}](gallery/{name}-{kind}.png)\n" for kind in FIGURES[name]]
+        lines += ["<details><summary>The study</summary>", "", "```toml", text.rstrip(), "```", "", "</details>", ""]
+    for name, figure in SCRIPTS.items():
+        summary = (WORKFLOWS / f"{name}.py").read_text().split('"""')[1].strip().partition("\n")
+        lines += [f"## {summary[0].rstrip('.')}", "", "```sh", f"python workflows/{name}.py", "```", ""]
+        lines += [f"![{name}]({figure})", ""]
+    return "\n".join(lines)
+
+
+def main(names):
+    folder = HERE / "gallery"
+    folder.mkdir(exist_ok=True)
+    for name in names or FIGURES:
+        draw(name, folder)
+    (HERE / "gallery.md").write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,126 @@
+"""The documentation: its Python runs, its studies are accepted, its commands and names exist."""
+
+import inspect
+import re
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import matplotlib
+import pytest
+
+import roughvisc as rv
+from roughvisc.cli import main
+from roughvisc.study.case import read_cases
+from roughvisc.views.case_text import study_text
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(p for p in DOCS.rglob("*.md") if not {"generated", "_build"} & set(p.parts))
+_BLOCK = re.compile(r"(?P<before>[^\n]*)\n```(?P<language>\w+)\n(?P<text>.*?)\n```", re.S)
+#: What a page's part of a study is completed with.
+BASE = {
+    "surface": {"generate": "wavy", "amplitude": 1e-5, "wavelength": 5e-4, "size": 1e-3, "shape": 16},
+    "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
+    "program": [{"load": 1e-4, "over": 0.1}],
+    "solve": {"boundary": "periodic", "tolerance": 1e-2},
+    "keep": {"times": 2},
+}
+MEASURED = {
+    "creep.csv": "time [s], compliance [1/MPa]\n0.01, 0.20\n0.1, 0.31\n1, 0.55\n10, 0.82\n",
+    "relaxation.csv": "time [s], modulus [MPa]\n0.01, 3\n0.1, 2\n1, 1.5\n10, 1.2\n",
+    "dma.csv": "frequency, storage [MPa], loss [MPa]\n0.1, 1, 0.2\n1, 1.5, 0.5\n10, 3, 0.6\n100, 3.5, 0.3\n",
+}
+
+
+def named(path):
+    return str(path.relative_to(DOCS))
+
+
+def blocks(path, language):
+    """Blocks of a language that are to be tried; one is left out by a comment above it that says why."""
+    found = _BLOCK.finditer(path.read_text(encoding="utf-8"))
+    return [b["text"] for b in found if b["language"] == language and "not run:" not in b["before"]]
+
+
+@pytest.fixture
+def there(tmp_path, monkeypatch):
+    """The project's folder as a reader has it, with measured data."""
+    shutil.copytree(ROOT / "surfaces", tmp_path / "surfaces")
+    shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
+    for name, text in MEASURED.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def completed(text):
+    """A study of which the page shows a part, with the tables that it lacks."""
+    return text + "\n" + study_text({name: table for name, table in BASE.items() if name not in tomllib.loads(text)})
+
+
+@pytest.mark.parametrize("path", [p for p in PAGES if blocks(p, "toml")], ids=named)
+def test_studies__are_accepted(path, there):
+    for number, text in enumerate(blocks(path, "toml")):
+        file = there / ("workflows" if path.stem == "gallery" else ".") / f"study{number}.toml"
+        file.write_text(completed(text))
+        for case in read_cases(file):
+            case.height()
+            assert case.material().contact_compliance(1.0) > 0
+
+
+@pytest.mark.parametrize("path", [p for p in PAGES if blocks(p, "python")], ids=named)
+def test_python__runs(path, there):
+    for text in blocks(path, "toml")[:1]:
+        (there / {"tutorial": "first.toml"}.get(path.stem, "study.toml")).write_text(completed(text))
+    space = {}
+    with matplotlib.rc_context({"backend": "agg"}):
+        for text in blocks(path, "python"):
+            exec(compile(text, str(path), "exec"), space)
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
+
+
+def test_commands__exist_with_their_options():
+    tried = 0
+    for path in [*PAGES, ROOT / "README.md"]:
+        for text in blocks(path, "sh"):
+            for verb, rest in re.findall(r"roughvisc (\w+)(.*)", text):
+                command = main.commands[verb]
+                known = {o for p in command.params if isinstance(p, click.Option) for o in p.opts}
+                assert {w for w in rest.split("#")[0].split() if w.startswith("-")} <= known, (
+                    f"{path.name}: {verb}{rest}"
+                )
+                tried += 1
+    assert tried > 10
+
+
+def test_reference__names_everything_public():
+    listed = re.findall(r"^   (\w+)$", (DOCS / "reference.md").read_text(), re.M)
+    public = {name for name in rv.__all__ if name != "__version__" and not inspect.ismodule(getattr(rv, name))}
+    assert public <= set(listed)
+
+
+def test_gallery__shows_every_study_as_it_is():
+    text = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    for study in (ROOT / "workflows").glob("*.toml"):
+        assert study.read_text(encoding="utf-8").rstrip() in text, f"run docs/make_gallery.py: {study.name} has changed"
+    for picture in re.findall(r"\]\((.*?\.png)\)", text):
+        assert 0 < (DOCS / picture).stat().st_size < 400_000
+
+
+def test_gallery__is_made_by_running_a_study(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import make_gallery
+
+    make_gallery.draw("load_sweep", tmp_path)
+    assert (tmp_path / "load_sweep-area.png").stat().st_size > 5000
+    assert make_gallery.page() == (DOCS / "gallery.md").read_text(encoding="utf-8")
+
+
+def test_links__lead_somewhere():
+    for path in PAGES:
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):
+            assert (path.parent / target).exists(), f"{named(path)}: {target}"
