@@ -334,6 +334,8 @@ def _local_client(processes: int) -> Iterator[Client]:
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.scheduler.allowed-failures": 1,
         "distributed.comm.timeouts.connect": "60s",
+        # one long task a worker: nobody reads its statistical profile, and sampling takes time from it
+        "distributed.worker.profile.enabled": False,
     }
     with (
         dask.config.set(settings),

@@ -3,6 +3,7 @@
 python workflows/benchmarks/sweep_overhead.py [cases]
 """
 
+import resource
 import sys
 import tempfile
 import time
@@ -28,25 +29,30 @@ def main(count: int = 200, workers: int = CPU_COUNT, alone: int = 20) -> dict[st
     Returns
     -------
     dict
-        ``wall`` of the sweep, ``bare`` of one case that is only computed and ``case`` of one in the sweep [s];
-        ``busy``, the part of the processes' time that is spent on cases; and ``overhead``, what storing, scheduling
-        and starting add to the bare computation, which is measured on ``alone`` of the cases.
+        ``wall`` of the sweep [s]; ``bare`` and ``case``, processor time of a case that is only computed (mean of
+        ``alone``) and of one in the sweep [s]; ``busy``, the part of the processes' time that is spent on cases; and
+        ``overhead``, the processor time that starting, scheduling and storing add. Other programs spoil ``wall``.
     """
     base = Case.from_json(STUDY)
     cases = [vary(base, {"surface.seed": seed}) for seed in range(count)]
     compute(cases[0], progress=False)  # warm
-    began = time.perf_counter()
+    began = time.process_time()
     for case in cases[:alone]:
         compute(case, progress=False)
-    bare = (time.perf_counter() - began) / min(alone, count)
+    bare = (time.process_time() - began) / min(alone, count)
     with tempfile.TemporaryDirectory() as folder:
-        began = time.perf_counter()
+        began, used = time.perf_counter(), processor_time()
         outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
-        wall = time.perf_counter() - began
+        wall, used = time.perf_counter() - began, processor_time() - used
     assert all(outcome.entry for outcome in outcomes.values())
-    spent = sum(outcome.seconds for outcome in outcomes.values())
-    figures = {"wall": wall, "bare": bare, "case": spent / count}
-    return figures | {"busy": spent / wall / workers, "overhead": wall * workers / (bare * count) - 1}
+    busy = sum(outcome.seconds for outcome in outcomes.values()) / wall / workers
+    return {"wall": wall, "bare": bare, "case": used / count, "busy": busy, "overhead": used / (bare * count) - 1}
+
+
+def processor_time() -> float:
+    """Of this process and of those that it has ended. [s]"""
+    found = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in found)
 
 
 if __name__ == "__main__":
