@@ -120,6 +120,20 @@ def test_run__keeps_what_did_not_converge_and_says_so(study, monkeypatch, caplog
         assert list(ds.status.values) == [0, 1, 0]
 
 
+def test_run__rounds_the_fields_as_the_study_says(study):
+    exact = run(study, progress=False)
+    study.write_text(BALL + "precision = 1e-3\n")
+    rounded = run(study, progress=False)
+    assert rounded.attrs["case_key"] != exact.attrs["case_key"]
+    assert rounded.pressure.attrs["relative_precision"] == 1e-3
+    assert not rounded.pressure.equals(exact.pressure)
+    xr.testing.assert_allclose(rounded.pressure, exact.pressure, rtol=1e-3, atol=0)
+    xr.testing.assert_equal(rounded.approach, exact.approach)
+    study.write_text(BALL + "precision = 1\n")
+    with pytest.raises(InputError, match=r"keep\.precision: found 1: expected a number"):
+        read_study(study)
+
+
 def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):
     case = read_study(study)
     assert result_folder(case) == tmp_path / "results" / "ball"

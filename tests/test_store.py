@@ -7,7 +7,7 @@ import xarray as xr
 from sample_results import hertz_creep, rough_creep
 
 from roughvisc.errors import InputError
-from roughvisc.study.store import open_result, whole_file, write_result
+from roughvisc.study.store import open_result, round_bits, significant_bits, whole_file, write_result
 
 
 def test_write_result__gives_the_same_numbers_back(tmp_path):
@@ -15,7 +15,7 @@ def test_write_result__gives_the_same_numbers_back(tmp_path):
     path = write_result(written, tmp_path / "new" / "result.nc")
     assert [p.name for p in path.parent.iterdir()] == ["result.nc"]
     with open_result(path) as read:
-        assert read["pressure"].encoding["chunksizes"] == (1, 21, 34)
+        assert read["pressure"].encoding["chunksizes"] == (5, 21, 34)
         assert not read["pressure"]._in_memory
         xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
         assert read.attrs["title"] == written.attrs["title"]
@@ -96,3 +96,47 @@ def test_open_result__refuses_what_is_none(tmp_path):
     xr.Dataset({"rain": ("time", np.arange(3.0))}).to_netcdf(tmp_path / "weather.nc")
     with pytest.raises(InputError, match="holds no time, force, approach: expected a result of roughvisc"):
         open_result(tmp_path / "weather.nc")
+
+
+@pytest.mark.parametrize("precision", [0.3, 1e-2, 1e-4, 1e-9])
+def test_precision__is_kept_and_said(tmp_path, precision):
+    exact = rough_creep(shape=(21, 34), frames=5)
+    exact["gap"][2, 3, 4] = np.nan
+    path = write_result(exact, tmp_path / "rounded.nc", precision=precision)
+    with open_result(path) as rounded:
+        for name in ("pressure", "gap"):
+            found, true = rounded[name].values, exact[name].values
+            np.testing.assert_allclose(found, true, rtol=precision, atol=0)
+            assert not np.array_equal(found, true, equal_nan=True)
+            assert np.array_equal(found == 0, true == 0), "contact stays contact"
+            assert rounded[name].attrs["relative_precision"] == precision
+            assert "bits of the fraction" in rounded[name].attrs["quantization"]
+        xr.testing.assert_identical(rounded["force"].load().drop_attrs(), exact["force"].drop_attrs())
+        assert "relative_precision" not in rounded["height"].attrs
+    with open_result(write_result(exact, tmp_path / "exact.nc")) as kept:
+        assert "relative_precision" not in kept["gap"].attrs
+        np.testing.assert_array_equal(kept["gap"].values, exact["gap"].values)
+
+
+def test_round_bits__is_to_nearest_and_uses_all_it_may():
+    values = np.concatenate([np.geomspace(1e-300, 1e300, 4001), -np.geomspace(1e-9, 1e9, 4001)])
+    for precision in (0.1, 1e-3, 1e-4, 1e-8):
+        bits = significant_bits(precision)
+        worst = np.max(np.abs(round_bits(values, bits) / values - 1))
+        assert precision / 4 < worst <= precision
+    special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan])
+    assert round_bits(special, 3).tobytes() == special.tobytes()
+
+
+def test_field__is_compressed_where_that_pays(tmp_path):
+    noise = np.random.default_rng(1)
+    ds = hertz_creep((128, 128), 12)
+    dense = noise.uniform(1.0, 2.0, ds["gap"].shape)
+    ds["gap"].values[:] = dense
+    ds["pressure"].values[:] = np.where(dense > 1.9, dense, 0.0)
+    for precision, compressed in ((None, {"pressure"}), (1e-3, {"pressure", "gap"})):
+        path = write_result(ds, tmp_path / "r.nc", precision=precision)
+        with netCDF4.Dataset(path) as raw:
+            assert {name for name in ("pressure", "gap") if raw[name].filters()["zlib"]} == compressed
+            assert raw["gap"].chunking() == [8, 64, 64]
+    assert path.stat().st_size < 0.5 * (ds["gap"].nbytes + ds["pressure"].nbytes)

@@ -302,12 +302,14 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, monkeypatch):
     from roughvisc.study import run as run_module
 
+    press = run_module.press
+
     def stubborn(*args, **settings):
-        ds = rv.simulate(*args, **settings)
+        ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "simulate", stubborn)
+    monkeypatch.setattr(run_module, "press", stubborn)
     for _ in range(2):
         outcomes = run_cases(study()[:1], tmp_path / "out", watch=Silence(), workers=0)
         (outcome,) = outcomes.values()

@@ -180,7 +180,7 @@ class _Problem:
                 trial, face, held, residual = self.projected_gradient(pressure, total, level)
             else:
                 search = self.precondition(residual, face)
-                if last_step is not None:
+                if last_step is not None and curvature > 0:
                     changed = displacement.reshape(-1)[face] - before.reshape(-1)[face]
                     beta = float(np.sum(search * changed)) / curvature
                     if beta > 0:

@@ -18,8 +18,6 @@ from typing import IO, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.study.store import frames_together
-
 Array = NDArray[Any]
 
 # mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
@@ -179,19 +177,10 @@ class RowFile:
         return read_record(self._stream, names)[1]
 
     def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
-        """All frames, read when they are asked for, as many at a time as lie in one chunk of the result's file."""
-        import dask.array as da
+        """All frames, read when they are asked for."""
+        from xarray.core.indexing import LazilyIndexedArray
 
-        rows = len(self.plain)
-        together = frames_together((rows, *shape))
-        heights = [min(together, rows - first) for first in range(0, rows, together)]
-
-        def block(block_info: Any) -> Array:
-            first, last = block_info[None]["array-location"][0]
-            return np.stack([frame(row) for row in range(first, last)])
-
-        name = f"rows-{id(self)}-{id(frame)}"
-        return da.map_blocks(block, chunks=(tuple(heights), *((n,) for n in shape)), dtype=float, name=name)
+        return LazilyIndexedArray(_frames((len(self.plain), *shape), frame))
 
     def sync(self) -> None:
         """Have all rows on the disk."""
@@ -200,3 +189,26 @@ class RowFile:
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
+
+
+def _frames(whole: tuple[int, ...], frame: Callable[[int], Array]) -> Any:
+    """What xarray takes for an array (time, x, y) that it has not read yet."""
+    from xarray.backends import BackendArray
+    from xarray.core.indexing import IndexingSupport, explicit_indexing_adapter
+
+    class Frames(BackendArray):
+        shape, dtype = whole, np.dtype(float)
+
+        def __getitem__(self, key: Any) -> Any:
+            return explicit_indexing_adapter(key, whole, IndexingSupport.BASIC, self.read)
+
+        def read(self, key: tuple[Any, ...]) -> Any:
+            rows = np.arange(whole[0])[key[0]]
+            if rows.ndim == 0:
+                return frame(int(rows))[key[1:]]
+            read = np.empty((rows.size, *whole[1:]))
+            for place, row in zip(read, rows, strict=True):
+                place[...] = frame(int(row))
+            return read[(slice(None), *key[1:])]
+
+    return Frames()

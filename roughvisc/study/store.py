@@ -16,7 +16,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import netCDF4
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.variables import annotate
@@ -124,20 +126,21 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     zlib level 1 with shuffle, the one filter that every reader has, where it saves half the space or more.
     ``_FillValue`` is declared only where a value may be missing.
     """
-    import dask
-
     dataset = annotate(dataset)
     dataset.attrs = {"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs)
     for name in dataset.variables:
-        if precision is not None and dataset[name].dims[-3:] == ("time", "x", "y"):
-            dataset[name] = _rounded(dataset[name], precision)
         dataset[name].attrs = plain_attributes(dataset[name].attrs)
         dataset[name].encoding = {}
-    # one thread: netCDF4 is not safe with more, and inside a worker the cluster must not be asked
-    with dask.config.set(scheduler="synchronous"), whole_file(path) as temporary:
-        encoding = {str(name): _encoding(dataset[name]) for name in dataset.variables}
+    frames = [name for name, variable in dataset.data_vars.items() if variable.dims == ("time", "x", "y")]
+    rest = dataset.drop_vars(frames)
+    with whole_file(path) as temporary:
         try:
-            dataset.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+            encoding = {str(name): _encoding(rest[name]) for name in rest.variables}
+            rest.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
+            with netCDF4.Dataset(temporary, "a") as file:
+                file.set_auto_mask(False)
+                for name in frames:
+                    _write_frames(file, dataset[name], precision)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             number = errno.ENOSPC if full else errno.EIO
@@ -145,17 +148,21 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     return Path(path)
 
 
-def _rounded(variable: xr.DataArray, precision: float) -> xr.DataArray:
-    """Variable with the bits of its fraction that a precision does not need set to zero, to nearest."""
-    bits = significant_bits(precision)
-    data = variable.data
-    data = data.map_blocks(round_bits, bits, dtype=data.dtype) if variable.chunks else round_bits(data, bits)
-    rounded = variable.copy(data=data)
-    rounded.attrs |= {
-        "relative_precision": precision,
-        "quantization": f"rounded to nearest in binary, {bits} bits of the fraction kept",
-    }
-    return rounded
+def _write_frames(file: netCDF4.Dataset, field: xr.DataArray, precision: float | None) -> None:
+    """Write a field over (time, x, y) one layer of chunks after the other: no more of it need be in memory."""
+    bits = 52 if precision is None else significant_bits(precision)
+    encoding = _encoding(field, bits)
+    fill = encoding.pop("_FillValue")
+    variable = file.createVariable(
+        str(field.name), field.dtype, field.dims, fill_value=False if fill is None else fill, **encoding
+    )
+    variable.setncatts(field.attrs)
+    if precision is not None:
+        variable.relative_precision = precision
+        variable.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
+    together = _CHUNK[0]
+    for first in range(0, field.sizes["time"], together):
+        variable[first : first + together] = round_bits(field[first : first + together].values, bits)
 
 
 def significant_bits(precision: float) -> int:
@@ -163,9 +170,8 @@ def significant_bits(precision: float) -> int:
     return min(max(math.ceil(-math.log2(precision)) - 1, 0), 52)
 
 
-def round_bits(values: Any, bits: int) -> Any:
+def round_bits(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
     """Doubles with that many bits of their fraction, rounded to nearest; zeros and missing values stay."""
-    values = np.asarray(values, dtype=float)
     dropped = 52 - bits
     if dropped == 0:
         return values
@@ -174,23 +180,25 @@ def round_bits(values: Any, bits: int) -> Any:
     return np.where(np.isfinite(values), whole.view(float), values)
 
 
-def _encoding(variable: xr.DataArray) -> dict[str, Any]:
+def _encoding(variable: xr.DataArray, bits: int = 52) -> dict[str, Any]:
     encoding: dict[str, Any] = {"_FillValue": None}
     if variable.dtype.kind == "f" and variable.name in MAY_BE_MISSING:
         encoding["_FillValue"] = variable.dtype.type(np.nan)
     if variable.ndim and variable.size:
         encoding["chunksizes"] = _chunks(variable.shape)
-        if _compresses(variable):
+        if _compresses(variable, bits):
             encoding |= {"zlib": True, "complevel": 1, "shuffle": True}
     return encoding
 
 
-def _compresses(variable: xr.DataArray) -> bool:
+def _compresses(variable: xr.DataArray, bits: int) -> bool:
     """Whether compression saves enough to be worth its time, tried on some rows of the middle frame."""
     if variable.nbytes < _SMALL:
         return True
     middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
     sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 64)].values)
+    if bits < 52:
+        sample = round_bits(sample, bits)
     shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T.tobytes()
     return len(zlib.compress(shuffled, 1)) < _WORTHWHILE * len(shuffled)
 
@@ -198,11 +206,6 @@ def _compresses(variable: xr.DataArray) -> bool:
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
     longest = _CHUNK[-len(shape) :] if len(shape) == 3 else (_LONGEST_CHUNK,) * len(shape)
     return tuple(min(n, most) for n, most in zip(shape, longest, strict=True))
-
-
-def frames_together(shape: tuple[int, ...]) -> int:
-    """How many frames of (time, x, y) lie in one chunk of the file."""
-    return _chunks(shape)[0]
 
 
 def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:

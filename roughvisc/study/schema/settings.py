@@ -81,4 +81,5 @@ class KeepSection(Section):
         WithJsonSchema({"type": ["integer", "array", "string"], "items": {"type": ["number", "string"]}}),
         Field(description=_TIMES_WANTED),
     ] = "all"
+    # relative, of the fields in the file; none: exact
     precision: measured("1", above=0, below=1) | None = None
