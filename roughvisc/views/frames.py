@@ -213,14 +213,16 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
 
 
 def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
-    """Each run of cells in contact as one line, half a cell longer at both ends."""
+    """Each run of cells in contact as one line; a lone cell as one of its width."""
     half = (x[1] - x[0]) / 2 if len(x) > 1 else 1.0
     borders = np.flatnonzero(np.diff(np.pad(touching.astype(int), 1)))
     parts = []
     for first, past in borders.reshape(-1, 2):
-        inner = slice(first, past, max(1, (past - first) // 60))
-        ends = [x[first] - half, *x[inner], x[past - 1] + half], [y[first], *y[inner], y[past - 1]]
-        parts.append(_path(np.array(ends[0]), np.array(ends[1])))
+        if past - first == 1:
+            parts.append(_path(x[first] + half * np.array([-1, 1]), y[[first, first]]))
+        else:
+            inner = np.unique([*range(first, past, max(1, (past - first) // 60)), past - 1])
+            parts.append(_path(x[inner], y[inner]))
     return "".join(parts)
 
 
