@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace import transform_engine
 from roughvisc.study.schema import Study
 from roughvisc.study.schema.surface import FileSurface, SurfaceSection
 from roughvisc.topography.readers import sha256
@@ -46,7 +47,7 @@ def case_key(settings: Study) -> str:
     ]
     stated["material"] = settings.material.content()
     stated["surface"] = surface_content(settings.surface)
-    stated["numerics"] = NUMERICS_REVISION
+    stated["numerics"] = [NUMERICS_REVISION, transform_engine().split()[0]]
     return _digest(stated)[:16]
 
 
