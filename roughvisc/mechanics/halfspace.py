@@ -21,6 +21,8 @@ Boundary = Literal["free", "periodic"]
 
 # Columns transformed together: the block and its transform stay in the cache (measured at 128 to 1024 squared).
 _BLOCK = 32
+# Cells from which several threads are faster than one (measured: slower at 512 squared, faster at 1024 squared).
+_THREADED = 1024**2
 
 
 class HalfSpace:
@@ -35,7 +37,8 @@ class HalfSpace:
     boundary : {"free", "periodic"}
         Free space (nothing outside the grid is loaded) or one period of an endless surface.
     workers : int, optional
-        Threads of the transforms; None: as ``scipy.fft.set_workers`` has it, one where nobody has set it.
+        Threads of the transforms on large grids; None: as ``scipy.fft.set_workers`` has it, one where nobody has
+        set it. Smaller grids are slower with several, and get one.
     """
 
     def __init__(
@@ -50,7 +53,7 @@ class HalfSpace:
         self.shape = shape
         self.spacing = spacing
         self.boundary = boundary
-        self.workers = workers
+        self.workers = workers if shape[0] * shape[1] >= _THREADED else 1
         if boundary == "free":
             self._padded = tuple(2 * fft.next_fast_len(n, real=True) for n in shape)
             symbol = free_space_symbol((self._padded[0], self._padded[1]), spacing)
