@@ -519,15 +519,15 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         retry_is_vain = error > 0.93 * state.rejected_error
         if not fixed and error > limit and length > _SMALLEST_STEP * segment.duration and not retry_is_vain:
             shrink = min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
-            spent = (state.iterations, state.convolutions)
+            start = state
             if held is not None:  # roll back both
-                length, held, state = held.state.now.time - base.now.time, None, base
+                length, held, start = held.state.now.time - base.now.time, None, base
             state = replace(
-                state,
+                start,
                 suggestion=shrink * length,
                 rejected_error=error,
-                iterations=spent[0],
-                convolutions=spent[1],
+                iterations=state.iterations,
+                convolutions=state.convolutions,
             )
             continue
         unresolved = state.unresolved
@@ -673,7 +673,6 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
     if share == 0:
         return 0.0
     last = state.now.time - state.before.time
-    constant = trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
     ahead = max(1.0, _growth(state, segment, trial.instant.time, event))
     soft = 1.0
     if segment.control == "load" and scene.compliance(0.0) < 0.01 * scene.compliance(trial.length):
@@ -693,7 +692,12 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
     fading = _fading(scene, state, trial, event)
     if segment.control == "approach":
         scalar_error *= fading
-    return share * constant * max(fading * pressure_error, scalar_error)
+    return share * _error_constant(trial, last) * max(fading * pressure_error, scalar_error)
+
+
+def _error_constant(trial: _Trial, last: float) -> float:
+    """Error of a step's rule over the step's difference to the extrapolation; ``last`` is the step before. [s]"""
+    return trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
 
 
 def _fading(scene: Scene, state: State, trial: _Trial, event: float) -> float:
@@ -729,7 +733,7 @@ def _suggestion(scene: Scene, trial: _Trial, error: float, state: State) -> floa
     if error == 0:
         return 2 * trial.length
     last = state.now.time - state.before.time
-    constant = trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
+    constant = _error_constant(trial, last)
     curvature = error / (constant * trial.length * (trial.length + last))
     target = _SHARE * scene.tolerance / curvature
     length = min(math.sqrt(4.2 * target), 2 * trial.length, scene.program.duration)
