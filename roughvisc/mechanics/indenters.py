@@ -47,10 +47,6 @@ class Indenter(Protocol):
         """Pressure over contact modulus of an elastic contact; zero outside. [-]"""
         ...
 
-    def scaled_slope(self, radius: ArrayLike) -> Array:
-        """Derivative ``g'(x)`` of the one-dimensional profile. [-]"""
-        ...
-
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """Surface displacement of an elastic contact, inside and outside. [m]"""
         ...
@@ -100,10 +96,6 @@ class Paraboloid:
         """``2 sqrt(a^2 - r^2) / (pi R)``. [-]"""
         r, a = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
         return np.asarray(2 / (np.pi * self.radius) * np.sqrt(np.maximum((a - r) * (a + r), 0.0)))
-
-    def scaled_slope(self, radius: ArrayLike) -> Array:
-        """``2 x / R``. [-]"""
-        return np.asarray(2 * np.asarray(radius, dtype=float) / self.radius)
 
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``(2 a^2 - r^2) / (2 R)`` inside; ``((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)) / (pi R)`` outside. [m]"""
@@ -157,10 +149,6 @@ class Cone:
             # arcosh(1 + e) without the rounding of 1 + e, which would be the whole value near the edge
             excess = np.where(r < radius, (radius - r) / r, 0.0)
             return np.asarray(self.slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
-
-    def scaled_slope(self, radius: ArrayLike) -> Array:
-        """``pi m / 2``. [-]"""
-        return np.full(np.shape(radius), np.pi / 2 * self.slope)
 
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``m (pi a / 2 - r)`` inside; ``m (a asin(a/r) - r + sqrt(r^2 - a^2))`` outside. [m]"""
