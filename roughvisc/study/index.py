@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
-from roughvisc.study.store import whole_file
+from roughvisc.study.store import NETCDF, whole_file
 from roughvisc.variables import VARIABLES
 
 log = logging.getLogger("roughvisc")

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import netCDF4
 import numpy as np
 from numpy.typing import NDArray
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
 from roughvisc.variables import annotate
@@ -38,7 +39,8 @@ _LONGEST_CHUNK = 1024
 #: 34 ms a frame, a sixth of the time of a step, and takes 1.3 ms as it is; a pressure on 8 % of the cells to 0.08 in
 #: 8 ms; a gap rounded to 1e-4 to 0.23 in 15 ms.
 _WORTHWHILE = 0.5
-_SMALL = 1 << 20  # compressed in any case [bytes]
+_SMALL = 1 << 16  # compressed in any case [bytes]
+_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
 #: Free space below which a write that failed is put down to a full disk. [bytes]
 _NEARLY_FULL = 1 << 20
 
@@ -124,23 +126,19 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Notes
     -----
     zlib level 1 with shuffle, the one filter that every reader has, where it saves half the space or more.
-    ``_FillValue`` is declared only where a value may be missing.
+    ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
+    would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
     dataset = annotate(dataset)
-    dataset.attrs = {"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs)
-    for name in dataset.variables:
-        dataset[name].attrs = plain_attributes(dataset[name].attrs)
-        dataset[name].encoding = {}
-    frames = [name for name, variable in dataset.data_vars.items() if variable.dims == ("time", "x", "y")]
-    rest = dataset.drop_vars(frames)
     with whole_file(path) as temporary:
         try:
-            encoding = {str(name): _encoding(rest[name]) for name in rest.variables}
-            rest.to_netcdf(temporary, format="NETCDF4", engine="netcdf4", encoding=encoding)
-            with netCDF4.Dataset(temporary, "a") as file:
-                file.set_auto_mask(False)
-                for name in frames:
-                    _write_frames(file, dataset[name], precision)
+            with _new_file(temporary) as file:
+                with NETCDF:
+                    file.setncatts({"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs))
+                    for dimension, size in dataset.sizes.items():
+                        file.createDimension(str(dimension), size)
+                for name in dataset.variables:
+                    _write(file, dataset[name], precision)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             number = errno.ENOSPC if full else errno.EIO
@@ -148,21 +146,34 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     return Path(path)
 
 
-def _write_frames(file: netCDF4.Dataset, field: xr.DataArray, precision: float | None) -> None:
-    """Write a field over (time, x, y) one layer of chunks after the other: no more of it need be in memory."""
-    bits = 52 if precision is None else significant_bits(precision)
-    encoding = _encoding(field, bits)
-    fill = encoding.pop("_FillValue")
-    variable = file.createVariable(
-        str(field.name), field.dtype, field.dims, fill_value=False if fill is None else fill, **encoding
-    )
-    variable.setncatts(field.attrs)
-    if precision is not None:
-        variable.relative_precision = precision
-        variable.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
-    together = _CHUNK[0]
-    for first in range(0, field.sizes["time"], together):
-        variable[first : first + together] = round_bits(field[first : first + together].values, bits)
+@contextmanager
+def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
+    with NETCDF:
+        file = netCDF4.Dataset(path, "w", format="NETCDF4")
+    try:
+        yield file
+    finally:
+        with NETCDF:
+            file.close()
+
+
+def _write(file: netCDF4.Dataset, variable: xr.DataArray, precision: float | None) -> None:
+    """Write a variable; a field over (time, x, y) one layer of chunks after the other: no more of it is in memory."""
+    field = variable.dims == ("time", "x", "y")
+    bits = 52 if precision is None or not field else significant_bits(precision)
+    encoding = _encoding(variable, bits)
+    with NETCDF:
+        written = file.createVariable(str(variable.name), variable.dtype, variable.dims, **encoding)
+        written.set_auto_maskandscale(False)
+        written.setncatts(plain_attributes(variable.attrs))
+        if field and precision is not None:
+            written.relative_precision = precision
+            written.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
+    layers = [slice(first, first + _CHUNK[0]) for first in range(0, len(variable), _CHUNK[0])] if field else [...]
+    for layer in layers:
+        values = round_bits(variable[layer].values, bits)  # outside the lock, which reading it may need
+        with NETCDF:
+            written[layer] = values
 
 
 def significant_bits(precision: float) -> int:
@@ -181,10 +192,10 @@ def round_bits(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
 
 
 def _encoding(variable: xr.DataArray, bits: int = 52) -> dict[str, Any]:
-    encoding: dict[str, Any] = {"_FillValue": None}
+    encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and variable.name in MAY_BE_MISSING:
-        encoding["_FillValue"] = variable.dtype.type(np.nan)
-    if variable.ndim and variable.size:
+        encoding["fill_value"] = variable.dtype.type(np.nan)
+    if variable.nbytes > _TINY:
         encoding["chunksizes"] = _chunks(variable.shape)
         if _compresses(variable, bits):
             encoding |= {"zlib": True, "complevel": 1, "shuffle": True}
