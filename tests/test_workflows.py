@@ -46,6 +46,10 @@ def test_benchmarks__run_small(tmp_path, monkeypatch):
         assert row["error"] <= row["peer_error"]
     for row in tables["scaling"]:
         assert 0 < row["transform_share"] < 1
+    swept, *stored = tables["sweep"]
+    assert 0 < swept["busy"] <= 1
+    assert len(stored) == 2
+    assert all(0 < row["storing"] < 1 for row in stored)
 
 
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):

@@ -31,8 +31,10 @@ _MARCH, _CALIBRATION = 3.0, 2.0
 _TIMED = 1024**2
 #: What the interpreter and the libraries take, measured. [bytes]
 _PROCESS = 230e6
-#: Bytes on disk for a byte of a field that is dense; seconds to compress a byte of a sparse and of a dense one [M].
-_DENSE, _WRITE_SPARSE, _WRITE_DENSE = 0.9, 4e-9, 18e-9
+#: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
+_WRITE, _ROUNDED = 3e-9, 0.5
+#: Frames of a field that are in memory at once while the file is written.
+_FRAMES_TOGETHER = 8
 
 
 @dataclass(frozen=True)
@@ -193,13 +195,8 @@ def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution:
     modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
     stepping = found.steps * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
-    dense = sum(name != "pressure" for name in case.settings.keep.fields)
-    sparse = len(case.settings.keep.fields) - dense
-    return (
-        found.convolutions * convolution
-        + stepping
-        + found.rows * cells * 8 * (sparse * _WRITE_SPARSE + dense * _WRITE_DENSE)
-    )
+    writing = found.rows * cells * 8 * len(case.settings.keep.fields) * _WRITE
+    return found.convolutions * convolution + stepping + writing
 
 
 def memory(case: Case, cells: int, found: March, engine: Engine) -> float:
@@ -212,12 +209,13 @@ def memory(case: Case, cells: int, found: March, engine: Engine) -> float:
         past = (3 * (len(engine.memory.material.times) + bool(engine.memory.material.fluidity)) + 2) * field
     elif isinstance(engine.memory, History):
         past = history_bytes(found.contact * cells, found.steps)
-    kept = 2 * found.rows * len(case.settings.keep.fields) * field
+    kept = min(found.rows, _FRAMES_TOGETHER) * field
     return _PROCESS + (transforms + solver + states) * field + past + kept
 
 
 def disk(case: Case, cells: int, found: March) -> float:
-    """Size of a case's file, compressed. [bytes]"""
-    ratio = {"pressure": min(_DENSE, _DENSE * found.contact + 0.02)}
-    fields = sum(ratio.get(name, _DENSE) for name in case.settings.keep.fields)
-    return 20e3 + 8.0 * cells * (found.rows * fields + _DENSE) + found.rows * 120
+    """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
+    dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
+    pressure = found.contact if found.contact < 0.02 else dense
+    fields = sum(pressure if name == "pressure" else dense for name in case.settings.keep.fields)
+    return 20e3 + 8.0 * cells * (found.rows * fields + 1.0) + found.rows * 120

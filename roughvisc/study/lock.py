@@ -12,6 +12,7 @@ import secrets
 import socket
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,8 @@ except ImportError:  # Windows: the file's age alone
 
 #: The holder touches its file so often, and is taken for dead when it has not for so long. [s]
 BEAT, STALE = 10.0, 60.0
+#: A process that was killed lets go of its lock when the system has cleared it away: so long is waited for that. [s]
+_PATIENCE = 2.0
 
 
 class Lock:
@@ -105,19 +108,23 @@ def held(path: Path) -> Iterator[Lock]:
 
 def _opened(path: Path) -> int:
     """Descriptor of the lock's file, locked."""
+    until = time.monotonic() + _PATIENCE
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
             alone = _locked(descriptor)
             if os.path.exists(path) and os.path.samestat(os.fstat(descriptor), os.stat(path)):
                 holder = _holder(descriptor)
-                if alone is False or (holder and not _dead(path, holder, alone)):
+                if alone is False and time.monotonic() < until:
+                    time.sleep(0.05)
+                elif alone is False or (holder and not _dead(path, holder, alone)):
                     whom = f"process {holder['pid']} on {holder['host']}" if holder else "another run"
                     raise InUseError(
                         f"{path}: {whom} is at work on this case in this folder: expected one run at a time; wait for "
                         f"it, or use another folder"
                     )
-                return descriptor
+                else:
+                    return descriptor
         except FileNotFoundError:  # whoever held it has just finished
             pass
         except BaseException:

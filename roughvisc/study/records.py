@@ -11,7 +11,7 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -22,8 +22,9 @@ Array = NDArray[Any]
 
 # mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
 _HEAD = struct.Struct("<4sIII")
-_MARK = b"rvr1"
+_MARK = b"rvr2"
 _KINDS = "fiub"
+_SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
 
 
 class Damaged(Exception):
@@ -35,8 +36,8 @@ def write_record(stream: IO[bytes], plain: Any, arrays: Mapping[str, Array]) -> 
 
     The stream must not be buffered: a full disk is then found here and nowhere else.
     """
-    payload = {name: np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for name, array in arrays.items()}
-    listed = [[name, a.dtype.str, a.shape, zlib.crc32(payload[name])] for name, a in arrays.items()]
+    payload = {name: _packed(array) for name, array in arrays.items()}
+    listed = [[name, a.dtype.str, a.shape, len(payload[name]), zlib.crc32(payload[name])] for name, a in arrays.items()]
     text = json.dumps([plain, listed]).encode()  # the shortest text that gives a float back exactly
     head = _HEAD.pack(_MARK, len(text), zlib.crc32(text), 0)[:-4]
     written = 0
@@ -74,22 +75,42 @@ def read_record(stream: IO[bytes], only: Collection[str] | None = None) -> tuple
         raise Damaged("a record is torn or damaged")
     plain, listed = json.loads(text)
     arrays = {}
-    for name, kind, shape, checksum in listed:
+    for name, kind, shape, size, checksum in listed:
         dtype = np.dtype(kind)
         if dtype.kind not in _KINDS:
             raise Damaged(f"a record holds {kind}")
-        size = math.prod(shape) * dtype.itemsize
         if only is not None and name not in only:
             stream.seek(size, os.SEEK_CUR)
             continue
-        array = np.empty(shape, dtype)
-        left = array.reshape(-1).view(np.uint8).data
+        packed = np.empty(size, np.uint8)
+        left = packed.data
         while len(left) and (count := stream.readinto(left)):  # type: ignore[attr-defined]
             left = left[count:]
-        if len(left) or zlib.crc32(array.reshape(-1).view(np.uint8).data) != checksum:
+        if len(left) or zlib.crc32(packed.data) != checksum:
             raise Damaged("a record is torn or damaged")
-        arrays[name] = array
+        arrays[name] = _unpacked(packed, shape, dtype)
     return plain, arrays
+
+
+def _packed(array: Array) -> memoryview:
+    """The bytes of an array; of a field of doubles that is mostly zero those that are not, after a bit for each."""
+    flat = np.ascontiguousarray(array).reshape(-1)
+    if array.dtype == np.float64 and array.size >= _SPARSE_SIZE:
+        there = flat.view(np.int64) != 0  # bits: a negative zero is kept
+        if 4 * np.count_nonzero(there) < array.size:
+            return np.concatenate([np.packbits(there), flat[there].view(np.uint8)]).data
+    return flat.view(np.uint8).data
+
+
+def _unpacked(packed: NDArray[np.uint8], shape: Sequence[int], dtype: np.dtype[Any]) -> Array:
+    """The array whose bytes these are: they are fewer than its size where it is mostly zero."""
+    size = math.prod(shape)
+    if packed.size == size * dtype.itemsize:
+        return packed.view(dtype).reshape(shape)
+    bits = (size + 7) // 8
+    flat = np.zeros(size, dtype)
+    flat[np.unpackbits(packed[:bits], count=size).view(bool)] = np.frombuffer(packed[bits:].tobytes(), dtype)
+    return flat.reshape(shape)
 
 
 class RowStore(Protocol):

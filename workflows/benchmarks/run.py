@@ -1,6 +1,6 @@
 """All benchmarks: prints the tables and writes them as NetCDF.
 
-    python workflows/benchmarks/run.py [--small] [--only seed,tamaas,scaling] [--out benchmarks.nc]
+    python workflows/benchmarks/run.py [--small] [--only seed,tamaas,scaling,sweep] [--out benchmarks.nc]
 
 Every figure is a ratio or a count measured in one run, at equal or smaller measured error.
 """
@@ -16,13 +16,20 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import against_seed
 import against_tamaas
 import scaling
+import sweep_overhead
 
 SMALL = {
     "seed": {"sizes": ((32, 10),), "repeats": 1},
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
     "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96},
+    "sweep": {"count": 3, "workers": 1, "alone": 1, "cells": 32},
 }
-PARTS = {"seed": against_seed.measure, "tamaas": against_tamaas.measure, "scaling": scaling.measure}
+PARTS = {
+    "seed": against_seed.measure,
+    "tamaas": against_tamaas.measure,
+    "scaling": scaling.measure,
+    "sweep": sweep_overhead.measure,
+}
 
 
 def main(parts=tuple(PARTS), small=False, out=None):

@@ -1,60 +1,105 @@
-"""What a sweep costs beside its computing: 200 cases of 64 x 64 cells on all cores.
+"""What a sweep costs beside its computing, and what keeping every step costs: processor time.
 
-python workflows/benchmarks/sweep_overhead.py [cases]
+200 cases of 64 x 64 cells on all cores, against plain processes that only compute; and cases of 512 x 512 cells of
+which every step is kept, against the same that are not stored.
 """
 
+import multiprocessing
 import resource
-import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from dask.system import CPU_COUNT
 
+from roughvisc.study import records, rows, run
 from roughvisc.study.case import Case, vary
-from roughvisc.study.run import compute
 from roughvisc.study.sweep import run_cases
 from roughvisc.study.watch import Silence
 
 STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": [1e-3, 1e-3], "shape": [64, 64],
 "hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 5e-5, "seed": 1},
 "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
-"program": [{"load": 0.02, "over": 0.05}, {"hold": 0.5}],
+"program": [{"load": 0.02, "over": 0.05}, {"hold": 0.5}, {"load": 0.0, "over": 0.05}],
 "solve": {"boundary": "periodic", "tolerance": 2e-4}, "keep": {"fields": ["pressure", "gap"], "times": 20}}"""
 
 
-def main(count: int = 200, workers: int = CPU_COUNT, alone: int = 20) -> dict[str, float]:
-    """Figures of a sweep over so many surfaces.
+def measure(count=200, workers=CPU_COUNT, alone=20, cells=512):
+    yield sweep(count, workers, alone)
+    for boundary in ("periodic", "free"):
+        yield storing(cells, boundary)
 
-    Returns
-    -------
-    dict
-        ``wall`` of the sweep [s]; ``bare`` and ``case``, processor time of a case that is only computed (mean of
-        ``alone``) and of one in the sweep [s]; ``busy``, the part of the processes' time that is spent on cases; and
-        ``overhead``, the processor time that starting, scheduling and storing add. Other programs spoil ``wall``.
+
+def sweep(count, workers, alone):
+    """Processor time that starting, scheduling and storing add, and how busy the processes are kept.
+
+    The bare time is of as many processes at once, since neighbours slow each other down.
     """
     base = Case.from_json(STUDY)
     cases = [vary(base, {"surface.seed": seed}) for seed in range(count)]
-    compute(cases[0], progress=False)  # warm
-    began = time.process_time()
-    for case in cases[:alone]:
-        compute(case, progress=False)
-    bare = (time.process_time() - began) / min(alone, count)
+    texts = [case.to_json() for case in cases[: min(alone, count)]]
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
+        bare = sum(pool.map(computing, [texts] * workers)) / workers
     with tempfile.TemporaryDirectory() as folder:
         began, used = time.perf_counter(), processor_time()
         outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
         wall, used = time.perf_counter() - began, processor_time() - used
     assert all(outcome.entry for outcome in outcomes.values())
-    busy = sum(outcome.seconds for outcome in outcomes.values()) / wall / workers
-    return {"wall": wall, "bare": bare, "case": used / count, "busy": busy, "overhead": used / (bare * count) - 1}
+    return {
+        "case": f"sweep of {count} cases of 64^2 on {workers} processes",
+        "seconds": wall,
+        "processor_per_case": used / count,
+        "overhead": used / (bare * count) - 1,
+        "busy": sum(outcome.seconds for outcome in outcomes.values()) / wall / workers,
+    }
 
 
-def processor_time() -> float:
+def computing(texts):
+    """Processor time that a case takes that is only computed. [s]"""
+    cases = [Case.from_json(text) for text in texts]
+    run.compute(cases[0], progress=False)  # warm
+    began = time.process_time()
+    for case in cases:
+        run.compute(case, progress=False)
+    return (time.process_time() - began) / len(cases)
+
+
+def storing(cells, boundary):
+    """Part of a case's processor time that keeping every step takes: rows, checkpoints and the file."""
+    base = Case.from_json(STUDY)
+    solve = {"solve.boundary": boundary, "solve.edge": "accept", "solve.tolerance": 1e-3}
+    case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 1e-5, "keep.times": "all"} | solve)
+    places = ((records.RowFile, "append"), (run, "keep"), (run.Keeper, "save"), (rows.Rows, "dataset"))
+    inside, found = [], {place: getattr(*place) for place in places}
+
+    def timed(function):
+        def call(*given, **named):
+            began = time.process_time()
+            result = function(*given, **named)
+            inside.append(time.process_time() - began)
+            return result
+
+        return call
+
+    for (owner, name), function in found.items():
+        setattr(owner, name, timed(function))
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            began = time.process_time()
+            run.run_case(case, Path(folder))
+            whole = time.process_time() - began
+    finally:
+        for (owner, name), function in found.items():
+            setattr(owner, name, function)
+    return {
+        "case": f"every step kept, {boundary}, {cells}^2",
+        "processor_per_case": whole,
+        "storing": sum(inside) / whole,
+    }
+
+
+def processor_time():
     """Of this process and of those that it has ended. [s]"""
     found = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(usage.ru_utime + usage.ru_stime for usage in found)
-
-
-if __name__ == "__main__":
-    for name, value in main(*map(int, sys.argv[1:2])).items():
-        print(f"{name:10} {value:.3g}")
