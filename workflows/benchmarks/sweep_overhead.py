@@ -69,7 +69,7 @@ def storing(cells, boundary):
     """Part of a case's processor time that keeping every step takes: rows, checkpoints and the file."""
     base = Case.from_json(STUDY)
     solve = {"solve.boundary": boundary, "solve.edge": "accept", "solve.tolerance": 1e-3}
-    case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 1e-5, "keep.times": "all"} | solve)
+    case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 5e-3 / cells, "keep.times": "all"} | solve)
     places = ((records.RowFile, "append"), (run, "keep"), (run.Keeper, "save"), (rows.Rows, "dataset"))
     inside, found = [], {place: getattr(*place) for place in places}
 
