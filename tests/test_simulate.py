@@ -6,6 +6,8 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc import closed_forms
+from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.study import scene
 from roughvisc.study.scene import kept_times
 from roughvisc.variables import FIELDS, VARIABLES, annotate
 
@@ -204,3 +206,88 @@ def test_annotate__refuses_what_is_not_declared():
         annotate(xr.Dataset({"stress": ("time", [1.0])}))
     with pytest.raises(ValueError, match="declared are"):
         annotate(xr.Dataset({"force": ("x", [1.0])}))
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the window follows the contact
+
+
+def two_hills(shape=(151, 133)):
+    """Rough hills of unequal height on a slope: the lower one is touched late, far from the first contact."""
+    rough = rv.self_affine((3e-4, 2.6e-4), shape, hurst=0.8, rms_height=1.5e-8, rolloff=1e-4, shortcut=1e-5, seed=5)
+    x, y = rough.x.values[:, None], rough.y.values
+    first = 4e-7 - ((x - 1.1e-4) ** 2 + (y - 1.2e-4) ** 2) / 2e-3
+    second = 1.5e-7 - ((x - 2.2e-4) ** 2 + (y - 1.6e-4) ** 2) / 2e-3
+    return rough.copy(data=rough.values + np.maximum(first, second)).drop_attrs()
+
+
+FOLLOWED = {
+    "loading and unloading": (
+        ZENER,
+        rv.Program().load(2e-3, over=0.5).hold(0.5).load(0, over=0.3).load(1e-3, over=0.2),
+    ),
+    "stress relaxation": (ZENER, rv.Program().approach(7e-7, over=0.2).hold(0.5).approach(1e-7, over=0.2)),
+    "soft": (rv.kelvin_voigt(1e6, 1e5), rv.Program().load(1e-3, over=0.2).hold(0.2)),
+    "direct history": (
+        rv.Tabulated(tuple(np.linspace(0, 1, 21)), tuple(1e-7 * (1 + np.linspace(0, 1, 21) ** 2))),
+        rv.Program().load(1e-3, over=0.2).hold(0.8),
+    ),
+    "jump": (rv.maxwell(1e6, 1e6), rv.Program().load(2e-3, over=0).hold(0.5)),
+}
+
+
+@pytest.fixture
+def solved_on(monkeypatch):
+    """Shapes of the grids that were solved on, in order."""
+    shapes = []
+    begin = HalfSpace.__init__
+
+    def noted(self, shape, *rest):
+        shapes.append(shape)
+        begin(self, shape, *rest)
+
+    monkeypatch.setattr(HalfSpace, "__init__", noted)
+    return shapes
+
+
+@pytest.mark.parametrize("name", FOLLOWED)
+def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
+    material, program = FOLLOWED[name]
+    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS}
+    followed = simulate(two_hills(), material, program, **settings)
+    assert len(set(solved_on)) >= 2, "the window grew"
+    assert solved_on[0][0] < 60
+    monkeypatch.setattr(scene, "_WORTH_FOLLOWING", 10**9)
+    whole = simulate(two_hills(), material, program, **settings)
+    assert solved_on[-1] == (151, 133)
+    force, depth = float(whole.force.max()), float(whole.approach.max())
+    area = float(whole.x[1] - whole.x[0]) * float(whole.y[1] - whole.y[0])
+    assert np.abs(followed.approach - whole.approach).max() < 3e-3 * depth
+    assert (np.abs(followed.pressure - whole.pressure).sum(("x", "y")) * area).max() < 2 * 3e-3 * force
+    for field in ("gap", "displacement"):
+        assert np.abs(followed[field] - whole[field]).max() < 1e-2 * depth
+    assert np.abs(followed.mean_gap - whole.mean_gap).max() < 3e-3 * depth
+    assert followed.mean_gap.values == pytest.approx(followed.gap.mean(("x", "y")).values, rel=1e-3)
+    right = followed.x > 1.7e-4
+    assert (followed.pressure.where(right).max() > 0) == (whole.pressure.where(right).max() > 0)
+    assert (np.abs(followed.contact_area - whole.contact_area) <= 0.02 * whole.contact_area.max()).all()
+
+
+def test_window__finds_the_contact_on_the_second_hill(solved_on):
+    ds = simulate(two_hills(), *FOLLOWED["loading and unloading"])
+    assert ds.pressure[1].where(ds.x > 1.7e-4).max() > 0
+
+
+def test_window__stops_at_the_border_of_a_scan():
+    with pytest.raises(rv.EdgeContactError, match="151 x 133"):
+        simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5))
+
+
+def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
+    bored = two_hills()
+    bored[40:50, 40:50] = np.nan
+    press = rv.Program().load(1e-4, over=0)
+    simulate(bored, ZENER, press, missing="absent")
+    simulate(two_hills(), ZENER, press, edge="accept")
+    simulate(two_hills(), ZENER, press, boundary="periodic")
+    assert set(solved_on) == {(151, 133)}

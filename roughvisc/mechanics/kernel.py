@@ -92,6 +92,25 @@ def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
     return total
 
 
+def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float, float]) -> Array:
+    """Displacement due to unit pressure on a rectangle and unit contact compliance, in closed form.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Positions, which broadcast, from the rectangle's centre; none on its edges' lines. [m]
+    sides : tuple of float
+        Of the rectangle. [m]
+
+    Returns
+    -------
+    ndarray
+        Exact to rounding within the rectangle and near it. [m]
+    """
+    positions = np.broadcast_arrays(x, y)
+    return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
+
+
 def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
     nodes, weights = np.polynomial.legendre.leggauss(points)
     total = np.zeros_like(x)

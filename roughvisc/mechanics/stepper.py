@@ -40,6 +40,8 @@ _SOFT = 0.1
 _DISCARDED = 1e-3  # length of that solve, in steps
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step before it gets
 _SMALLEST_STEP = 1e-6  # of the segment
+# The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
+_BEYOND = 1.05
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,10 @@ class Scene:
     accept_edge : bool
         In free space, whether cells at the border of the grid may carry pressure.
     enlarge : callable or None
-        Where contact reaches the border: gives this scene on a larger grid and the cell of it at which the present
-        grid begins, or None if the profile is not known farther out. The memory must be one of pressures.
+        Where the grid gets too small for the contact: gives this scene on a larger grid and the cell of it at which
+        the present grid begins, or None if the profile is not known farther out. The memory must be one of pressures.
+    outside : float
+        Least undeformed gap of the domain beyond the grid; infinite where the grid is all of it. [m]
     """
 
     halfspace: HalfSpace
@@ -82,6 +86,7 @@ class Scene:
     present: Mask | None = None
     accept_edge: bool = False
     enlarge: Callable[[Scene], tuple[Scene, tuple[int, int]] | None] | None = None
+    outside: float = math.inf
 
     def lowest(self, field: Array) -> float:
         """Least value over the present cells."""
@@ -385,8 +390,15 @@ def _kept(scene: Scene, time: float) -> bool:
     return scene.times is None or time in scene.times
 
 
+def _outgrown(scene: Scene, instant: Instant) -> bool:
+    """Whether the grid is too small: contact cannot be excluded beyond it, or has reached the domain's border."""
+    if scene.outside < math.inf:
+        return _BEYOND * instant.approach >= scene.outside
+    return at_edge(scene, instant.pressure)
+
+
 def at_edge(scene: Scene, pressure: Array) -> bool:
-    """Whether pressure at the border of a free-space grid acts as the edge of a punch that nobody asked for."""
+    """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
     if scene.halfspace.boundary != "free" or scene.accept_edge:
         return False
     return any(bool(np.any(side > 0)) for side in (pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]))
@@ -470,7 +482,7 @@ def _jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, State, _
         start = value if following and following[0].control == "load" else entered.start
         return scene, replace(entered, unresolved=True, start=start), None
     trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
-    while at_edge(scene, trial.instant.pressure):
+    while _outgrown(scene, trial.instant):
         scene, state = _enlarged(scene, _spent(state, trial), state.now.time)
         trial = _attempt(scene, state, segment.control, value, 0.0, "linear")
     return scene, _entered(scene, _committed(scene, _spent(state, trial), trial)), trial
@@ -507,7 +519,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         trial = _attempt(scene, state, segment.control, value, length, rule, share)
         trial = replace(trial, instant=replace(trial.instant, time=arrival))
         state = _spent(state, trial)
-        if at_edge(scene, trial.instant.pressure):
+        if _outgrown(scene, trial.instant):
             if held is not None:
                 yield held
                 held = None
@@ -564,7 +576,7 @@ def _closing_time(scene: Scene, state: State, segment: Segment, event: float) ->
         _, carried = scene.memory.predict(state.memory, time - now, "linear")
         if scene.memory.acts_on == "pressure":
             carried = scene.halfspace.displacement(carried)
-        return value <= scene.lowest(scene.gap + carried)
+        return value <= min(scene.lowest(scene.gap + carried), scene.outside)
 
     if segment.control == "load":
         return event if apart(event) and apart(now + (event - now) / 2) else now

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+#: Writes the field of a row to an array of zeros, and gives that.
+Frame = Callable[[int, Array], Array]
 
 # mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
 _HEAD = struct.Struct("<4sIII")
@@ -126,7 +128,7 @@ class RowStore(Protocol):
         """Arrays of a row, those of these names at least."""
         ...
 
-    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
+    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Any:
         """Array (time, x, y) of what ``frame`` gives for each row."""
         ...
 
@@ -147,9 +149,12 @@ class RowsInMemory:
         """Arrays of a row, those of these names at least."""
         return self._arrays[row]
 
-    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Array:
+    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Array:
         """All frames."""
-        return np.array([frame(row) for row in range(len(self.plain))])
+        frames = np.zeros((len(self.plain), *shape))  # memory that is never written to is never touched
+        for row, out in enumerate(frames):
+            frame(row, out)
+        return frames
 
 
 class RowFile:
@@ -197,7 +202,7 @@ class RowFile:
         self._stream.seek(self._begins[row])
         return read_record(self._stream, names)[1]
 
-    def stacked(self, frame: Callable[[int], Array], shape: tuple[int, int]) -> Any:
+    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Any:
         """All frames, read when they are asked for."""
         from xarray.core.indexing import LazilyIndexedArray
 
@@ -212,7 +217,7 @@ class RowFile:
         self._stream.close()
 
 
-def _frames(whole: tuple[int, ...], frame: Callable[[int], Array]) -> Any:
+def _frames(whole: tuple[int, ...], frame: Frame) -> Any:
     """What xarray takes for an array (time, x, y) that it has not read yet."""
     from xarray.backends import BackendArray
     from xarray.core.indexing import IndexingSupport, explicit_indexing_adapter
@@ -226,10 +231,10 @@ def _frames(whole: tuple[int, ...], frame: Callable[[int], Array]) -> Any:
         def read(self, key: tuple[Any, ...]) -> Any:
             rows = np.arange(whole[0])[key[0]]
             if rows.ndim == 0:
-                return frame(int(rows))[key[1:]]
-            read = np.empty((rows.size, *whole[1:]))
+                return frame(int(rows), np.zeros(whole[1:]))[key[1:]]
+            read = np.zeros((rows.size, *whole[1:]))
             for place, row in zip(read, rows, strict=True):
-                place[...] = frame(int(row))
+                frame(int(row), place)
             return read[(slice(None), *key[1:])]
 
     return Frames()

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.memory import padded
 from roughvisc.mechanics.stepper import Scene, Step
+from roughvisc.mechanics.window import Reach, Window, mean_influence
 from roughvisc.study.records import RowStore
 from roughvisc.study.scene import Ground
 from roughvisc.variables import STATUS_MEANINGS, annotate
@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 class Rows:
     """Kept instants of one march, in order.
 
-    Where the grid may grow, each row keeps the effective pressure too, so that what belongs to the larger grid is
-    there in the end: nothing outside ever carried pressure.
+    Where the march goes on in a window, or the grid may grow, a row keeps what was in contact and the effective
+    pressure there, from which its fields over the final domain follow: nothing outside ever carried pressure.
 
     Parameters
     ----------
@@ -43,14 +43,30 @@ class Rows:
         self._ground = ground
         self._fields = tuple(fields)
         self._store = store
+        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing))
+        self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
 
     def __len__(self) -> int:
         return len(self._store.plain)
 
     def add(self, step: Step, worst_error: float, converged: bool, wall_time: float) -> None:
         """Take up an accepted step, with the worst of those since the last row."""
-        shown = step.shown
-        counted, frames = self._fields_of(step.scene, shown.pressure, shown.displacement, step.level)
+        shown, window = step.shown, self._ground.window
+        contact = shown.pressure > 0
+        touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
+        arrays: dict[str, Array] = {}
+        if window.whole:
+            gap = self._ground.gap + shown.displacement
+            self._settle(gap, step.level)
+            gap[contact] = 0.0
+            mean_gap = float(np.nanmean(gap))
+            fields = {"pressure": shown.pressure, "gap": gap, "displacement": shown.displacement}
+            arrays = {name: fields[name] for name in self._fields}
+        else:
+            assert shown.effective is not None, "a window asks for a memory of pressures"
+            mean_gap = self._mean_gap(window, shown.effective, step.level)
+        if step.scene.enlarge is not None and shown.effective is not None:
+            arrays |= {"source_pressure": shown.pressure, "source": shown.effective}
         row = {
             "time": shown.time,
             "force": shown.force,
@@ -60,30 +76,27 @@ class Rows:
             "convolutions": step.state.convolutions,
             "residual": step.bound,
             "time_error": worst_error,
-            "status": _status(step, converged, self._ground.present),
+            "status": self._status(step, converged, contact),
             "wall_time": wall_time,
-            **counted,
+            "contact_area": touching,
+            "contact_area_corrected": max(touching - _staircase(contact, step.scene), 0.0),
+            "contact_fraction": touching / self._area(),
+            "mean_gap": mean_gap,
         }
-        grid = {"level": step.level, "corner": self._corner()}
-        sources = {}
-        if step.scene.enlarge is not None and shown.effective is not None:
-            sources = {"source_pressure": shown.pressure, "source": shown.effective}
-        self._store.append({"row": row, "grid": grid}, frames | sources)
+        grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
+        self._store.append({"row": row, "grid": grid}, arrays)
 
     def dataset(self, scene: Scene, method: str) -> xr.Dataset:
-        """All rows, on the grid of the final scene; fields in a file are read when they are asked for."""
+        """All rows, on the final domain; fields in a file are read when they are asked for."""
         height = self._ground.height
-        rows = [
-            plain["row"] | ({} if self._is_settled(i) else self._settled(scene, i)[0])
-            for i, plain in enumerate(self._store.plain)
-        ]
+        rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         for name in self._fields:
-            frames = self._store.stacked(partial(self._frame, scene, name), scene.halfspace.shape)
+            frames = self._store.stacked(partial(self._frame, name), self._ground.window.domain)
             variables[name] = (("time", "x", "y"), frames)
         variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float))
         if "filled" in height.coords:
@@ -101,63 +114,69 @@ class Rows:
         )
         return annotate(dataset)
 
-    def _frame(self, scene: Scene, name: str, index: int) -> Array:
-        """A field of a row."""
-        if self._is_settled(index):
-            return self._store.arrays(index, name)[name]
-        return self._settled(scene, index)[1][name]
+    def _window(self, index: int) -> Window:
+        """The window of the final domain that a row was solved on."""
+        grid = self._store.plain[index]["grid"]
+        return self._ground.window_at(grid["corner"], grid["shape"])
 
-    def _is_settled(self, index: int) -> bool:
-        """Whether a row is on the final grid: every growth moves the corner."""
-        return bool(self._store.plain[index]["grid"]["corner"] == self._corner())
+    def _recounted(self, index: int) -> dict[str, float]:
+        """What is counted over the domain, where that has grown since the row was taken up."""
+        row, grid = (self._store.plain[index][part] for part in ("row", "grid"))
+        if tuple(grid["domain"]) == self._ground.window.domain:
+            return {}
+        source = self._store.arrays(index, "source")["source"]
+        if self._ground.present.all():
+            mean_gap = self._mean_gap(self._window(index), source, grid["level"])
+        else:
+            mean_gap = float(np.nanmean(self._frame("gap", index, np.zeros(self._ground.window.domain))))
+        return {"contact_fraction": row["contact_area"] / self._area(), "mean_gap": mean_gap}
 
-    def _settled(self, scene: Scene, index: int) -> tuple[dict[str, float], dict[str, Array]]:
-        """What is counted on the fields of a row of a smaller grid, and these, on the final one."""
-        grid, arrays = self._store.plain[index]["grid"], self._store.arrays(index, "source_pressure", "source")
-        axes = (self._ground.height[axis].values for axis in ("x", "y"))
-        first = [int(np.searchsorted(axis, corner)) for axis, corner in zip(axes, grid["corner"], strict=True)]
-        shape, offset = scene.halfspace.shape, (first[0], first[1])
-        pressure = padded(arrays["source_pressure"], shape, offset)
-        displacement = scene.halfspace.displacement(padded(arrays["source"], shape, offset))
-        return self._fields_of(scene, pressure, displacement, grid["level"])
+    def _mean_gap(self, window: Window, source: Array, level: float) -> float:
+        """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
+        return float(np.mean(self._ground.gap)) + float(np.sum(source * self._mean_influence(window))) - level
 
-    def _corner(self) -> list[float]:
-        """Centre of the first cell of the present grid. [m]"""
-        return [float(self._ground.height[axis].values[0]) for axis in ("x", "y")]
+    def _frame(self, name: str, index: int, out: Array) -> Array:
+        """A field of a row over the final domain, written to ``out``, which holds zeros."""
+        window = self._window(index)
+        if window.whole:
+            out[...] = self._store.arrays(index, name)[name]
+            return out
+        arrays = self._store.arrays(index, "source_pressure", "source")
+        if name == "pressure":
+            out[window.cells] = arrays["source_pressure"]
+            return out
+        for rows, displacement in self._reach(window).rows(arrays["source"]):
+            out[rows] = displacement
+            if name == "gap":
+                out[rows] += self._ground.gap[rows]
+                self._settle(out[rows], self._store.plain[index]["grid"]["level"], rows)
+        if name == "gap":
+            out[window.cells][arrays["source_pressure"] > 0] = 0.0
+        return out
 
-    def _fields_of(
-        self, scene: Scene, pressure: Array, displacement: Array, level: float
-    ) -> tuple[dict[str, float], dict[str, Array]]:
-        """What is counted on the fields, and those asked for."""
-        present = self._ground.present
-        area = scene.halfspace.cell_area
-        contact = pressure > 0
-        gap = scene.gap + displacement
+    def _settle(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
+        """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
         gap -= level
         np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
-        gap[contact] = 0.0
-        gap[~present] = np.nan
-        touching = float(np.count_nonzero(contact)) * area
-        counted = {
-            "contact_area": touching,
-            "contact_area_corrected": max(touching - _staircase(contact, scene), 0.0),
-            "contact_fraction": touching / (area * contact.size),
-            "mean_gap": float(np.nanmean(gap)),
-        }
-        available = {"pressure": pressure, "gap": gap, "displacement": displacement}
-        return counted, {name: available[name] for name in self._fields}
+        absent = ~self._ground.present[rows]
+        if absent.any():
+            gap[absent] = np.nan
 
+    def _area(self) -> float:
+        """Of the domain. [m2]"""
+        dx, dy = self._ground.spacing
+        return dx * dy * self._ground.height.size
 
-def _status(step: Step, converged: bool, present: NDArray[np.bool_]) -> int:
-    if not converged:
-        meaning = "not_converged"
-    elif step.shown.force == 0:
-        meaning = "open"
-    elif (step.shown.pressure > 0)[present].all():
-        meaning = "full_contact"
-    else:
-        meaning = "converged"
-    return STATUS_MEANINGS.index(meaning)
+    def _status(self, step: Step, converged: bool, contact: NDArray[np.bool_]) -> int:
+        if not converged:
+            meaning = "not_converged"
+        elif step.shown.force == 0:
+            meaning = "open"
+        elif self._ground.window.whole and contact[self._ground.present].all():
+            meaning = "full_contact"
+        else:
+            meaning = "converged"
+        return STATUS_MEANINGS.index(meaning)
 
 
 def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -16,34 +17,61 @@ from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
+from roughvisc.mechanics.window import Window, whole_domain, window_around
 from roughvisc.topography.grid import axis_step
 from roughvisc.topography.indenters import grown
 
-#: An analytic profile's grid grows by this factor a time, and no farther than so many cells.
+#: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2
+#: The window begins so many cells wide, on surfaces whose shorter side has so many.
+_FIRST_EXTENT, _WORTH_FOLLOWING = 32, 96
 
 
 class Ground:
-    """The labelled surface under a scene, which may grow while that is marched through: ``growths`` times so far."""
+    """The labelled surface under a scene, and the window of it that is solved on.
 
-    def __init__(self, height: xr.DataArray, missing: Literal["refuse", "absent"] = "refuse") -> None:
+    Both may grow while the scene is marched through: ``growths`` times so far. The window follows the contact in free
+    space, where only what is pressed matters; elsewhere it is the whole surface.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Profile, peaks up. [m]
+    missing : {"refuse", "absent"}
+        What missing heights mean.
+    follow : bool
+        Whether to begin with a small window, where all of the surface is present.
+    """
+
+    def __init__(
+        self, height: xr.DataArray, missing: Literal["refuse", "absent"] = "refuse", *, follow: bool = False
+    ) -> None:
+        self._missing = missing
+        self.growths = 0
+        self._lay(height)
+        self._extent = float(_FIRST_EXTENT)
+        if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
+            self.window = window_around(self.gap, _FIRST_EXTENT)
+
+    def _lay(self, height: xr.DataArray) -> None:
         self.height = _checked(height)
         values = self.height.values
         self.present: NDArray[np.bool_] = np.isfinite(values)
-        _check_missing(self.height, self.present, missing)
-        self._missing = missing
-        self.growths = 0
+        _check_missing(self.height, self.present, self._missing)
+        #: Undeformed gap at first touch, zero at absent cells. [m]
+        self.gap = np.where(self.present, np.max(values[self.present]) - values, 0.0)
+        self.spacing = (_side(self.height, "x"), _side(self.height, "y"))
+        self.window = whole_domain((values.shape[0], values.shape[1]))
 
     @property
-    def gap(self) -> NDArray[np.float64]:
-        """Undeformed gap at first touch, zero at absent cells. [m]"""
-        values = self.height.values
-        return np.where(self.present, np.max(values[self.present]) - values, 0.0)
+    def corner(self) -> tuple[float, float]:
+        """Centre of the window's first cell. [m]"""
+        first = self.window.first
+        return float(self.height["x"].values[first[0]]), float(self.height["y"].values[first[1]])
 
     def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
-        """Half-space on the surface's grid."""
-        sides = (_side(self.height, "x"), _side(self.height, "y"))
-        return HalfSpace(self.height.shape, sides, boundary, workers)
+        """Half-space on the window's grid."""
+        return HalfSpace(self.window.shape, self.spacing, boundary, workers)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""
@@ -51,17 +79,39 @@ class Ground:
 
     def enlarge(self, scene: Scene) -> tuple[Scene, tuple[int, int]] | None:
         """The scene on a larger grid, and the cell of it where the present one begins; None if it cannot grow."""
-        larger = grown(self.height, GROWTH)
-        if larger is None or larger.size > MOST_CELLS:
-            return None
-        first = [int(np.searchsorted(larger[axis].values, self.height[axis].values[0])) for axis in ("x", "y")]
-        growths = self.growths + 1
-        self.__init__(larger, self._missing)  # type: ignore[misc]
-        self.growths = growths
+        x, y = self.corner
+        if self.window.whole:
+            larger = grown(self.height, GROWTH)
+            if larger is None or larger.size > MOST_CELLS:
+                return None
+            self._lay(larger)
+        else:
+            before = self.window
+            while self.window == before:
+                self._extent *= GROWTH
+                self.window = window_around(self.gap, int(self._extent))
+        self.growths += 1
+        first = (self._cell("x", x) - self.window.first[0], self._cell("y", y) - self.window.first[1])
         halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
-        present = None if self.present.all() else self.present
-        settings = {**vars(scene), "halfspace": halfspace, "gap": self.gap, "present": present}
-        return Scene(**settings), (first[0], first[1])
+        return replace(scene, halfspace=halfspace, **self.shown()), first
+
+    def shown(self) -> dict[str, Any]:
+        """What a scene takes from the surface."""
+        return {
+            "gap": np.ascontiguousarray(self.gap[self.window.cells]),
+            "present": None if self.present.all() else self.present,
+            "outside": self.window.outside,
+        }
+
+    def _cell(self, axis: str, position: float) -> int:
+        """Index in the domain of the cell at a position. [m]"""
+        return int(np.searchsorted(self.height[axis].values, position))
+
+    def window_at(self, corner: Sequence[float], shape: Sequence[int]) -> Window:
+        """A window of the present domain that was solved on before: its first cell's centre and its shape."""
+        domain = (self.height.shape[0], self.height.shape[1])
+        first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
+        return Window(domain, first, (shape[0], shape[1]))
 
 
 def prepare(
@@ -92,22 +142,20 @@ def prepare(
         raise InputError("the program is empty: expected at least one segment")
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
-    grows = boundary == "free" and edge == "error" and ground.can_grow()
-    gap = ground.gap
-    _check_approach(program, boundary, gap[ground.present])
+    grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
+    _check_approach(program, boundary, ground.gap[ground.present])
     engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement")
     scene = Scene(
         halfspace=ground.halfspace(boundary),
-        gap=gap,
         material=material,
         memory=engine.memory,
         program=program,
         times=kept_times(program, times),
         tolerance=float(tolerance),
         time_step=None if time_step == "auto" else float(time_step),
-        present=None if ground.present.all() else ground.present,
         accept_edge=edge == "accept",
         enlarge=ground.enlarge if grows else None,
+        **ground.shown(),
     )
     return scene, engine
 

@@ -142,7 +142,8 @@ def press(
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
     began = time.perf_counter()
-    ground = Ground(height, missing)
+    follow = boundary == "free" and edge == "error" and method == "fast"
+    ground = Ground(height, missing, follow=follow)
     scene, engine = prepare(
         ground,
         material,

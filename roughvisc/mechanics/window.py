@@ -1,0 +1,155 @@
+"""The part of a free-space domain that the contact is solved on, and what it does to the rest.
+
+Pressure is not negative, and pushes the surface away everywhere: beyond the window the gap exceeds the undeformed gap
+less the approach. As long as that is positive at the lowest place outside, no contact there is missed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from roughvisc.mechanics.kernel import love_kernel, rectangle_displacement
+
+Array = NDArray[np.float64]
+
+# Cells of the smallest window, and of a border around what lies low enough.
+_SMALLEST, _BORDER = 24, 2
+_BLOCK = 32  # columns or rows transformed together, as in halfspace
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of cells of a domain.
+
+    Attributes
+    ----------
+    domain : tuple of int
+        Number of cells of the domain.
+    first, shape : tuple of int
+        Cell of the domain at which the window begins, and its number of cells.
+    outside : float
+        Least undeformed gap beyond the window; infinite where the window is the whole domain. [m]
+    """
+
+    domain: tuple[int, int]
+    first: tuple[int, int]
+    shape: tuple[int, int]
+    outside: float = math.inf
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is the whole domain."""
+        return self.shape == self.domain
+
+    @property
+    def cells(self) -> tuple[slice, slice]:
+        """Index of its cells in the domain."""
+        (i, j), (nx, ny) = self.first, self.shape
+        return slice(i, i + nx), slice(j, j + ny)
+
+
+def whole_domain(shape: tuple[int, int]) -> Window:
+    """The window that leaves nothing out."""
+    return Window(shape, (0, 0), shape)
+
+
+def window_around(gap: Array, extent: int) -> Window:
+    """The window around what lies lowest, about so many cells wide.
+
+    Parameters
+    ----------
+    gap : ndarray, shape (nx, ny)
+        Undeformed gap of the domain. [m]
+    extent : int
+        Longest side, in cells: as much of what lies low is taken as fits, at least what lies lowest.
+
+    Returns
+    -------
+    Window
+        With sides that transform well, and nowhere at the border of the domain: the whole of it otherwise.
+    """
+    lowest = [np.min(gap, axis=1), np.min(gap, axis=0)]  # of each row and column
+    levels = np.unique(np.concatenate(lowest))
+
+    def box(level: float) -> list[tuple[int, int]]:
+        inside = [np.flatnonzero(side <= level) for side in lowest]
+        return [(int(cells[0]), int(cells[-1]) + 1) for cells in inside]
+
+    fits, too_large = 0, len(levels)
+    while too_large - fits > 1:
+        middle = (fits + too_large) // 2
+        inside = max(last - first for first, last in box(float(levels[middle]))) <= extent
+        fits, too_large = (middle, too_large) if inside else (fits, middle)
+    sides = []
+    for (first, last), cells in zip(box(float(levels[fits])), gap.shape, strict=True):
+        length = fft.next_fast_len(max(last - first + 2 * _BORDER, _SMALLEST), real=True)
+        start = (first + last - length) // 2
+        if start <= 0 or start + length >= cells:
+            return whole_domain((gap.shape[0], gap.shape[1]))
+        sides.append(slice(start, start + length))
+    beyond = [np.delete(side, cells) for side, cells in zip(lowest, sides, strict=True)]
+    shape = (sides[0].stop - sides[0].start, sides[1].stop - sides[1].start)
+    outside = float(min(np.min(beyond[0]), np.min(beyond[1])))
+    return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside)
+
+
+def mean_influence(window: Window, spacing: tuple[float, float]) -> Array:
+    """Mean displacement of the domain due to unit pressure on each cell of the window. [m]
+
+    The kernel is symmetric: it is the displacement of that cell under uniform pressure on the domain, which is a
+    rectangle and has a closed form.
+    """
+    centres = [
+        (np.arange(i, i + n) + 0.5) * side for i, n, side in zip(window.first, window.shape, spacing, strict=True)
+    ]
+    sides = (window.domain[0] * spacing[0], window.domain[1] * spacing[1])
+    count = window.domain[0] * window.domain[1]
+    return rectangle_displacement(centres[0][:, None] - sides[0] / 2, centres[1] - sides[1] / 2, sides) / count
+
+
+class Reach:
+    """Displacement of a whole domain under pressure in a window of it: one convolution of their joint length.
+
+    Parameters
+    ----------
+    window : Window
+        Where pressure is.
+    spacing : tuple of float
+        Cell sides. [m]
+    """
+
+    def __init__(self, window: Window, spacing: tuple[float, float]) -> None:
+        self._window = window
+        lengths = [n + m - 1 for n, m in zip(window.domain, window.shape, strict=True)]
+        self._padded = [fft.next_fast_len(n, real=True) for n in lengths]
+        # signed distance from a cell of the window to one of the domain, wrapped around where the sum is negative
+        distances = []
+        for first, m, n, length in zip(window.first, window.shape, window.domain, self._padded, strict=True):
+            steps = np.arange(length)
+            steps[steps >= n] -= length  # from n - 1 down to 1 - m; what lies between is never read
+            distances.append(np.abs(np.clip(steps, 1 - m, n - 1) - first))
+        quadrant = love_kernel((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
+        self._symbol = fft.rfft2(quadrant[np.ix_(*distances)])
+
+    def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:
+        """Displacement of the domain under a pressure in the window over the contact modulus, some rows at a time. [m]
+
+        What is made of them stays in the cache.
+        """
+        (nx, ny), (mx, my) = self._window.domain, self._padded
+        along_y = fft.rfft(pressure, n=my, axis=1)
+        spread = np.empty((nx, along_y.shape[1]), complex)
+        for start in range(0, along_y.shape[1], _BLOCK):
+            block = slice(start, start + _BLOCK)
+            columns = fft.fft(along_y[:, block], n=mx, axis=0)
+            columns *= self._symbol[:, block]
+            spread[:, block] = fft.ifft(columns, axis=0, overwrite_x=True)[:nx]
+        for start in range(0, nx, _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            yield rows, fft.irfft(spread[rows], n=my, axis=1, overwrite_x=True)[:, :ny]
