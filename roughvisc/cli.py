@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,8 +77,9 @@ def main() -> None:
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
 @click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
 @click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
+@click.option("--profile", is_flag=True, help="Say where the time went; computes in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-def run(study: Path, out: Path | None, no_plots: bool, quiet: bool, **where: Any) -> None:
+def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: bool, **where: Any) -> None:
     """Compute all cases of a study file.
 
     Each case ends in one NetCDF file, named by what determines its numbers; a single one also in figures beside it.
@@ -97,13 +100,28 @@ def run(study: Path, out: Path | None, no_plots: bool, quiet: bool, **where: Any
     cases = read_cases(study)
     folder = result_folder(cases[0], out)
     console = Console(quiet=quiet)
-    if len(cases) == 1 and not (where["scheduler"] or where["scheduler_file"]):
-        complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
-        if complaint:
-            click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
-            raise _Failure("1 of 1 cases failed", 1)
-    else:
-        _run_all(cases, folder, console, **where)
+    elsewhere = where["scheduler"] or where["scheduler_file"]
+    if profile and (elsewhere or where["workers"]):
+        raise InputError("--profile: times this process only: expected no --scheduler, --scheduler-file or --workers")
+    with _profile(console) if profile else nullcontext():
+        if len(cases) == 1 and not elsewhere:
+            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
+            if complaint:
+                click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
+                raise _Failure("1 of 1 cases failed", 1)
+        else:
+            _run_all(cases, folder, console, **(where | {"workers": 0} if profile else where))
+
+
+@contextmanager
+def _profile(console: Console) -> Iterator[None]:
+    """Print where the time of what runs inside went."""
+    from roughvisc.study.profile import profiled
+    from roughvisc.views.console import profile_table
+
+    with profiled() as profile:
+        yield
+    console.print(profile_table(profile))
 
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:

@@ -142,7 +142,15 @@ class Reach:
 
         What is made of them stays in the cache.
         """
-        (nx, ny), (mx, my) = self._window.domain, self._padded
+        spread = self.spread(pressure)
+        for start in range(0, len(spread), _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            along_y = fft.irfft(spread[rows], n=self._padded[1], axis=1, overwrite_x=True)
+            yield rows, along_y[:, : self._window.domain[1]]
+
+    def spread(self, pressure: Array) -> NDArray[np.complex128]:
+        """The displacement as its transform along y."""
+        nx, (mx, my) = self._window.domain[0], self._padded
         along_y = fft.rfft(pressure, n=my, axis=1)
         spread = np.empty((nx, along_y.shape[1]), complex)
         for start in range(0, along_y.shape[1], _BLOCK):
@@ -150,6 +158,4 @@ class Reach:
             columns = fft.fft(along_y[:, block], n=mx, axis=0)
             columns *= self._symbol[:, block]
             spread[:, block] = fft.ifft(columns, axis=0, overwrite_x=True)[:nx]
-        for start in range(0, nx, _BLOCK):
-            rows = slice(start, start + _BLOCK)
-            yield rows, fft.irfft(spread[rows], n=my, axis=1, overwrite_x=True)[:, :ny]
+        return spread

@@ -17,6 +17,7 @@ from rich.text import Text
 from roughvisc.views.axes import unit_for
 
 if TYPE_CHECKING:
+    from roughvisc.study.profile import Profile
     from roughvisc.study.task import Outcome
 
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
@@ -153,6 +154,19 @@ _MODELLED = {
 }
 #: Cases that a plan lists one by one.
 _LISTED = 20
+
+
+def profile_table(profile: Profile) -> Group:
+    """Where the time of a run went."""
+    table = Table(box=None, padding=(0, 2), title="Where the time went", title_justify="left", title_style="bold")
+    table.add_column("part")
+    for column in ("time", "share", "calls"):
+        table.add_column(column, justify="right")
+    for part, seconds in profile.seconds.most_common():
+        calls = profile.calls[part]
+        table.add_row(part, readable(seconds, "s"), f"{profile.share(part):.1%}", f"{calls:,}" if calls else "")
+    table.add_row("all", readable(profile.whole, "s"), "100.0%", "", style="bold")
+    return Group(table)
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:
