@@ -151,7 +151,7 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     if any(s.control != "load" for s in scene.program.segments) or scene.present is not None:
         raise InputError("method='seed' treats given loads and complete surfaces only; use method='fast'")
     largest_step = scene.time_step or scene.program.duration / 100
-    state = State(Instant(0.0, np.zeros_like(scene.gap), np.zeros_like(scene.gap), 0.0, 0.0), None)
+    state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), None)
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
         state = replace(state, segment=index, began=state.now.time, start=state.now.force)
@@ -194,7 +194,8 @@ def _advance(
     if at_edge(scene, solution.pressure):
         raise edge_error(scene, time)
     increments.append((time, solution.pressure - state.now.pressure))
-    now = Instant(time, solution.pressure, past + solution.displacement, load, solution.level)
+    now = Instant(time, solution.pressure, load, solution.level)
+    displacement = past + solution.displacement
     state = replace(
         state,
         now=now,
@@ -202,4 +203,4 @@ def _advance(
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),
     )
-    return state, Step(now, solution.level, math.nan, math.nan, solution.stagnated, scene, state)
+    return state, Step(now, displacement, None, solution.level, math.nan, math.nan, solution.stagnated, scene, state)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
-from roughvisc.mechanics.contact import ContactState, solve_contact
+from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.loading import Program, Segment
 from roughvisc.mechanics.materials import Material
@@ -105,20 +105,16 @@ class Instant:
     ----------
     time : float
         [s]
-    pressure, displacement : ndarray, shape (nx, ny)
-        Pressure [Pa] and total displacement of the half-space [m].
+    pressure : ndarray, shape (nx, ny)
+        [Pa]
     force, approach : float
         [N], [m]
-    effective : ndarray or None
-        Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
     """
 
     time: float
     pressure: Array
-    displacement: Array
     force: float
     approach: float
-    effective: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -179,8 +175,12 @@ class Step:
     ----------
     shown : Instant
         What to report: the state's present instant, its pressure resolved where the material cannot jump.
+    displacement : ndarray, shape (nx, ny)
+        Total displacement of the half-space then. [m]
+    effective : ndarray or None
+        Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
     level : float
-        Rigid-body approach that belongs to ``shown.displacement``: ``gap = undeformed gap + displacement - level``. [m]
+        Rigid-body approach that belongs to the displacement: ``gap = undeformed gap + displacement - level``. [m]
     bound : float
         Bound on the relative error of the pressure left by the contact solver, in the energy norm.
     time_error : float
@@ -194,6 +194,8 @@ class Step:
     """
 
     shown: Instant
+    displacement: Array
+    effective: Array | None
     level: float
     bound: float
     time_error: float
@@ -207,10 +209,20 @@ class _Trial:
     """A step that was computed and is not yet accepted."""
 
     instant: Instant
+    displacement: Array
+    effective: Array | None
     field: Array  # what the memory acts on
     length: float
     rule: Rule
-    contact: ContactState | None  # None while the surfaces are apart
+    bound: float = 0.0
+    converged: bool = True
+    iterations: int = 0
+    convolutions: int = 0
+
+    @property
+    def apart(self) -> bool:
+        """Whether the surfaces are apart."""
+        return self.instant.force == 0
 
 
 def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
@@ -241,7 +253,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     if state is None:
         state = _rest(scene)
         if segments and segments[0].duration > 0:
-            yield _step(scene, state, None, math.nan)
+            yield _step(scene, state, _at_rest(scene, state), math.nan)
     while state.segment < len(segments):
         segment = segments[state.segment]
         if segment.duration == 0:
@@ -249,20 +261,25 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             following = segments[state.segment : state.segment + 1]
             right_hand = _can_jump(scene) or state.now.time == 0
             if right_hand and not (following and following[0].duration == 0):
-                yield _step(scene, state, trial, math.nan)
+                yield _step(scene, state, trial or _at_rest(scene, state), math.nan)
+            del trial  # its fields are not needed while the next step is computed
         else:
             for step in _through(scene, state, segment):
                 scene, state = step.scene, step.state
                 corner = state.segment < len(segments) and state.now.time == state.began
                 if not (corner and segments[state.segment].duration == 0 and _can_jump(scene)):
                     yield step
+                del step
 
 
 def _rest(scene: Scene) -> State:
-    shape = scene.halfspace.shape
-    effective = np.zeros(shape) if scene.memory.acts_on == "pressure" else None
-    now = Instant(0.0, np.zeros(shape), np.zeros(shape), 0.0, scene.lowest(scene.gap), effective)
-    return State(now, scene.memory.start(shape))
+    now = Instant(0.0, np.zeros(scene.halfspace.shape), 0.0, scene.lowest(scene.gap))
+    return State(now, scene.memory.start(scene.halfspace.shape))
+
+
+def _at_rest(scene: Scene, state: State) -> _Trial:
+    nothing = np.zeros(scene.halfspace.shape)
+    return _Trial(state.now, nothing, nothing if scene.memory.acts_on == "pressure" else None, nothing, 0.0, "linear")
 
 
 def _can_jump(scene: Scene) -> bool:
@@ -290,7 +307,7 @@ def _attempt(
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
         nothing = np.zeros_like(gap)
-        return _Trial(Instant(time, nothing, carried, 0.0, approach, effective), nothing, length, rule, None)
+        return _Trial(Instant(time, nothing, 0.0, approach), carried, effective, nothing, length, rule)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
@@ -303,19 +320,26 @@ def _attempt(
         start=_extrapolated(state, length) * alpha,
         present=scene.present,
     )
-    if effective is not None:
-        contact = replace(contact, convolutions=contact.convolutions + 1)
     pressure = contact.pressure / alpha
     instant = Instant(
         time,
         pressure,
-        carried + contact.displacement,
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
-        None if effective is None else effective + contact.pressure,
     )
-    field = pressure if scene.memory.acts_on == "pressure" else contact.displacement / alpha
-    return _Trial(instant, field, length, rule, contact)
+    carried += contact.displacement
+    return _Trial(
+        instant,
+        carried,
+        None if effective is None else effective + contact.pressure,
+        pressure if scene.memory.acts_on == "pressure" else contact.displacement / alpha,
+        length,
+        rule,
+        contact.bound,
+        contact.converged,
+        contact.iterations,
+        contact.convolutions + (effective is not None),
+    )
 
 
 def _extrapolated(state: State, length: float) -> Array:
@@ -348,37 +372,27 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
 
 
 def _spent(state: State, trial: _Trial) -> State:
-    if trial.contact is None:
-        return state
     return replace(
         state,
-        iterations=state.iterations + trial.contact.iterations,
-        convolutions=state.convolutions + trial.contact.convolutions,
+        iterations=state.iterations + trial.iterations,
+        convolutions=state.convolutions + trial.convolutions,
     )
 
 
-def _step(scene: Scene, state: State, trial: _Trial | None, time_error: float) -> Step:
+def _step(scene: Scene, state: State, trial: _Trial, time_error: float) -> Step:
     """What is yielded of an accepted trial."""
-    contact = trial.contact if trial is not None else None
-    if contact is None:
-        return Step(state.now, state.now.approach, 0.0, time_error, True, scene, state)
-    if trial is not None and trial.length > 0 and _kept(scene, state.now.time) and _soft(scene, trial.length):
+    shown, converged = trial, trial.converged
+    pressure, level = state.now.pressure, state.now.approach
+    if not trial.apart and trial.length > 0 and _kept(scene, state.now.time) and _soft(scene, trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
-        sharp = _attempt(
-            scene, replace(state, before=None), "load", state.now.force, _DISCARDED * trial.length, "right"
-        )
-        state = _spent(state, sharp)
-        shown = replace(
-            state.now,
-            pressure=sharp.instant.pressure,
-            displacement=sharp.instant.displacement,
-            effective=sharp.instant.effective,
-        )
-        assert sharp.contact is not None
-        converged = contact.converged and sharp.contact.converged
-        return Step(shown, sharp.instant.approach, sharp.contact.bound, time_error, converged, scene, state)
-    return Step(state.now, state.now.approach, contact.bound, time_error, contact.converged, scene, state)
+        bare = replace(state, before=None)
+        shown = _attempt(scene, bare, "load", state.now.force, _DISCARDED * trial.length, "right")
+        state = _spent(state, shown)
+        converged = converged and shown.converged
+        pressure, level = shown.instant.pressure, shown.instant.approach
+    now = replace(state.now, pressure=pressure)
+    return Step(now, shown.displacement, shown.effective, level, shown.bound, time_error, converged, scene, state)
 
 
 def _soft(scene: Scene, length: float) -> bool:
@@ -423,21 +437,11 @@ def _enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
     shape = scene.halfspace.shape
     memory = scene.memory.enlarged(state.memory, shape, offset)
 
-    def moved(instant: Instant | None) -> Instant | None:
-        if instant is None:
-            return None
-        effective = None if instant.effective is None else padded(instant.effective, shape, offset)
-        source = np.zeros(shape) if effective is None else effective
-        return replace(
-            instant,
-            pressure=padded(instant.pressure, shape, offset),
-            displacement=scene.halfspace.displacement(source),
-            effective=effective,
-        )
+    def moved(instant: Instant) -> Instant:
+        return replace(instant, pressure=padded(instant.pressure, shape, offset))
 
-    now = moved(state.now)
-    assert now is not None
-    return scene, replace(state, now=now, before=moved(state.before), memory=memory)
+    before = None if state.before is None else moved(state.before)
+    return scene, replace(state, now=moved(state.now), before=before, memory=memory)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -468,10 +472,9 @@ def _entered(scene: Scene, state: State) -> State:
 def _jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, State, _Trial | None]:
     """Zero-length segment: solved with the instantaneous compliance; left for the next step if there is none."""
     value = segment.value(0.0, state.start)
-    current = state.now.force if segment.control == "load" else state.now.approach
-    if value == current:
-        return scene, _entered(scene, state), None
     if not _can_jump(scene):
+        if value == (state.now.force if segment.control == "load" else state.now.approach):
+            return scene, _entered(scene, state), None
         if segment.control == "approach":
             raise InputError(
                 f"at {state.now.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
@@ -560,9 +563,11 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             held = None
         if fresh and not fixed and not unresolved and arrival < end:
             base, held = replace(state, suggestion=length), step
+            state = step.state
         else:
+            base = state = step.state
             yield step
-        state = step.state
+        del trial, accepted, step  # their fields are not needed while the next step is computed
 
 
 def _closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:

@@ -56,17 +56,17 @@ class Rows:
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
         arrays: dict[str, Array] = {}
         if window.whole:
-            gap = self._ground.gap + shown.displacement
+            gap = self._ground.gap + step.displacement
             self._settle(gap, step.level)
             gap[contact] = 0.0
             mean_gap = float(np.nanmean(gap))
-            fields = {"pressure": shown.pressure, "gap": gap, "displacement": shown.displacement}
+            fields = {"pressure": shown.pressure, "gap": gap, "displacement": step.displacement}
             arrays = {name: fields[name] for name in self._fields}
         else:
-            assert shown.effective is not None, "a window asks for a memory of pressures"
-            mean_gap = self._mean_gap(window, shown.effective, step.level)
-        if step.scene.enlarge is not None and shown.effective is not None:
-            arrays |= {"source_pressure": shown.pressure, "source": shown.effective}
+            assert step.effective is not None, "a window asks for a memory of pressures"
+            mean_gap = self._mean_gap(window, step.effective, step.level)
+        if step.scene.enlarge is not None and step.effective is not None:
+            arrays |= {"source_pressure": shown.pressure, "source": step.effective}
         row = {
             "time": shown.time,
             "force": shown.force,

@@ -179,6 +179,7 @@ def press(
             report(step.shown.time, scene.program.duration)
             if keeper is not None and method == "fast":
                 keeper.passed(reached)
+            del step  # its fields are not needed while the next one is computed
     finally:
         close()
     if not len(rows):
