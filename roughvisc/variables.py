@@ -115,6 +115,16 @@ VARIABLES: dict[str, Variable] = {
         "estimated relative error of pressure (L1) and approach due to time steps",
         "not available (missing) for fixed time steps without an estimate",
     ),
+    "grid_error": Variable(
+        _SERIES,
+        "1",
+        "estimated relative error of pressure (L1) and approach due to the grid",
+        "from the same history on cells twice as long, by Richardson extrapolation; the pressure over the largest "
+        "force; of a scan it holds what roughness its coarser copy has lost",
+    ),
+    "grid_error_area": Variable(
+        _SERIES, "1", "estimated relative error of the corrected contact area due to the grid", "as grid_error"
+    ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),
 }

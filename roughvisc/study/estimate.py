@@ -112,6 +112,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         time_step=settings.solve.time_step,
         times=times,
         edge="accept",
+        memory=settings.solve.memory,
     )
     steps = rows = damped = 0
     reached = contact = 0.0

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.engine import Engine, engine_for
+from roughvisc.mechanics.engine import Engine, Kind, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
@@ -74,6 +74,7 @@ def prepare(
     time_step: float | Literal["auto"],
     times: int | Sequence[float] | None,
     edge: Literal["error", "accept"],
+    memory: Kind = "auto",
 ) -> tuple[Scene, Engine]:
     """Scene of a case and what models its material; see :func:`roughvisc.simulate` for the parameters.
 
@@ -95,7 +96,7 @@ def prepare(
     grows = boundary == "free" and edge == "error" and ground.can_grow()
     gap = ground.gap
     _check_approach(program, boundary, gap[ground.present])
-    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement")
+    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
     scene = Scene(
         halfspace=ground.halfspace(boundary),
         gap=gap,
