@@ -57,7 +57,10 @@ def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:
     if done:
         with whole_file(path) as temporary:
             temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
-            read_cases(temporary)
+            try:
+                read_cases(temporary)
+            except InputError as error:
+                raise InputError(str(error).replace(str(temporary), str(path))) from error
             shutil.copymode(path, temporary)
     return ", ".join(done)
 
@@ -68,7 +71,8 @@ def _set(document: Any, name: str, key: str, value: Any) -> str:
     if table is None:
         if value is None:
             return ""
-        if document.body and not tomlkit.dumps(document).endswith("\n\n"):
+        text = tomlkit.dumps(document)
+        for _ in range(0 if not text or text.endswith("\n\n") else 1 if text.endswith("\n") else 2):
             document.add(tomlkit.nl())
         document.add(name, tomlkit.table())
         table = document[name]

@@ -30,7 +30,7 @@ Pressure = Callable[[Array, float], Array]
 
 #: What is compared, in the order of the results.
 QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_corrected", "mean_gap")
-#: A cell whose centre has an infinite pressure is averaged over so many points each way.
+#: A cell whose centre has no finite pressure is averaged over so many points each way.
 _POINTS = 32
 
 
@@ -88,9 +88,10 @@ class ClosedForm:
         worst = 0.0
         for n, (time, radius) in enumerate(zip(self.times, self.radius, strict=True)):
             exact = np.zeros(distance.shape)
-            exact[distance < radius] = self.pressure(distance[distance < radius], float(time))
+            inside = distance < radius
+            exact[inside] = self.pressure(distance[inside], float(time))
             field = exact[back]
-            for i, j in np.argwhere(np.isinf(field)):
+            for i, j in np.argwhere(~np.isfinite(field)):  # a cone's apex
                 field[i, j] = self._cell_mean(x[i, j], y[i, j], sides, float(time))
             difference = np.abs(dataset["pressure"][n].values - field).sum() * sides[0] * sides[1]
             worst = max(worst, float(difference))

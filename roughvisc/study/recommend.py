@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.study.exact import QUANTITIES
+from roughvisc.study.ladder import step_text
+from roughvisc.units import quantity as quantity_in
 
 #: The accuracies that are advised on unasked.
 TARGETS = (1e-2, 1e-3)
@@ -170,6 +172,12 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
+def _step(step: float) -> str | float:
+    """A time step with its unit, where that is no other number."""
+    text = step_text(step)
+    return text if quantity_in(text, "s") == step else step
+
+
 def keys_of(dataset: xr.Dataset, index: int) -> dict[str, dict[str, Any]]:
     """Tables and keys of a study file that make a setting; None: to be as if it were not there.
 
@@ -184,7 +192,7 @@ def keys_of(dataset: xr.Dataset, index: int) -> dict[str, dict[str, Any]]:
     step, precision = float(row["time_step"]), float(row["precision"])
     solve: dict[str, Any] = {
         "tolerance": float(row["tolerance"]),
-        "time_step": step if np.isfinite(step) else None,
+        "time_step": _step(step) if np.isfinite(step) else None,
         "method": None if row["method"] == "fast" else row["method"].item(),
         "memory": None if row["memory"] == "auto" else row["memory"].item(),
     }
