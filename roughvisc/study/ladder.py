@@ -17,6 +17,8 @@ FLOAT32 = 2.0**-24
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Fewest cells a side of a coarser grid that is worth a try.
 _FEWEST = 12
+#: Most cells a side of a finer one.
+_MOST = 1024
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
         if min(shape) / coarsening >= _FEWEST:
             rungs.append(Setting(tolerance, coarsening=coarsening))
     if not is_data(case):
-        rungs.append(Setting(1e-3, coarsening=0.5))
+        rungs += [Setting(1e-3, coarsening=c) for c in (0.5, 0.25) if max(shape) / c <= _MOST]
     rungs.append(Setting(1e-3, precision=FLOAT32))
     if duration > 0:
         rungs.append(Setting(1e-2, memory="direct"))

@@ -114,13 +114,15 @@ class _Finest:
 
     def __init__(self, bench: Bench, rungs: Sequence[Setting], data: bool) -> None:
         fast = [setting for setting in rungs if setting.method == "fast"] or list(rungs)
-        grid = 1.0 if data else min(setting.coarsening for setting in rungs)
         self.sharpest = min(setting.tolerance for setting in fast)
-        self._setting = Setting(self.sharpest / _SHARPER, coarsening=grid)
+        grids = [1.0] if data else sorted({setting.coarsening for setting in rungs})
+        candidates = [Setting(self.sharpest / _SHARPER, coarsening=grid) for grid in grids]
+        allowed = bench.left / 2
+        self._setting = next((one for one in candidates if bench.expected(one) <= allowed), candidates[-1])
         self._bench = bench
         self._coarser: dict[float, dict[str, float]] = {}
         expected = bench.expected(self._setting)
-        if expected > bench.left / 2:
+        if expected > allowed:
             where = f"{bench.case.origin}: " if bench.case.origin else ""
             raise InputError(
                 f"{where}surface: the run that all others are measured against would take about {expected:.3g} s, "
@@ -133,6 +135,11 @@ class _Finest:
             raise InputError(f"{where}the run that all others are measured against: {error}") from error
         self.name = f"finest run: {bench.label(self._setting)}"
         self.time, self.grid = self._uncertainties()
+
+    def check(self, setting: Setting) -> None:
+        """Refuse a setting that is finer than what it would be measured against."""
+        if setting.coarsening < self._setting.coarsening:
+            raise NotRun("finer than the run to measure it against, for which there is no time")
 
     def errors(self, dataset: xr.Dataset) -> dict[str, float]:
         """Of a result at the same times."""
@@ -196,6 +203,8 @@ def _row(bench: Bench, setting: Setting, exact: ClosedForm | None, finest: _Fine
     }
     costs = dict.fromkeys(("run_time", "transforms", "steps", "peak_memory", "disk_size"), math.nan)
     try:
+        if finest and not is_data(bench.case):
+            finest.check(setting)
         run = bench.run(setting)
     except NotRun as error:
         return row | costs | {"note": str(error)}

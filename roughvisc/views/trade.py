@@ -102,7 +102,9 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     known = np.isfinite(spent) & np.isfinite(wrong)
     positive = wrong[known & (wrong > 0)]
     lowest = positive.min() if positive.size else 1e-3
-    floor = lowest / 3 if (wrong[known] == 0).any() else lowest
+    nothing = bool((wrong[known] == 0).any())
+    floor = lowest / 3 if nothing else lowest
+    bottom = floor / (3 if nothing else 1.8)
     height = np.maximum(wrong, floor)
     best = np.flatnonzero(front(dataset, quantity))
     best = best[np.argsort(spent[best], kind="stable")]
@@ -116,11 +118,12 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlim(spent[known].min() / 1.6, spent[known].max() * 3)
-    ax.set_ylim(floor / 1.8, height[known].max() * 2)
-    if (wrong[known] == 0).any():
+    ax.set_ylim(bottom, height[known].max() * 2)
+    if nothing:
+        ax.axhline(floor * 1.7, color="0.6", lw=0.6, ls=(0, (1, 2)), zorder=0)
         ax.text(0.02, floor, "none seen", transform=ax.get_yaxis_transform(), fontsize=6, style="italic", va="center")
-    if unsure > floor / 1.8:
-        ax.axhspan(floor / 1.8, min(unsure, height[known].max()), color="0.93", zorder=0, label="reference not known")
+    if unsure > bottom:
+        ax.axhspan(bottom, min(unsure, height[known].max()), color="0.93", zorder=0, label="reference not known")
     for axis, most in ((ax.xaxis, 30), (ax.yaxis, 300)):
         low, high = axis.get_view_interval()
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < most * low else (1.0,), numticks=20))
