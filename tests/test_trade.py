@@ -153,6 +153,14 @@ def test_reference__that_would_take_too_long_is_refused(tmp_path):
         measured(case_of(tmp_path, ROUGH), Setting(1e-2), budget=1e-6)
 
 
+def test_settings__finer_than_the_affordable_reference_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(Bench, "expected", lambda _self, setting: 1e9 if setting.coarsening < 1 else 0.0)
+    ds = measured(case_of(tmp_path), Setting(1e-2), Setting(1e-2, coarsening=0.5), reference="run")
+    assert set(ds.reference.values) == {"finest run: tolerance = 2e-3"}
+    assert ds.note[0] == ""
+    assert ds.note[1].item().startswith("finer than the run to measure it against")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [({"budget": 0}, "budget is 0"), ({"reference": "best"}, "reference is 'best'")],
@@ -351,6 +359,8 @@ def test_trade__is_labelled_and_survives_its_file(tmp_path):
     again = open_trade(write_trade(ds, tmp_path / "trade.nc"))
     xr.testing.assert_equal(again, ds)
     assert again.attrs["recommendation"] == ds.attrs["recommendation"]
+    with xr.open_dataset(tmp_path / "trade.nc") as plain:
+        assert len(rv.plot.trade(plain).axes) == 2
     with pytest.raises(rv.InputError, match="is no trade"):
         open_trade(write_trade(ds[["error"]], tmp_path / "other.nc"))
     with pytest.raises(rv.InputError, match="cannot be opened"):

@@ -101,6 +101,13 @@ def test_cheapest__does_not_trust_a_stroke_of_luck():
     assert recommend.cheapest(ds, AREA, 0.01) == 0, "all sharper ones keep this"
 
 
+def test_cheapest__does_not_let_the_noise_of_a_clock_decide():
+    alike = [(Setting(1e-3), 1.05, 0.001), (Setting(1e-3, memory="direct"), 1.0, 0.001)]
+    assert recommend.cheapest(made_up(alike), AREA, 0.01) == 0
+    slower = [(Setting(1e-3), 1.2, 0.001), alike[1]]
+    assert recommend.cheapest(made_up(slower), AREA, 0.01) == 1
+
+
 def test_cheapest__takes_none_that_was_not_measured():
     assert recommend.cheapest(made_up([(Setting(1e-2), np.nan, np.nan), MADE_UP[3]]), AREA, 0.01) == 1
 

@@ -6,6 +6,7 @@ import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
@@ -249,6 +250,9 @@ def _labelled(
     dataset.attrs = {
         "Conventions": "CF-1.11",
         "title": case.title,
+        "source": f"roughvisc {metadata.version('roughvisc')}",
+        "comment": "One case computed under many settings, each timed and held against 'reference'; attribute 'case' "
+        "states it (JSON, SI units).",
         "case": case.to_json(),
         "grid_is_data": int(is_data(case)),
         "transforms": transform_engine(),
