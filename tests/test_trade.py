@@ -161,6 +161,12 @@ def test_settings__finer_than_the_affordable_reference_are_left_out(tmp_path, mo
     assert ds.note[1].item().startswith("finer than the run to measure it against")
 
 
+def test_reference__is_not_on_a_coarser_grid_than_the_study(tmp_path, monkeypatch):
+    monkeypatch.setattr(Bench, "expected", lambda _self, setting: 1e9 if setting.coarsening < 2 else 0.0)
+    with pytest.raises(rv.InputError, match=r"would take about 1e\+09 s"):
+        measured(case_of(tmp_path), Setting(1e-2), Setting(1e-2, coarsening=2.0), reference="run")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [({"budget": 0}, "budget is 0"), ({"reference": "best"}, "reference is 'best'")],

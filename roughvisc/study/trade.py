@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
@@ -15,20 +14,18 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import transform_engine
-from roughvisc.study.bench import Bench, NotRun, Report, Run
+from roughvisc.study.bench import Bench, NotRun, Report
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.exact import QUANTITIES, ClosedForm, closed_form
+from roughvisc.study.finest import Finest
 from roughvisc.study.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.recommend import recommendation
-from roughvisc.study.richardson import differences, grid_uncertainty, time_uncertainty
 from roughvisc.study.scene import kept_times
 from roughvisc.study.trade_watch import reporting
 from roughvisc.variables import annotate
 
 #: Kept times where a study keeps all accepted steps, which differ from setting to setting.
 _INSTANTS = 9
-#: The reference's tolerance is the sharpest measured one over this.
-_SHARPER = 5.0
 
 
 def trade(
@@ -93,7 +90,7 @@ def trade(
     with tempfile.TemporaryDirectory() as folder, reporting(progress) as report:
         bench = Bench(case, height, Path(folder), budget, report)
         known = exact.quantities if exact else ()
-        finest = None if set(QUANTITIES) <= set(known) else _Finest(bench, rungs, is_data(case))
+        finest = None if set(QUANTITIES) <= set(known) else Finest(bench, rungs, is_data(case))
         rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
     order = [rungs.index(row["rung"]) for row in rows]
     rows = [rows[i] for i in np.argsort(order, kind="stable")]
@@ -110,79 +107,7 @@ def _comparable(case: Case) -> Case:
     return vary(case, changes)
 
 
-class _Finest:
-    """The finest run of a case, and how far it may be off."""
-
-    def __init__(self, bench: Bench, rungs: Sequence[Setting], data: bool) -> None:
-        fast = [setting for setting in rungs if setting.method == "fast"] or list(rungs)
-        self.sharpest = min(setting.tolerance for setting in fast)
-        grids = [1.0] if data else sorted({setting.coarsening for setting in rungs})
-        candidates = [Setting(self.sharpest / _SHARPER, coarsening=grid) for grid in grids]
-        allowed = bench.left / 2
-        self._setting = next((one for one in candidates if bench.expected(one) <= allowed), candidates[-1])
-        self._bench = bench
-        self._coarser: dict[float, dict[str, float]] = {}
-        expected = bench.expected(self._setting)
-        if expected > allowed:
-            where = f"{bench.case.origin}: " if bench.case.origin else ""
-            raise InputError(
-                f"{where}surface: the run that all others are measured against would take about {expected:.3g} s, "
-                f"more than half of the {bench.left:.0f} s allowed: give a larger budget, or resample the surface"
-            )
-        try:
-            self.run: Run = bench.run(self._setting)
-        except NotRun as error:
-            where = f"{bench.case.origin}: " if bench.case.origin else ""
-            raise InputError(f"{where}the run that all others are measured against: {error}") from error
-        self.name = f"finest run: {bench.label(self._setting)}"
-        self.time, self.grid = self._uncertainties()
-
-    def check(self, setting: Setting) -> None:
-        """Refuse a setting that is finer than what it would be measured against."""
-        if setting.coarsening < self._setting.coarsening:
-            raise NotRun("finer than the run to measure it against, for which there is no time")
-
-    def errors(self, dataset: xr.Dataset) -> dict[str, float]:
-        """Of a result at the same times."""
-        return differences(dataset, self.run.dataset)
-
-    def of_coarsening(self, factor: float) -> dict[str, float]:
-        """Errors that a grid alone makes: of a run on it that is as sharp as the finest one."""
-        if factor == self._setting.coarsening:
-            return dict.fromkeys(QUANTITIES, 0.0)
-        if factor not in self._coarser:
-            try:
-                run = self._bench.run(replace(self._setting, coarsening=factor))
-                self._coarser[factor] = self.errors(run.dataset)
-            except NotRun:
-                self._coarser[factor] = dict.fromkeys(QUANTITIES, math.nan)
-        return self._coarser[factor]
-
-    def _uncertainties(self) -> tuple[dict[str, float], dict[str, float]]:
-        """What the steps and what the grid leave unknown; missing where the runs for it cannot be had."""
-        bench, setting = self._bench, self._setting
-        unknown = dict.fromkeys(QUANTITIES, math.nan)
-        in_time = unknown
-        try:
-            looser = self.errors(bench.run(replace(setting, tolerance=self.sharpest)).dataset)
-            in_time = {name: time_uncertainty(value, _SHARPER) for name, value in looser.items()}
-            second = bench.run(replace(setting, coarsening=2 * setting.coarsening)).dataset
-        except NotRun:
-            return in_time, unknown
-        near = self._coarser[2 * setting.coarsening] = self.errors(second)
-        try:
-            third = bench.run(replace(setting, coarsening=4 * setting.coarsening)).dataset
-        except NotRun:
-            far = unknown
-        else:
-            far = differences(third, second)
-            self._coarser[4 * setting.coarsening] = self.errors(third)
-        fine = self.run.dataset
-        ratio = math.sqrt(fine.sizes["x"] * fine.sizes["y"] / (second.sizes["x"] * second.sizes["y"]))
-        return in_time, {name: grid_uncertainty(name, near[name], far[name], ratio) for name in QUANTITIES}
-
-
-def _row(bench: Bench, setting: Setting, exact: ClosedForm | None, finest: _Finest | None) -> dict[str, Any]:
+def _row(bench: Bench, setting: Setting, exact: ClosedForm | None, finest: Finest | None) -> dict[str, Any]:
     """What a setting cost and how wrong it was, or why that is not known."""
     shape = shape_of(bench.case, bench.shape, setting.coarsening)
     missing = dict.fromkeys(QUANTITIES, math.nan)
@@ -229,7 +154,7 @@ _COORDS = ("setting", "family", "method", "memory", "tolerance", "time_step", "c
 
 
 def _labelled(
-    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: _Finest | None
+    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: Finest | None
 ) -> xr.Dataset:
     names = [name for name in rows[0] if name != "rung"]
     columns: dict[str, Any] = {}
