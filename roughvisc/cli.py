@@ -215,6 +215,58 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
         raise _Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
 
 
+@main.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of what is found. [default: results/STUDY-trade]")
+@click.option("--apply", "target", metavar="PART", help="Write the setting for this accuracy into STUDY: 1%.")
+@click.option("--quantity", default="contact_area_corrected", help="Whose accuracy --apply means.", show_default=True)
+@click.option("--budget", metavar="TIME", default="5 min", help="Wall time of all runs together.", show_default=True)
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
+    """Measure what accuracy costs in a study, and say which setting to take.
+
+    The case is computed under a ladder of settings: tolerances, grids, fixed steps, memories, the seed paper's
+    algorithm. Each is timed and held against a closed form where the case has one, else against its own finest run.
+    A NetCDF and a figure are written; --apply sets the keys of STUDY, whose comments and layout stay.
+
+    \b
+    Example:
+      roughvisc trade workflows/ball_on_rubber.toml
+      roughvisc trade study.toml --apply 1%
+    """
+    from dask.system import CPU_COUNT
+    from rich.console import Console
+    from scipy import fft
+
+    from roughvisc.study import recommend, trade_file
+    from roughvisc.study.apply import apply
+    from roughvisc.study.case import read_study
+    from roughvisc.study.trade import trade as measured
+    from roughvisc.study.trade_watch import reporting
+    from roughvisc.views.plot import trade as figure
+    from roughvisc.views.trade_table import trade_table
+
+    case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
+    folder, part = trade_file.trade_folder(case, out), None
+    recommend.known_quantity(quantity, "--quantity")
+    if target is not None:
+        part = trade_file.part_of_one(target, "--apply")
+        trade_file.check_writable(study)
+    with reporting(True, console) as report, fft.set_workers(CPU_COUNT):
+        dataset = measured(case, budget=time, progress=report)
+    console.print(trade_table(dataset))
+    _say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
+    _draw(figure(dataset), folder / "trade.png")
+    _say(console, "Figure", folder / "trade.png")
+    if part is not None:
+        index = recommend.cheapest(dataset, quantity, part)
+        if index is None:
+            shortfall = recommend.shortfall(dataset, quantity, part)
+            raise _Failure(f"{study}: --apply {target}: {shortfall}; the study is as it was", 1)
+        changes = apply(study, recommend.keys_of(dataset, index))
+        console.print(f"{study}: {changes or 'as it should be already'}", soft_wrap=True, highlight=False)
+
+
 def _say(console: Console, what: str, path: Path) -> None:
     """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)

@@ -46,6 +46,7 @@ class Variable:
 _GRID = ("x", "y")
 _FRAME = ("time", "x", "y")
 _SERIES = ("time",)
+_RUNS = ("setting",)
 
 VARIABLES: dict[str, Variable] = {
     # coordinates: x and y carry no `axis` attribute, which would make ParaView wrap the surface on a sphere
@@ -115,8 +116,62 @@ VARIABLES: dict[str, Variable] = {
         "estimated relative error of pressure (L1) and approach due to time steps",
         "not available (missing) for fixed time steps without an estimate",
     ),
+    "grid_error": Variable(
+        _SERIES,
+        "1",
+        "estimated relative error of pressure (L1) and approach due to the grid",
+        "from the same history on cells twice as long, by Richardson extrapolation; the pressure over the largest "
+        "force; of a scan it holds what roughness its coarser copy has lost",
+    ),
+    "grid_error_area": Variable(
+        _SERIES, "1", "estimated relative error of the corrected contact area due to the grid", "as grid_error"
+    ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),
+    # a trade of accuracy against speed: what was set, what it cost, how wrong it was
+    "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
+    "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
+    "family": Variable(_RUNS, "", "what the setting varies", dtype="str"),
+    "method": Variable(_RUNS, "", "method of solution", dtype="str"),
+    "memory": Variable(_RUNS, "", "memory asked for", dtype="str"),
+    "tolerance": Variable(_RUNS, "1", "tolerance asked for"),
+    "time_step": Variable(_RUNS, "s", "fixed time step", "missing where steps were chosen by the tolerance"),
+    "coarsening": Variable(_RUNS, "1", "length of a cell over that of the study's"),
+    "precision": Variable(_RUNS, "1", "relative precision of the fields in the file", "missing where exact"),
+    "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
+    "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
+    "run_time": Variable(_RUNS, "s", "wall time of computing the result and writing its file"),
+    "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
+    "steps": Variable(_RUNS, "1", "accepted time steps"),
+    "peak_memory": Variable(_RUNS, "byte", "memory of the process at its peak", "counted from the arrays it needs"),
+    "disk_size": Variable(_RUNS, "byte", "size of the result's file"),
+    "note": Variable(_RUNS, "", "why the setting was not measured; empty if it was", dtype="str"),
+    "error": Variable(
+        ("setting", "quantity"),
+        "1",
+        "relative error against the reference",
+        "the worst over the kept times; pressure: its absolute difference summed (L1) over the largest force; any "
+        "other: over its largest value",
+    ),
+    "coarsening_error": Variable(
+        ("setting", "quantity"),
+        "1",
+        "part of the error that the coarser grid alone makes",
+        "of a run as sharp in time as the reference; on a scan it holds what the surface has lost",
+    ),
+    "reference": Variable(("quantity",), "", "what the errors are measured against", dtype="str"),
+    "reference_time_uncertainty": Variable(
+        ("quantity",),
+        "1",
+        "how far the reference itself may be off due to time steps",
+        "by Richardson extrapolation; zero if exact",
+    ),
+    "reference_grid_uncertainty": Variable(
+        ("quantity",),
+        "1",
+        "how far the reference itself may be off due to the grid",
+        "by Richardson extrapolation; zero if exact; of a scan: what its spacing leaves unknown",
+    ),
 }
 
 #: Fields that the user may ask for in ``fields``.
@@ -146,7 +201,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         found = annotated[name].dims
         if found[-len(declared.dims) :] != declared.dims:
             raise ValueError(f"variable {name!r} has dimensions {found}, declared are {declared.dims}")
-        if annotated[name].dtype != np.dtype(declared.dtype) and annotated[name].dtype.kind != "f":
+        if annotated[name].dtype != np.dtype(declared.dtype) and annotated[name].dtype.kind not in "fUO":
             annotated[name] = annotated[name].astype(declared.dtype)
         annotated[name].attrs.update(declared.attributes())
     if "status" in annotated:

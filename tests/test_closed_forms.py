@@ -480,3 +480,14 @@ def test_westergaard_half_width__is_elastic_with_the_compliance_of_the_moment():
         elastic = cf.westergaard(1e-3, 1.0, 1e6 / float(ZENER.contact_compliance(t)), 200.0)
         soft = materials.zener(1e6, 0.5e6, 0.5e6)
         assert float(cf.westergaard_half_width(1e-3, 1.0, soft, program, t)) == pytest.approx(elastic.half_width)
+
+
+def test_reduced_contact__keeps_times_that_are_no_exact_sums():
+    """0.1 + (0.35 - 0.1) is not 0.35 in floating point: the state at such a time was left zero."""
+    times = np.linspace(0, 0.4, 9)
+    assert 0.1 + (times[7] - 0.1) != times[7]
+    program = Program().approach(1e-2, over=0.1).approach(2e-3, over=0.3)
+    found = cf.reduced_contact(cf.Cone(0.02), materials.maxwell(1.0, 1.0), program, times, steps=20)
+    value = np.interp(times, [0, 0.1, 0.4], [0, 1e-2, 2e-3])
+    assert found.approach == pytest.approx(value, rel=1e-12)
+    assert np.all(found.radius[1:] > 0)

@@ -8,9 +8,10 @@ from test_run import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.mechanics.engine import engine_for
 from roughvisc.study import plan as plan_module
 from roughvisc.study.case import read_cases, vary
-from roughvisc.study.estimate import coarse
+from roughvisc.study.estimate import March, coarse, wall_time
 from roughvisc.study.simulate import simulate
 
 ROUGH = """
@@ -171,3 +172,12 @@ def test_coarse__is_the_same_surface_with_fewer_points():
     assert float(small.x[-1] + small.x[0]) == pytest.approx(2e-4)
     assert simulate(small, rv.elastic(1e6), rv.Program().load(1e-4, over=0), progress=False).sizes["x"] == 17
     assert coarse(ball, 500).shape == (90, 101)
+
+
+def test_plan__counts_the_coarser_solve_of_a_grid_error(study):
+    plain = study(ROUGH)[0]
+    asked = vary(plain, {"solve.grid_error": True})
+    engine = engine_for(plain.material(), 0.51, 2e-3)
+    found = March(20, 10, 400, 0.0, 0.1, True)
+    seconds = [wall_time(case, 90 * 108, found, engine, 1e-3) for case in (plain, asked)]
+    assert seconds[0] + 0.25 * 0.4 <= seconds[1] <= 2 * seconds[0], "a quarter of the cells, at least"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
+from roughvisc.errors import InputError
 from roughvisc.mechanics.history import History, history_bytes
 from roughvisc.mechanics.materials import Material, Prony
 from roughvisc.mechanics.memory import ActsOn, Memory, Modes, stiff_ratio
@@ -16,6 +18,10 @@ SERIES_SHARE = 0.1
 SHORTEST_AGE = 1e-6
 #: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
 _SHORTEST_STEP = 1e-3
+
+
+#: Which memory to take: the cheapest that is accurate enough, or every past pressure.
+Kind = Literal["auto", "direct"]
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,13 @@ class Engine:
     note: str
 
 
-def engine_for(material: Material, duration: float, tolerance: float, acts_on: ActsOn = "displacement") -> Engine:
+def engine_for(
+    material: Material,
+    duration: float,
+    tolerance: float,
+    acts_on: ActsOn = "displacement",
+    kind: Kind = "auto",
+) -> Engine:
     """Memory for a material over a program.
 
     Parameters
@@ -50,6 +62,8 @@ def engine_for(material: Material, duration: float, tolerance: float, acts_on: A
         Relative error that the whole computation is allowed.
     acts_on : {"displacement", "pressure"}
         The form that a recursive memory takes.
+    kind : {"auto", "direct"}
+        ``direct``: the direct history, whatever the material; dearer, and independent of any series.
 
     Returns
     -------
@@ -60,8 +74,17 @@ def engine_for(material: Material, duration: float, tolerance: float, acts_on: A
     Raises
     ------
     InputError
-        If the material is not known over the whole program.
+        If the material is not known over the whole program, or the direct history of it would ring.
     """
+    if kind not in ("auto", "direct"):
+        raise InputError(f"memory is {kind!r}: expected 'auto' or 'direct'")
+    if kind == "direct":
+        if duration > 0 and not _direct_is_accurate(material, duration):
+            raise InputError(
+                "memory='direct' takes the pressure as linear in each step, which rings on this material: "
+                "expected memory='auto', or an instantaneous compliance that is not small"
+            )
+        return Engine(History(material), 0.0, "direct history of every pressure, as asked for")
     if isinstance(material, Prony):
         return Engine(Modes(material, acts_on), 0.0, _terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters

@@ -272,16 +272,22 @@ def _pass(
                 raise InputError("a jump of approach needs a material with instantaneous compliance")
             else:
                 run.pending_load = segment.end
-            kept[:, times == end] = run.state[:, None] if can_jump or end == 0 else kept[:, times == end]
+            at = _same(times, end)
+            kept[:, at] = run.state[:, None] if can_jump or end == 0 else kept[:, at]
             continue
         begin = run.value(segment.control)
         before = 0.0
         for instant in mesh:
             run.advance(float(instant) - before, segment.control, segment.value(float(instant), begin))
             before = float(instant)
-            at = times == start + before if before < segment.duration else times == end
+            at = _same(times, start + before if before < segment.duration else end)
             kept[:, at] = run.state[:, None]
     return kept, run.largest_radius
+
+
+def _same(times: Array, instant: float) -> NDArray[np.bool_]:
+    """Which of the times an instant is: a time less the start of its segment, plus that, may be a rounding off."""
+    return np.abs(times - instant) <= 4 * np.finfo(float).eps * times
 
 
 def _growing_row(run: Callable[..., tuple[Array, float]], outermost: float) -> tuple[tuple[Array, float], float]:

@@ -152,6 +152,8 @@ def march_seed(scene: Scene) -> Iterator[Step]:
         raise InputError("method='seed' treats given loads and complete surfaces only; use method='fast'")
     largest_step = scene.time_step or scene.program.duration / 100
     state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), None)
+    if scene.program.segments and scene.program.segments[0].duration > 0:
+        yield Step(state.now, np.zeros_like(scene.gap), None, 0.0, 0.0, math.nan, True, scene, state)
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
         state = replace(state, segment=index, began=state.now.time, start=state.now.force)

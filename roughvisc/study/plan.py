@@ -190,9 +190,10 @@ class _Engines:
     def of(self, case: Case, grows: bool) -> Engine:
         settings, duration = case.settings, case.program().duration
         acts_on = "pressure" if grows else "displacement"
-        name = f"{settings.material!r} {duration!r} {settings.solve.tolerance!r} {acts_on}"
+        name = f"{settings.material!r} {duration!r} {settings.solve.tolerance!r} {settings.solve.memory} {acts_on}"
         if name not in self._found:
-            self._found[name] = engine_for(case.material(), duration, settings.solve.tolerance, acts_on)
+            solve = settings.solve
+            self._found[name] = engine_for(case.material(), duration, solve.tolerance, acts_on, solve.memory)
         return self._found[name]
 
 

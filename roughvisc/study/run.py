@@ -124,6 +124,8 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
             method=settings.solve.method,
             missing=settings.surface.missing,
             edge=settings.solve.edge,
+            memory=settings.solve.memory,
+            grid_error=settings.solve.grid_error,
             progress=progress,
             keeper=keeper,
         )

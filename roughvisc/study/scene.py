@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.engine import Engine, engine_for
+from roughvisc.mechanics.engine import Engine, Kind, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
@@ -124,6 +124,7 @@ def prepare(
     time_step: float | Literal["auto"],
     times: int | Sequence[float] | None,
     edge: Literal["error", "accept"],
+    memory: Kind = "auto",
 ) -> tuple[Scene, Engine]:
     """Scene of a case and what models its material; see :func:`roughvisc.simulate` for the parameters.
 
@@ -144,7 +145,7 @@ def prepare(
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
     _check_approach(program, boundary, ground.gap[ground.present])
-    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement")
+    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
     scene = Scene(
         halfspace=ground.halfspace(boundary),
         material=material,

@@ -5,21 +5,23 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import xarray as xr
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.engine import Kind
 from roughvisc.mechanics.halfspace import Boundary
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.seed import march_seed
 from roughvisc.mechanics.stepper import march
 from roughvisc.study.checkpoint import Keeper, Reached
+from roughvisc.study.grid_error import with_grid_error
 from roughvisc.study.records import RowsInMemory
 from roughvisc.study.rows import Rows
 from roughvisc.study.scene import Ground, prepare
-from roughvisc.variables import FIELDS
+from roughvisc.variables import FIELDS, annotate
 
 log = logging.getLogger("roughvisc")
 
@@ -46,6 +48,8 @@ def simulate(
     method: Method = "fast",
     missing: Literal["refuse", "absent"] = "refuse",
     edge: Literal["error", "accept"] = "error",
+    memory: Kind = "auto",
+    grid_error: bool = False,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
     """Press a rigid profile on a linear viscoelastic half-space.
@@ -76,6 +80,11 @@ def simulate(
         Missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
         In free space, whether contact may reach the border of the grid.
+    memory : {"auto", "direct"}
+        ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
+    grid_error : bool
+        Whether to compute the history once more on cells twice as long, and to estimate from it the error that the
+        grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -117,11 +126,41 @@ def simulate(
         method=method,
         missing=missing,
         edge=edge,
+        memory=memory,
+        grid_error=grid_error,
         progress=progress,
     )
 
 
 def press(
+    height: xr.DataArray,
+    material: Material,
+    program: Program,
+    *,
+    fields: Sequence[str],
+    grid_error: bool,
+    progress: bool | Progress,
+    keeper: Keeper | None = None,
+    **settings: Any,
+) -> xr.Dataset:
+    """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
+
+    The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
+    """
+    needed = ("pressure",) if grid_error and "pressure" not in fields else ()
+    given = {"fields": (*fields, *needed), "keeper": keeper, "progress": progress}
+    dataset = _press(height, material, program, **given, **settings)
+    if not grid_error:
+        return dataset
+
+    def again(few: xr.DataArray, times: list[float]) -> xr.Dataset:
+        given = {"fields": ("pressure",), "keeper": None, "progress": False}
+        return _press(few, material, program, **given, **{**settings, "times": times})
+
+    return annotate(with_grid_error(dataset, height, again)).drop_vars(needed)
+
+
+def _press(
     height: xr.DataArray,
     material: Material,
     program: Program,
@@ -134,13 +173,10 @@ def press(
     method: Method,
     missing: Literal["refuse", "absent"],
     edge: Literal["error", "accept"],
+    memory: Kind,
     progress: bool | Progress,
-    keeper: Keeper | None = None,
+    keeper: Keeper | None,
 ) -> xr.Dataset:
-    """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
-
-    The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
-    """
     began = time.perf_counter()
     follow = boundary == "free" and edge == "error" and method == "fast"
     ground = Ground(height, missing, follow=follow)
@@ -153,6 +189,7 @@ def press(
         time_step=time_step,
         times=times,
         edge=edge,
+        memory=memory,
     )
     unknown = [name for name in fields if name not in FIELDS]
     if unknown:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: Variables where a value may be missing and NaN says so; any other has none, and no fill value.
-MAY_BE_MISSING = frozenset({"height", "gap", "time_error"})
+MAY_BE_MISSING = frozenset({"height", "gap", "time_error", "grid_error", "grid_error_area"})
 #: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
 #: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
 #: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.

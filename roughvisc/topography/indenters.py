@@ -141,6 +141,14 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     )
 
 
+def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
+    """The same indenter on another number of cells over the domain that it was made for; None if it is none."""
+    if grown(h, 1.0) is None:
+        return None
+    recipe = json.loads(h.attrs["recipe"])
+    return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
+
+
 def _sphere(x: np.ndarray, y: np.ndarray, radius: float, exact: bool) -> np.ndarray:
     r2 = x**2 + y**2
     if not exact:

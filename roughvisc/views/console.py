@@ -77,11 +77,17 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Approach at the end", readable(float(last["approach"]), "m")),
         (
             "Contact area at the end",
-            f"{readable(float(last['contact_area_corrected']), 'm2')}"
+            f"{readable(float(last['contact_area_corrected']), 'm2')} corrected for the grid, "
+            f"{readable(float(last['contact_area']), 'm2')} counted"
             f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
         ),
         ("Accuracy: worst residual", _number(dataset["residual"])),
         ("Accuracy: worst time error", _number(dataset["time_error"])),
+        *(
+            (f"Accuracy: worst {label}", _number(dataset[name]))
+            for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
+            if name in dataset
+        ),
         ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
         ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
         ("Cost: wall time", readable(float(last["wall_time"]), "s")),

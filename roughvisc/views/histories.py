@@ -19,6 +19,7 @@ from roughvisc.views.axes import (
     GREEN,
     ORANGE,
     PURPLE,
+    SKY,
     VERMILION,
     TimeAxis,
     letter_panels,
@@ -90,7 +91,12 @@ def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
     axis = TimeAxis.of(dataset["time"])
     times = axis.unit(dataset["time"])
     floor, ceiling = math.inf, 0.0
-    for name, label, colour in (("residual", "solver (energy bound)", PURPLE), ("time_error", "time steps", ORANGE)):
+    shown = (
+        ("residual", "solver (energy bound)", PURPLE),
+        ("time_error", "time steps", ORANGE),
+        ("grid_error", "grid", SKY),
+    )
+    for name, label, colour in shown:
         if name not in dataset:
             continue
         values = dataset[name].values.astype(float)

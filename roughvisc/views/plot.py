@@ -18,6 +18,7 @@ from roughvisc.views.distributions import contact_clusters, distributions
 from roughvisc.views.fields import maps, section
 from roughvisc.views.histories import area_against_load, history, hysteresis
 from roughvisc.views.surfaces import surface
+from roughvisc.views.trade import trade
 
 __all__ = [
     "animate",
@@ -30,6 +31,7 @@ __all__ = [
     "save_figures",
     "section",
     "surface",
+    "trade",
 ]
 
 #: What :func:`save_figures` draws: name -> (function, variables of which all, variables of which one is needed).

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
-from roughvisc.study.schema.entries import a_list, choice, measured, shown, whole
+from roughvisc.study.schema.entries import Flag, a_list, choice, measured, shown, whole
 from roughvisc.study.schema.section import Section, nearest
 from roughvisc.variables import FIELDS
 
@@ -64,6 +64,8 @@ class SolveSection(Section):
     ] = "auto"
     method: choice("fast", "seed") = "fast"
     edge: choice("error", "accept") = "error"
+    memory: choice("auto", "direct") = "auto"
+    grid_error: Flag = False
 
 
 class KeepSection(Section):

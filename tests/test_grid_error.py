@@ -1,0 +1,120 @@
+"""The grid's error on request: what it says against closed forms, and how a surface is made coarser."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_run import BALL
+
+import roughvisc as rv
+from roughvisc import closed_forms
+from roughvisc.study.case import Case, read_study
+from roughvisc.study.coarser import block_means, coarser, edges_of, pressure_distance
+from roughvisc.topography.indenters import grown
+
+RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
+RUBBER = rv.zener(3e6, 3e6, 0.3e6)
+PRESS = rv.Program().load(LOAD, over=0).hold(0.4)
+TIMES = [0.0, 0.1, 0.4]
+EXACT = closed_forms.lee_radok_step(RADIUS, RUBBER, LOAD)
+
+
+def pressed(shape, **settings):
+    settings = {"times": TIMES, "tolerance": 1e-3, "progress": False, "grid_error": True, **settings}
+    return rv.simulate(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
+
+
+def true_errors(ds):
+    """Of pressure and approach, the larger; and of the corrected area, each at its worst time."""
+    r = np.hypot(ds.x.values[:, None] - SIZE[0] / 2, ds.y.values - SIZE[1] / 2)
+    cell = float(np.prod([SIZE[i] / ds.sizes[axis] for i, axis in enumerate(("x", "y"))]))
+    pressure = [np.abs(ds.pressure[i].values - EXACT.pressure(r, t)).sum() * cell / LOAD for i, t in enumerate(TIMES)]
+    approach = np.abs(ds.approach.values - EXACT.approach(TIMES)) / EXACT.approach(TIMES[-1])
+    area = np.abs(ds.contact_area_corrected.values / (np.pi * EXACT.radius(TIMES) ** 2) - 1)
+    return max(*pressure, *approach), float(area.max())
+
+
+@pytest.mark.parametrize("shape", [(47, 60), (33, 31), 64])
+def test_grid_error__bounds_the_true_one_and_is_of_its_size(shape):
+    ds = pressed(shape)
+    true, true_area = true_errors(ds)
+    assert true < float(ds.grid_error.max()) < 5 * true
+    assert true_area < float(ds.grid_error_area.max()) < 10 * true_area
+
+
+def test_grid_error__falls_with_the_grid():
+    coarse, fine = (float(pressed(n, fields=("pressure",)).grid_error.max()) for n in (32, 96))
+    assert coarse / fine > 3  # first order at least
+
+
+def test_grid_error__is_missing_unless_asked_for_and_leaves_the_rest_alone():
+    plain, asked = pressed((24, 21), grid_error=False), pressed((24, 21))
+    assert not {"grid_error", "grid_error_area"} & set(plain.variables)
+    xr.testing.assert_equal(plain.drop_vars("wall_time"), asked[list(plain.variables)].drop_vars("wall_time"))
+    assert "pressure" not in pressed((24, 21), fields=())
+
+
+def test_grid_error__is_missing_where_the_coarser_solve_fails():
+    height = rv.sphere(RADIUS, SIZE, (24, 21)) * 1.0
+    height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
+    at_border = {"times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
+    load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
+    ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
+    assert np.isnan(ds.grid_error).all()
+    assert np.isnan(ds.grid_error_area).all()
+
+
+def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
+    file = tmp_path / "ball.toml"
+    file.write_text(BALL + "[solve]\ngrid_error = true\n")
+    case = read_study(file)
+    with rv.run(case, tmp_path / "out", progress=False) as ds:
+        assert (ds.grid_error > 0).all()
+        assert ds.grid_error.attrs["long_name"].endswith("due to the grid")
+    file.write_text(BALL)
+    assert read_study(file).key != case.key
+    assert Case.from_json(case.to_json()).key == case.key
+
+
+def test_direct_memory__gives_the_same_contact():
+    settings = {"grid_error": False, "tolerance": 1e-4}
+    series, direct = pressed((33, 31), **settings), pressed((33, 31), memory="direct", **settings)
+    assert "direct history" in direct.attrs["memory"]
+    assert direct.approach.values == pytest.approx(series.approach.values, rel=2e-4)
+
+
+def test_direct_memory__is_refused_where_it_would_ring():
+    soft = rv.kelvin_voigt(1e6, 1e5)
+    with pytest.raises(rv.InputError, match="memory='direct'"):
+        rv.simulate(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, memory="direct", progress=False)
+
+
+def test_coarser__makes_an_indenter_anew_and_averages_anything_else():
+    ball = rv.sphere(RADIUS, SIZE, (31, 24))
+    few = coarser(ball, 2)
+    assert few.shape == (17, 12)
+    assert grown(few) is not None
+    rough = rv.self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2)
+    means = rough.values.reshape(15, 2, 12, 2).mean((1, 3))
+    assert coarser(rough, 2).values == pytest.approx(means, abs=1e-12 * float(abs(rough).max()))
+
+
+def test_block_means__conserve_the_force_on_any_grid():
+    field = np.random.default_rng(3).random((2, 7, 5))
+    cells = (np.linspace(0, 7, 8), np.linspace(0, 10, 6))
+    onto = (np.linspace(-1, 8, 4), np.linspace(0, 10, 4))
+    means = block_means(field, cells, onto)
+    area = np.diff(onto[0])[:, None] * np.diff(onto[1])
+    assert (means * area).sum((-2, -1)) == pytest.approx(field.sum((-2, -1)) * 1 * 2, rel=1e-12)
+    assert edges_of(np.array([0.5, 1.5, 2.5])).tolist() == [0, 1, 2, 3]
+
+
+def test_pressure_distance__counts_what_lies_outside_the_other_grid():
+    def uniform(low, high, pressure):
+        centres = np.arange(low + 0.5, high)
+        shape = (1, len(centres), len(centres))
+        coords = {"time": [0.0], "x": centres, "y": centres}
+        return xr.Dataset({"pressure": (("time", "x", "y"), np.full(shape, pressure))}, coords=coords)
+
+    small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
+    assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]
+    assert pressure_distance(large, small).tolist() == [20.0]
