@@ -366,7 +366,7 @@ def validate(cells: int) -> None:
 
     \b
     Example:
-      roughvisc validate
+      roughvisc validate --cells 65
     """
     from rich.console import Console
 
