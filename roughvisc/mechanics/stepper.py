@@ -40,6 +40,9 @@ _SOFT = 0.1
 _DISCARDED = 1e-3  # length of that solve, in steps
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step before it gets
 _SMALLEST_STEP = 1e-6  # of the segment
+_ROUNDING = (
+    1e-11  # of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform
+)
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,7 @@ class State:
     contact_since : float
         Time at which the surfaces last came into contact. [s]
     work : float
-        Work of the force on the approach since the start; jumps count as quasi-static. [J]
+        Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
     blind : bool
@@ -327,7 +330,10 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
     now = trial.instant
     touching = now.force > 0
     # an unresolved jump of the load precedes the step
-    mean_force = now.force if state.unresolved else 0.5 * (state.now.force + now.force)
+    mean = now.pressure if state.unresolved else 0.5 * (state.now.pressure + now.pressure)
+    # Of the pressure on the displacement: where surfaces touch that is the force on the approach, and cells that touch
+    # in a part of the step only count by that part. Without memory it is the stored energy, whatever the steps.
+    work = float(np.sum(mean * (now.displacement - state.now.displacement))) * scene.halfspace.cell_area
     return replace(
         state,
         now=now,
@@ -336,7 +342,7 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
-        work=state.work + mean_force * (now.approach - state.now.approach),
+        work=state.work + work,
         unresolved=False,
         blind=False,
     )
@@ -680,7 +686,9 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
         elapsed = scene.compliance(trial.instant.time - since)
         soft = scene.compliance(max(event, trial.instant.time) - since) / elapsed if elapsed > 0 else 1.0
     force = max(state.largest_force, trial.instant.force * ahead)
-    approach = max(state.largest_approach, abs(trial.instant.approach) * ahead * soft)
+    approach = max(
+        state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
+    )
     difference = float(np.sum(np.abs(trial.instant.pressure - _extrapolated(state, trial.length))))
     pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
     ratio = trial.length / last
@@ -693,6 +701,12 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
     if segment.control == "approach":
         scalar_error *= fading
     return share * _error_constant(trial, last) * max(fading * pressure_error, scalar_error)
+
+
+def _unresolved_approach(scene: Scene, now: Instant) -> float:
+    """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
+    pressure = now.force / (now.pressure.size * scene.halfspace.cell_area)
+    return _ROUNDING * scene.compliance(now.time) * pressure * scene.halfspace.largest_influence
 
 
 def _error_constant(trial: _Trial, last: float) -> float:

@@ -15,7 +15,7 @@ from roughvisc.study.schema.surface import FileSurface, SurfaceSection
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
-NUMERICS_REVISION = 1
+NUMERICS_REVISION = 2
 
 #: Keys of a surface card that say whence it came and change no height.
 _PROSE = {
