@@ -173,3 +173,15 @@ def test_random_cases__are_contact_states(monkeypatch, capsys):
     for name, wrong in [("pressure", -ds.pressure), ("force", 2 * ds.force), ("displacement", 0 * ds.displacement),
                         ("work", -ds.work), ("approach", ds.approach * np.nan)]:  # fmt: skip
         assert random_cases.violations(ds.assign({name: wrong})), name
+
+
+@pytest.mark.parametrize("method", ["fast", "seed"])
+def test_work_of_a_jump__is_two_fifths_under_a_sphere(method):
+    """Hertz, loaded at once: the stored energy, not half of force times approach."""
+    ball = rv.sphere(1.0, 0.6, 41)
+    ds = simulate(
+        ball, rv.elastic(1.0), rv.Program().load(0.02, over=0).hold(1.0), "free", method=method, time_step=1.0
+    )
+    expected = 0.4 * float(ds.force[0] * ds.approach[0])
+    # of second order in h / a = 0.094
+    assert float(ds.work[-1]) == pytest.approx(expected, rel=1e-2)

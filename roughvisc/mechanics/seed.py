@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.materials import Prony
-from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event
+from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event, work_between
 
 Array = NDArray[np.float64]
 
@@ -198,7 +198,7 @@ def _advance(
     state = replace(
         state,
         now=now,
-        work=state.work + 0.5 * (state.now.force + load) * (now.approach - state.now.approach),
+        work=state.work + work_between(scene, state.now, now),
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),
     )

@@ -329,11 +329,6 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, trial.field)
     now = trial.instant
     touching = now.force > 0
-    # an unresolved jump of the load precedes the step
-    mean = now.pressure if state.unresolved else 0.5 * (state.now.pressure + now.pressure)
-    # Of the pressure on the displacement: where surfaces touch that is the force on the approach, and cells that touch
-    # in a part of the step only count by that part. Without memory it is the stored energy, whatever the steps.
-    work = float(np.sum(mean * (now.displacement - state.now.displacement))) * scene.halfspace.cell_area
     return replace(
         state,
         now=now,
@@ -342,10 +337,20 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
-        work=state.work + work,
+        work=state.work + work_between(scene, state.now, now, jumped=state.unresolved),
         unresolved=False,
         blind=False,
     )
+
+
+def work_between(scene: Scene, before: Instant, now: Instant, jumped: bool = False) -> float:
+    """Work of the pressure on the displacement from one instant to the next. [J]
+
+    Where surfaces touch that is the force on the approach; cells that touch in a part of the step count by that part
+    only. Without memory it is the stored energy, whatever the steps. ``jumped``: the pressure changed at once, before.
+    """
+    mean = now.pressure if jumped else 0.5 * (before.pressure + now.pressure)
+    return float(np.sum(mean * (now.displacement - before.displacement))) * scene.halfspace.cell_area
 
 
 def _spent(state: State, trial: _Trial) -> State:
