@@ -10,7 +10,8 @@ from roughvisc.study.case import read_cases, vary
 from roughvisc.study.run import run
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
-STUDIES = sorted(FOLDER.glob("*.toml"))
+#: But the map of extremes, whose script holds each case against its closed form.
+STUDIES = sorted(path for path in FOLDER.glob("*.toml") if path.stem != "stability_map")
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda p: p.stem)
@@ -36,6 +37,15 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             r, p = points.get_data()
             inside = r < 0.8 * line.get_xdata()[np.flatnonzero(line.get_ydata())[-1]]
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
+
+
+def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)
+    assert (tmp_path / "map.png").stat().st_size > 10_000
+    assert found.error.shape == (5, 5)
+    assert float(found.duration.max() / found.duration.min()) == pytest.approx(1e24)
+    assert (found.error < 1e-3).all(), "none refused, and the tolerance kept"
 
 
 def test_benchmarks__run_small(tmp_path, monkeypatch):

@@ -18,10 +18,10 @@ from roughvisc.mechanics.engine import Engine, engine_for
 from roughvisc.mechanics.memory import Modes
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, wall_time
+from roughvisc.study.notes import left_out
 from roughvisc.study.results import parameters_of
 from roughvisc.study.run import result_folder
 from roughvisc.study.scene import Ground
-from roughvisc.variables import FIELDS
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
@@ -220,7 +220,9 @@ def _row(
     except InputError as error:
         return row | {"refusal": str(error)}
     exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
-    row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": _left_out(case, engine)}
+    keep = case.settings.keep
+    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all")
+    row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
     cells = height.size
@@ -244,23 +246,6 @@ def _scheme(case: Case, engine: Engine, found: March) -> str:
         return f"no memory: each step by itself, steps {steps}"
     damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     return f"piecewise-linear pressure{damped}, steps {steps}"
-
-
-def _left_out(case: Case, engine: Engine) -> str:
-    """What nothing asks for, and is therefore not modelled, computed or kept."""
-    out = []
-    if engine.note.startswith("no memory"):
-        out.append("history (the material is elastic)")
-    elif engine.memory.acts_on == "displacement":
-        out.append("convolutions of the past")
-    if case.settings.solve.boundary == "periodic":
-        out.append("padding")
-    absent = [name for name in FIELDS if name not in case.settings.keep.fields]
-    if absent:
-        out.append(f"{' and '.join(absent)} in the file")
-    if case.settings.keep.times != "all":
-        out.append("steps between kept times in the file")
-    return ", ".join(out)
 
 
 # ----------------------------------------------------------------------------------------------------------------

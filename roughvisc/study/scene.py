@@ -18,6 +18,7 @@ from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
 from roughvisc.mechanics.window import Window, whole_domain, window_around
+from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
 from roughvisc.topography.indenters import grown
 
@@ -141,13 +142,16 @@ def prepare(
         raise InputError(f"time_step is {time_step!r}: expected 'auto' or a positive number [s]")
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
+    check_times(program, time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
     _check_approach(program, boundary, ground.gap[ground.present])
+    halfspace = ground.halfspace(boundary)
+    check_loads(program, material, halfspace, ground.gap[ground.present])
     engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
     scene = Scene(
-        halfspace=ground.halfspace(boundary),
+        halfspace=halfspace,
         material=material,
         memory=engine.memory,
         program=program,

@@ -17,6 +17,7 @@ from roughvisc.views.axes import fullest_frame, require
 from roughvisc.views.distributions import contact_clusters, distributions
 from roughvisc.views.fields import maps, section
 from roughvisc.views.histories import area_against_load, history, hysteresis
+from roughvisc.views.stability import stability_map
 from roughvisc.views.surfaces import surface
 from roughvisc.views.trade import trade
 
@@ -30,6 +31,7 @@ __all__ = [
     "maps",
     "save_figures",
     "section",
+    "stability_map",
     "surface",
     "trade",
 ]
