@@ -197,7 +197,7 @@ def _press(
         larger = ground.enlarge(scene)
         assert larger is not None, "it grew before"
         scene = larger[0]
-    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows)
+    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows, tolerance)
     spent = reached.wall_time - began
     kept = None if scene.times is None else set(scene.times)
     report, close = _reporter(progress)
