@@ -24,7 +24,9 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def left_out(engine: Engine, boundary: str, method: str, fields: Sequence[str], every_step: bool) -> str:
+def left_out(
+    engine: Engine, boundary: str, method: str, fields: Sequence[str], every_step: bool, window: bool = False
+) -> str:
     """What nothing asks for, and is therefore not modelled, computed or kept."""
     out = []
     if engine.note.startswith("no memory"):
@@ -33,6 +35,8 @@ def left_out(engine: Engine, boundary: str, method: str, fields: Sequence[str], 
         out.append("convolutions of the past")
     if boundary == "periodic":
         out.append("padding")
+    if window:
+        out.append("what lies too deep to be touched")
     absent = [name for name in FIELDS if name not in fields]
     if absent:
         out.append(f"{' and '.join(absent)} in the file")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,7 @@ from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, w
 from roughvisc.study.notes import left_out
 from roughvisc.study.results import parameters_of
 from roughvisc.study.run import result_folder
-from roughvisc.study.scene import Ground
+from roughvisc.study.scene import Ground, follows
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
@@ -52,11 +53,20 @@ _COLUMNS = {
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, or why it cannot be had."""
+    """A surface's height, or why it cannot be had.
+
+    ``windows`` are those that follow a contact on it, from small to large: the least gap beyond each [m], and the part
+    of the cells that it takes.
+    """
 
     height: xr.DataArray | None
     grows: bool
     problem: str
+    windows: tuple[tuple[float, float], ...] = ()
+
+    def solved_on(self, level: float) -> float:
+        """Part of the cells that are solved on where the approach comes to a level. [m]"""
+        return next((part for outside, part in self.windows if outside > level), 1.0)
 
 
 def plan(
@@ -164,10 +174,14 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        ground = Ground(height, case.settings.surface.missing)
+        ground = Ground(height, case.settings.surface.missing, follow=True)
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "")
+    windows = []
+    while not ground.window.whole:
+        windows.append((ground.window.outside, math.prod(ground.window.shape) / height.size))
+        ground.widen()
+    return _Surface(height, ground.can_grow(), "", tuple(windows))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -214,24 +228,26 @@ def _row(
     if surface is None or surface.height is None:
         return row
     height, grows = surface.height, surface.grows and free and solve.edge == "error"
+    window = bool(surface.windows) and follows(solve.boundary, solve.edge, solve.method)
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
-        engine = engines.of(case, grows)
+        engine = engines.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
     exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     keep = case.settings.keep
-    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all")
+    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all", window)
     row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
-    cells = height.size
+    cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
+    part = surface.solved_on(found.level) if window else 1.0
     return row | {
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,
         "rows": found.rows,
         "convolutions": found.convolutions,
-        "wall_time": wall_time(case, cells, found, engine, stopwatch.seconds(height, solve.boundary)),
+        "wall_time": wall_time(case, cells, found, engine, convolution, part),
         "memory": memory(case, cells, found, engine),
         "disk": disk(case, cells, found),
     }

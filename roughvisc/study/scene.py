@@ -53,6 +53,8 @@ class Ground:
         self._extent = float(_FIRST_EXTENT)
         if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT)
+        #: Whether the march begins on a window of the surface.
+        self.followed = not self.window.whole
 
     def _lay(self, height: xr.DataArray) -> None:
         self.height = _checked(height)
@@ -87,14 +89,18 @@ class Ground:
                 return None
             self._lay(larger)
         else:
-            before = self.window
-            while self.window == before:
-                self._extent *= GROWTH
-                self.window = window_around(self.gap, int(self._extent))
+            self.widen()
         self.growths += 1
         first = (self._cell("x", x) - self.window.first[0], self._cell("y", y) - self.window.first[1])
         halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
         return replace(scene, halfspace=halfspace, **self.shown()), first
+
+    def widen(self) -> None:
+        """Go on to the next larger window, which is the whole surface in the end."""
+        before = self.window
+        while self.window == before:
+            self._extent *= GROWTH
+            self.window = window_around(self.gap, int(self._extent))
 
     def shown(self) -> dict[str, Any]:
         """What a scene takes from the surface."""
@@ -113,6 +119,11 @@ class Ground:
         domain = (self.height.shape[0], self.height.shape[1])
         first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
         return Window(domain, first, (shape[0], shape[1]))
+
+
+def follows(boundary: str, edge: str, method: str) -> bool:
+    """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
+    return boundary == "free" and edge == "error" and method == "fast"
 
 
 def prepare(

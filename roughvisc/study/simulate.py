@@ -21,7 +21,7 @@ from roughvisc.study.grid_error import with_grid_error
 from roughvisc.study.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.records import RowsInMemory
 from roughvisc.study.rows import Rows
-from roughvisc.study.scene import Ground, prepare
+from roughvisc.study.scene import Ground, follows, prepare
 from roughvisc.variables import FIELDS, annotate
 
 log = logging.getLogger("roughvisc")
@@ -173,8 +173,7 @@ def _press(
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    follow = boundary == "free" and edge == "error" and method == "fast"
-    ground = Ground(height, missing, follow=follow)
+    ground = Ground(height, missing, follow=follows(boundary, edge, method))
     scene, engine = prepare(
         ground,
         material,
@@ -223,7 +222,7 @@ def _press(
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": slope_note(ground.height, boundary, float(dataset["approach"].max())),
-        "left_out": left_out(engine, boundary, method, fields, times is None),
+        "left_out": left_out(engine, boundary, method, fields, times is None, ground.followed),
     }
     if described["slope_note"]:
         log.warning("%s", described["slope_note"])
