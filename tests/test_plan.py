@@ -191,8 +191,8 @@ def test_plan__counts_the_window_that_follows_a_small_contact(study):
     (case,) = study(text)
     whole = vary(case, {"solve.edge": "accept"})
     planned = rv.plan([case, whole])
-    assert "too deep to be touched" in str(planned.left_out[0])
-    assert "too deep" not in str(planned.left_out[1])
+    assert "too deep to be touched" in str(planned.left_out.values[0])
+    assert "too deep" not in str(planned.left_out.values[1])
     assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
     ds = rv.run(case, progress=False)
-    assert ds.attrs["left_out"] == str(planned.left_out[0])
+    assert ds.attrs["left_out"] == planned.left_out.values[0]
