@@ -548,15 +548,18 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         limit = _SHARE * scene.tolerance * (1 if _kept(scene, arrival) else 2)
         fixed = scene.time_step is not None
         retry_is_vain = error > 0.93 * state.rejected_error
-        if not fixed and error > limit and length > _SMALLEST_STEP * segment.duration and not retry_is_vain:
-            shrink = min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
+        # where the approach is given, a step that is too long may undershoot and seem to open the contact
+        opens = segment.control == "approach" and trial.apart and state.now.force > 0
+        too_long = (error > limit and not retry_is_vain) or opens
+        if not fixed and too_long and length > _SMALLEST_STEP * segment.duration:
+            shrink = 0.2 if opens else min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
             start = state
             if held is not None:  # roll back both
                 length, held, start = held.state.now.time - base.now.time, None, base
             state = replace(
                 start,
                 suggestion=shrink * length,
-                rejected_error=error,
+                rejected_error=math.inf if opens else error,
                 iterations=state.iterations,
                 convolutions=state.convolutions,
             )
