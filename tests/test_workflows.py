@@ -63,6 +63,16 @@ def test_benchmarks__run_small(tmp_path, monkeypatch):
     assert all(0 < row["storing"] < 1 for row in stored)
 
 
+def test_tolerance_matrix__is_kept_by_a_zener_material(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("tolerance_matrix")
+    ds = module.main(tmp_path / "t.nc", tmp_path / "t.png", materials=("Zener 1:1",), tolerances=(1e-2,), workers=0)
+    assert ds.error_over_tolerance.shape == (1, 7, 1)
+    assert (ds.error_over_tolerance <= 1).all()
+    assert (ds.error_over_tolerance > 1e-3).all(), "the reference is another run"
+    assert (tmp_path / "t.png").exists()
+
+
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}
