@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.engine import Engine, Kind, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
@@ -26,6 +27,8 @@ from roughvisc.topography.indenters import grown
 GROWTH, MOST_CELLS = 1.5, 4096**2
 #: The window begins so many cells wide, on surfaces whose shorter side has so many.
 _FIRST_EXTENT, _WORTH_FOLLOWING = 32, 96
+#: Cells of the longer side on which the window after a jump at the start is foreseen.
+_FORESEEN_ON = 40
 
 
 class Ground:
@@ -156,6 +159,9 @@ def prepare(
     check_times(program, time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
+    while ground.window.outside <= foreseen:
+        ground.widen()
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
     _check_approach(program, boundary, ground.gap[ground.present])
     halfspace = ground.halfspace(boundary)
@@ -174,6 +180,21 @@ def prepare(
         **ground.shown(),
     )
     return scene, engine
+
+
+def _foreseen(ground: Ground, program: Program, material: Material) -> float:
+    """About the approach right after a jump at the start, from every so-many-eth cell; zero if there is none. [m]"""
+    segment, glassy = program.segments[0], float(material.contact_compliance(0.0))
+    value = segment.end or 0.0
+    if segment.duration > 0 or value <= 0 or glassy <= 0:
+        return 0.0
+    if segment.control == "approach":
+        return value
+    stride = math.ceil(max(ground.gap.shape) / _FORESEEN_ON)
+    gap = ground.gap[::stride, ::stride]
+    dx, dy = (stride * side for side in ground.spacing)
+    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy))
+    return solve_contact(halfspace, gap, load=value * glassy / (dx * dy), tolerance=1e-2, max_iterations=50).approach
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
