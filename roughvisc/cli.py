@@ -387,6 +387,8 @@ def _draw(figure: Any, path: Path) -> None:
 def plot(result: Path, out: Path | None) -> None:
     """Draw the figures of a result, or of all results in a folder.
 
+    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases.
+
     \b
     Example:
       roughvisc plot results/quickstart --out figures
@@ -394,7 +396,8 @@ def plot(result: Path, out: Path | None) -> None:
     from rich.console import Console
 
     from roughvisc.study.store import open_result
-    from roughvisc.views.plot import save_figures
+    from roughvisc.views.plot import save_figures, save_sweep_figures
+    from roughvisc.views.sweep_files import results_of
 
     paths = sorted(p for p in result.glob("*.nc") if not p.name.startswith(".")) if result.is_dir() else [result]
     if not paths:
@@ -404,6 +407,9 @@ def plot(result: Path, out: Path | None) -> None:
         with open_result(path) as dataset:
             for figure in save_figures(dataset, out or path.parent, path.stem):
                 _say(console, "Figure", figure)
+    together = results_of(result) if len(paths) > 1 else None
+    for figure in save_sweep_figures(together, out or result) if together is not None else ():
+        _say(console, "Figure", figure)
 
 
 @main.command()
