@@ -90,7 +90,7 @@ def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
         inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
         assert inside, f"{text!r} runs off the figure"
     for label in labels(figure):
-        bare = label in ("Rel. error", "Contact clusters", "Clusters at least as large")
+        bare = label in ("Rel. error", "Per kept time", "Contact clusters", "Clusters at least as large")
         assert bare or label.endswith("]"), label
 
 
@@ -184,12 +184,19 @@ def test_frame_at__nearest_time_or_counted_from_the_end():
 
 def test_history__data_and_units():
     ds = made.hertz_creep()
-    force, approach, area, accuracy = plot.history(ds).axes[:4]
-    assert [ax.get_ylabel() for ax in (force, approach, area)] == [
+    force, approach, area, gap, work, cost, accuracy = plot.history(ds).axes
+    assert [ax.get_ylabel() for ax in (force, approach, area, gap, work, cost)] == [
         "Force [mN]",
         "Approach [µm]",
         "Contact area [mm²]",
+        "Mean gap [µm]",
+        "Work [µJ]",
+        "Per kept time",
     ]
+    np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
+    np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
+    for name in ("convolutions", "iterations"):
+        np.testing.assert_allclose(lines(cost)[name].get_ydata(), ds[name])
     assert accuracy.get_xlabel() == "Time [s]"
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
@@ -222,6 +229,8 @@ def test_history__of_what_is_there():
     figure = plot.history(ds)
     assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]", "Rel. error"]
     assert [text.get_text() for text in figure.axes[-1].texts] == ["no accuracy recorded"]
+    lowest = [ax.get_ylabel() for ax in plot.history(made.hertz_creep().drop_vars("force")).axes if ax.get_xlabel()]
+    assert lowest == ["Work [µJ]", "Per kept time", "Rel. error"], "the lowest panel of each column, and the one below"
     with pytest.raises(InputError, match="nothing to draw"):
         plot.history(ds[["height", "time_error"]])
 

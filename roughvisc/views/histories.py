@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
@@ -31,7 +31,16 @@ from roughvisc.views.axes import (
     unit_for,
 )
 
-_PANELS = (("force", "Force", BLUE), ("approach", "Approach", VERMILION), ("contact_area", "Contact area", GREEN))
+_PANELS = (
+    ("force", "Force", BLUE),
+    ("approach", "Approach", VERMILION),
+    ("contact_area", "Contact area", GREEN),
+    ("mean_gap", "Mean gap", PURPLE),
+    ("work", "Work", ORANGE),
+)
+_COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
+#: Panels up to which they stand in one column.
+_ONE_COLUMN = 3
 _NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
@@ -121,11 +130,27 @@ def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
     ax.set_ylabel("Rel. error")
 
 
+def _draw_cost(ax: Axes, dataset: xr.Dataset) -> None:
+    """What every kept time has cost since the one before it."""
+    times = TimeAxis.of(dataset["time"]).unit(dataset["time"])
+    found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
+    for values, label, colour in found:
+        ax.plot(times, values, color=colour, marker=_marker(len(times)), ms=2.5, lw=1, label=label)
+    shown = np.concatenate([values for values, _, _ in found])
+    if shown.min() > 0 and shown.max() > 100 * shown.min():
+        ax.set_yscale("log")
+    else:
+        _leave_room(ax, shown)
+        ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.set_ylabel("Per kept time")
+
+
 @styled
 def history(dataset: xr.Dataset) -> Figure:
-    """Force, approach and contact area over time, with the accuracy of every kept time below.
+    """Force, approach, contact area, mean gap and work over time; cost and accuracy of every kept time below.
 
-    The time axis is linear or logarithmic as the kept times suit. Steps that did not converge are crossed out.
+    What the result does not hold is left out. The time axis is linear or logarithmic as the kept times suit. Steps
+    that did not converge are crossed out. Work is that of the force so far, which is dissipated where a loop closes.
 
     Parameters
     ----------
@@ -144,23 +169,46 @@ def history(dataset: xr.Dataset) -> Figure:
     require(dataset, "time")
     panels = [panel for panel in _PANELS if panel[0] in dataset]
     if not panels:
-        raise InputError("the result holds no force, approach or contact_area: nothing to draw over time")
-    figure = new_figure(4.6, 1.25 * len(panels) + 1.3)
-    axes = figure.subplots(len(panels) + 1, sharex=True, height_ratios=[1.0] * len(panels) + [0.75])
+        names = ", ".join(name for name, _, _ in _PANELS)
+        raise InputError(f"the result holds none of {names}: nothing to draw over time")
+    costs = any(name in dataset for name, _, _ in _COSTS)
+    figure, axes = _history_panels(len(panels) + costs)
     for ax, (name, label, colour) in zip(axes, panels, strict=False):
         _draw_history(ax, dataset, name, label, colour)
-    if panels[-1][0] == "contact_area":
-        _fraction_axis(axes[-2], dataset)
+        if name == "contact_area":
+            _fraction_axis(ax, dataset)
+    if costs:
+        _draw_cost(axes[-2], dataset)
     _draw_accuracy(axes[-1], dataset)
     axis = TimeAxis.of(dataset["time"])
-    axis.apply(axes[-1], dataset["time"])
     for ax in axes:
+        axis.apply(ax, dataset["time"])
+        lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel(ax.get_xlabel() if lowest else "")
         ax.grid(axis="both", color="0.9", lw=0.5)
         if ax.get_legend_handles_labels()[1]:
             ax.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=4, borderaxespad=0.15, handlelength=1.6)
     letter_panels(axes)
     figure.align_ylabels(axes)
     return figure
+
+
+def _history_panels(count: int) -> tuple[Figure, list[Axes]]:
+    """So many panels in one or two columns, and one below them across the whole width."""
+    columns = 1 if count <= _ONE_COLUMN else 2
+    rows = -(-count // columns)
+    figure = new_figure(4.6 if columns == 1 else 7.4, 1.25 * rows + 1.3 + 0.25 * (columns - 1))
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.0] * rows + [0.75])
+    cells = [grid[number // columns, number % columns] for number in range(count)]
+    return figure, [figure.add_subplot(cell) for cell in (*cells, grid[rows, :])]
+
+
+def _nothing_below(ax: Axes, axes: Sequence[Axes]) -> bool:
+    """Whether no panel of the same column has its time axis right below."""
+    place = ax.get_subplotspec()
+    below = [other.get_subplotspec() for other in axes]
+    return not any(one.rowspan.start == place.rowspan.stop and one.colspan == place.colspan for one in below)
 
 
 @styled
