@@ -15,7 +15,7 @@ from PIL import Image
 
 from roughvisc.errors import InputError
 from roughvisc.views import animate as animation
-from roughvisc.views import axes, fields, plot, surfaces
+from roughvisc.views import axes, plot, sections, surfaces
 
 SAMPLES = {
     "creep": made.hertz_creep,
@@ -378,9 +378,9 @@ def test_section__states_its_exaggeration():
 
 def test_section__gap_and_displacement_give_the_same_surface():
     ds = made.hertz_creep()
-    by_gap = fields.deformed_surface(ds.drop_vars("displacement"), 5)
+    by_gap = sections.deformed_surface(ds.drop_vars("displacement"), 5)
     for other in (ds, ds.drop_vars("gap")):
-        np.testing.assert_allclose(fields.deformed_surface(other, 5), by_gap, atol=1e-10)
+        np.testing.assert_allclose(sections.deformed_surface(other, 5), by_gap, atol=1e-10)
 
 
 def test_section__goes_where_it_is_told():

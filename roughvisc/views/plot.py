@@ -13,11 +13,14 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.views.animate import animate
+from roughvisc.views.area_load import area_against_load
 from roughvisc.views.axes import fullest_frame, require
 from roughvisc.views.case_histories import histories_of_cases
 from roughvisc.views.distributions import contact_clusters, distributions
-from roughvisc.views.fields import maps, section
-from roughvisc.views.histories import area_against_load, history, hysteresis
+from roughvisc.views.fields import maps
+from roughvisc.views.histories import history
+from roughvisc.views.loops import hysteresis
+from roughvisc.views.sections import section
 from roughvisc.views.surfaces import surface
 from roughvisc.views.sweep_files import save_sweep_figures
 from roughvisc.views.sweeps import sweep
