@@ -37,6 +37,7 @@ _PUBLIC = {
         "roughvisc.study.results": "open_results",
         "roughvisc.study.plan": "plan",
         "roughvisc.study.trade": "trade",
+        "roughvisc.study.validate": "validate",
         "roughvisc.views.report": "report",
         "roughvisc.views.handover": "to_csv deformed",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",

@@ -1,4 +1,4 @@
-"""The command line: ``roughvisc run | plan | scan | plot``.
+"""The command line: ``roughvisc run | plan | scan | plot | report | validate``.
 
 Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted. Heavy imports
 are made inside the commands, so that ``--help`` is quick.
@@ -436,6 +436,32 @@ def report(results: Path, output: Path | None) -> None:
     from roughvisc.views.report import report as write
 
     _say(Console(), "Report", write(results, output))
+
+
+@main.command()
+@click.option("--cells", type=click.IntRange(33), default=129, show_default=True, help="Cells along the grids' sides.")
+def validate(cells: int) -> None:
+    """Hold the solver on this machine against analytic solutions.
+
+    Takes less than a minute on most machines. The errors to expect follow from the grid and the tolerance; the exit
+    status is 1 if any is larger.
+
+    \b
+    Example:
+      roughvisc validate --cells 65
+    """
+    from rich.console import Console
+
+    from roughvisc.study.validate import validate as validated
+    from roughvisc.views.console import print_validation
+
+    console = Console()
+    with console.status("validating") as status:
+        found = validated(cells, progress=lambda done, of: status.update(f"validating: {done} of {of} cases done"))
+    print_validation(console, found)
+    failed = sum(not one.passed for one in found)
+    if failed:
+        raise _Failure(f"{failed} of {len(found)} comparisons failed", 1)
 
 
 if __name__ == "__main__":

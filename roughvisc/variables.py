@@ -83,8 +83,9 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "J",
         "work of the force on the approach since the start",
-        "over every accepted step, kept or not; the work done so far, not what is dissipated; a jump counts as its "
-        "mean force times its jump of approach; with periodic boundaries without the uniform displacement",
+        "over every accepted step, kept or not, as that of the pressure on the displacement; the work done so far, not "
+        "what is dissipated; without memory the stored energy, exactly; a jump counts as its mean pressure on its jump "
+        "of displacement; with periodic boundaries without the uniform displacement",
     ),
     "contact_area": Variable(_SERIES, "m2", "real contact area", "cells that carry pressure, counted"),
     "contact_area_corrected": Variable(

@@ -199,18 +199,19 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     modes = ModesState(np.zeros((0, 2, 3)), strange, None, 1 / 3)
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
-        state = State(now, memory, before=None, rejected_error=math.inf, blind=True, convolutions=2**40)
+        state = State(now, strange, memory, before=None, rejected_error=math.inf, blind=True, convolutions=2**40)
         reached = Reached(state, math.nan, False, 3, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
         back = load_checkpoint(tmp_path / "c", "key")
         assert repr(replace(back, state=None)) == repr(replace(reached, state=None))
         for field in fields(State):
-            if field.name not in ("now", "memory"):
+            if field.name not in ("now", "displacement", "memory"):
                 assert getattr(back.state, field.name) == getattr(state, field.name), field.name
         assert back.state.before is None
         assert (back.state.now.force, math.copysign(1, back.state.now.approach)) == (1e-310, -1)
         assert back.state.now.pressure.flags.c_contiguous
         assert back.state.now.pressure.tobytes() == strange.T.tobytes()
+        assert back.state.displacement.tobytes() == strange.tobytes()
         assert type(back.state.memory) is type(memory)
         for field in fields(memory):
             one, other = getattr(back.state.memory, field.name), getattr(memory, field.name)

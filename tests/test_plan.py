@@ -181,3 +181,18 @@ def test_plan__counts_the_coarser_solve_of_a_grid_error(study):
     found = March(20, 10, 400, 0.0, 0.1, True)
     seconds = [wall_time(case, 90 * 108, found, engine, 1e-3) for case in (plain, asked)]
     assert seconds[0] + 0.25 * 0.4 <= seconds[1] <= 2 * seconds[0], "a quarter of the cells, at least"
+
+
+def test_plan__counts_the_window_that_follows_a_small_contact(study):
+    text = ROUGH[: ROUGH.index("[surface]")] + (
+        '[surface]\ngenerate = "sphere"\nradius = "10 mm"\nsize = "2 mm"\nshape = [201, 187]\n'
+    )
+    text += ROUGH[ROUGH.index("[material]") :].replace('boundary = "periodic"\n', "").replace('"0.02 N"', '"1 mN"')
+    (case,) = study(text)
+    whole = vary(case, {"solve.edge": "accept"})
+    planned = rv.plan([case, whole])
+    assert "too deep to be touched" in str(planned.left_out.values[0])
+    assert "too deep" not in str(planned.left_out.values[1])
+    assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
+    ds = rv.run(case, progress=False)
+    assert ds.attrs["left_out"] == planned.left_out.values[0]

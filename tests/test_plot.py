@@ -539,3 +539,15 @@ def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):
 def test_animate__mp4(tmp_path):
     path = plot.animate(made.hertz_creep(), tmp_path / "contact.mp4", frames=3, dpi=40)
     assert path.read_bytes()[4:8] == b"ftyp"
+
+
+def test_stability_map__hatches_what_was_refused_and_frames_what_is_beyond():
+    error = xr.DataArray([[1e-5, np.nan], [1e-2, np.inf]], dims=("time", "ratio"), name="error")
+    found = error.assign_coords(time=[1e-3, 1e3], ratio=[1.0, 10.0]).to_dataset()
+    figure = plot.stability_map(found, expected=1e-3)
+    axes = figure.axes[0]
+    assert len(axes.lines) == 2, "one error beyond what is expected, one that is no number"
+    assert sum(bool(c.get_hatch()) for c in axes.collections) == 1
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["refused, with a reason", "beyond 0.001"]
+    with pytest.raises(InputError, match="expected errors over two parameters"):
+        plot.stability_map(found.isel(time=0))

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import fft
 
 import roughvisc as rv
 from roughvisc import closed_forms
+from roughvisc.mechanics import halfspace
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.study import scene
 from roughvisc.study.scene import kept_times
@@ -291,3 +293,16 @@ def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
     simulate(two_hills(), ZENER, press, edge="accept")
     simulate(two_hills(), ZENER, press, boundary="periodic")
     assert set(solved_on) == {(151, 133)}
+
+
+def test_threads__change_no_bit(monkeypatch):
+    """Nor does the next run."""
+    monkeypatch.setattr(halfspace, "_THREADED", 0)
+    rough = rv.self_affine((1e-4, 1.1e-4), (41, 45), hurst=0.8, rms_slope=0.1, shortcut=8e-6, seed=3)
+    found = []
+    for threads in (1, 2, 2):
+        with fft.set_workers(threads):
+            found.append(simulate(rough, program=rv.Program().load(1e-3, over=0.1), boundary="periodic", fields=FIELDS))
+    for ds in found[1:]:
+        for name in (*FIELDS, "approach", "work", "iterations"):
+            assert ds[name].values.tobytes() == found[0][name].values.tobytes(), name

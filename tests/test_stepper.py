@@ -179,3 +179,15 @@ def test_contact_at_the_border__is_an_error_unless_accepted():
     with pytest.raises(rv.EdgeContactError, match=r"at 0 s contact reaches the border .*edge='accept'"):
         list(march(scene(rv.elastic(1.0), program)))
     assert final(march(scene(rv.elastic(1.0), program, accept_edge=True))).shown.force == 5.0
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e8])
+def test_held_approach__relaxes_and_does_not_open(ratio):
+    """The force falls to the ratio of the moduli within a millionth of the retardation time, and stays there."""
+    material = rv.zener(1.0, 1 / ratio, 1 / ratio)
+    relaxation = 1 / (1 + ratio)
+    program = rv.Program().approach(0.05, over=0).hold(100 * relaxation)
+    steps = list(march(scene(material, program, times=(0.0, 50 * relaxation, 100 * relaxation), tolerance=1e-3)))
+    at = {s.shown.time: s.shown.force for s in steps}
+    assert at[100 * relaxation] / at[0.0] == pytest.approx(relaxation, rel=0.02)
+    assert all(s.shown.force > 0 for s in steps)

@@ -10,7 +10,8 @@ from roughvisc.study.case import read_cases, vary
 from roughvisc.study.run import run
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
-STUDIES = sorted(FOLDER.glob("*.toml"))
+#: But the map of extremes, whose script holds each case against its closed form.
+STUDIES = sorted(path for path in FOLDER.glob("*.toml") if path.stem != "stability_map")
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda p: p.stem)
@@ -38,18 +39,38 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)
+    assert (tmp_path / "map.png").stat().st_size > 10_000
+    assert found.error.shape == (5, 5)
+    assert float(found.duration.max() / found.duration.min()) == pytest.approx(1e24)
+    assert (found.error < 1e-3).all(), "none refused, and the tolerance kept"
+
+
 def test_benchmarks__run_small(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
     assert (tmp_path / "table.nc").exists()
-    for row in tables["seed"] + tables["tamaas"]:
+    for row in tables["seed"] + tables["tamaas"] + tables["contact_mechanics"]:
         assert row["error"] <= row["peer_error"]
-    for row in tables["scaling"]:
-        assert 0 < row["transform_share"] < 1
+    *scaled, pressure_only, with_gap = tables["scaling"]
+    assert all(0 < row["transform_share"] < 1 for row in scaled)
+    assert max(pressure_only["error"], with_gap["error"]) < 1e-3
     swept, *stored = tables["sweep"]
     assert 0 < swept["busy"] <= 1
     assert len(stored) == 2
     assert all(0 < row["storing"] < 1 for row in stored)
+
+
+def test_tolerance_matrix__is_kept_by_a_zener_material(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("tolerance_matrix")
+    ds = module.main(tmp_path / "t.nc", tmp_path / "t.png", materials=("Zener 1:1",), tolerances=(1e-2,), workers=0)
+    assert ds.error_over_tolerance.shape == (1, 7, 1)
+    assert (ds.error_over_tolerance <= 1).all()
+    assert (ds.error_over_tolerance > 1e-3).all(), "the reference is another run"
+    assert (tmp_path / "t.png").exists()
 
 
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.materials import Prony
-from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event
+from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event, work_between
 
 Array = NDArray[np.float64]
 
@@ -151,7 +151,7 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     if any(s.control != "load" for s in scene.program.segments) or scene.present is not None:
         raise InputError("method='seed' treats given loads and complete surfaces only; use method='fast'")
     largest_step = scene.time_step or scene.program.duration / 100
-    state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), None)
+    state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), np.zeros_like(scene.gap), None)
     if scene.program.segments and scene.program.segments[0].duration > 0:
         yield Step(state.now, np.zeros_like(scene.gap), None, 0.0, 0.0, math.nan, True, scene, state)
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
@@ -201,7 +201,8 @@ def _advance(
     state = replace(
         state,
         now=now,
-        work=state.work + 0.5 * (state.now.force + load) * (now.approach - state.now.approach),
+        displacement=displacement,
+        work=state.work + work_between(scene, state, now.pressure, displacement),
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),
     )

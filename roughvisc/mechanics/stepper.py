@@ -42,6 +42,8 @@ _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step before it gets
 _SMALLEST_STEP = 1e-6  # of the segment
 # The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
 _BEYOND = 1.05
+# Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
+_ROUNDING = 1e-11
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,8 @@ class State:
     ----------
     now, before : Instant
         The present instant, and the one before if the next step may extrapolate from it.
+    displacement : ndarray, shape (nx, ny)
+        Total displacement of the half-space at the present instant. [m]
     memory : object
         State of the memory at the present instant.
     segment : int
@@ -138,7 +142,7 @@ class State:
     contact_since : float
         Time at which the surfaces last came into contact. [s]
     work : float
-        Work of the force on the approach since the start; jumps count as quasi-static. [J]
+        Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
     blind : bool
@@ -150,6 +154,7 @@ class State:
     """
 
     now: Instant
+    displacement: Array
     memory: Any
     before: Instant | None = None
     segment: int = 0
@@ -274,7 +279,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 def _rest(scene: Scene) -> State:
     now = Instant(0.0, np.zeros(scene.halfspace.shape), 0.0, scene.lowest(scene.gap))
-    return State(now, scene.memory.start(scene.halfspace.shape))
+    return State(now, np.zeros(scene.halfspace.shape), scene.memory.start(scene.halfspace.shape))
 
 
 def _at_rest(scene: Scene, state: State) -> _Trial:
@@ -355,20 +360,29 @@ def _committed(scene: Scene, state: State, trial: _Trial) -> State:
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, trial.field)
     now = trial.instant
     touching = now.force > 0
-    # an unresolved jump of the load precedes the step
-    mean_force = now.force if state.unresolved else 0.5 * (state.now.force + now.force)
     return replace(
         state,
         now=now,
+        displacement=trial.displacement,
         before=state.now if trial.length > 0 else None,
         memory=memory,
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
-        work=state.work + mean_force * (now.approach - state.now.approach),
+        work=state.work + work_between(scene, state, now.pressure, trial.displacement, jumped=state.unresolved),
         unresolved=False,
         blind=False,
     )
+
+
+def work_between(scene: Scene, state: State, pressure: Array, displacement: Array, jumped: bool = False) -> float:
+    """Work of the pressure on the displacement from a state to the next. [J]
+
+    Where surfaces touch that is the force on the approach; cells that touch in a part of the step count by that part
+    only. Without memory it is the stored energy, whatever the steps. ``jumped``: the pressure changed at once, before.
+    """
+    mean = pressure if jumped else 0.5 * (state.now.pressure + pressure)
+    return float(np.sum(mean * (displacement - state.displacement))) * scene.halfspace.cell_area
 
 
 def _spent(state: State, trial: _Trial) -> State:
@@ -440,8 +454,10 @@ def _enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
     def moved(instant: Instant) -> Instant:
         return replace(instant, pressure=padded(instant.pressure, shape, offset))
 
-    before = None if state.before is None else moved(state.before)
-    return scene, replace(state, now=moved(state.now), before=before, memory=memory)
+    now, before = moved(state.now), None if state.before is None else moved(state.before)
+    glassy, carried = scene.memory.predict(memory, 0.0, "linear")
+    displacement = scene.halfspace.displacement(carried + glassy * now.pressure)
+    return scene, replace(state, now=now, displacement=displacement, before=before, memory=memory)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -532,15 +548,18 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         limit = _SHARE * scene.tolerance * (1 if _kept(scene, arrival) else 2)
         fixed = scene.time_step is not None
         retry_is_vain = error > 0.93 * state.rejected_error
-        if not fixed and error > limit and length > _SMALLEST_STEP * segment.duration and not retry_is_vain:
-            shrink = min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
+        # where the approach is given, a step that is too long may undershoot and seem to open the contact
+        opens = segment.control == "approach" and trial.apart and state.now.force > 0
+        too_long = (error > limit and not retry_is_vain) or opens
+        if not fixed and too_long and length > _SMALLEST_STEP * segment.duration:
+            shrink = 0.2 if opens else min(max(0.7 * math.sqrt(limit / error), 0.2), 0.5)
             start = state
             if held is not None:  # roll back both
                 length, held, start = held.state.now.time - base.now.time, None, base
             state = replace(
                 start,
                 suggestion=shrink * length,
-                rejected_error=error,
+                rejected_error=math.inf if opens else error,
                 iterations=state.iterations,
                 convolutions=state.convolutions,
             )
@@ -697,7 +716,9 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
         elapsed = scene.compliance(trial.instant.time - since)
         soft = scene.compliance(max(event, trial.instant.time) - since) / elapsed if elapsed > 0 else 1.0
     force = max(state.largest_force, trial.instant.force * ahead)
-    approach = max(state.largest_approach, abs(trial.instant.approach) * ahead * soft)
+    approach = max(
+        state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
+    )
     difference = float(np.sum(np.abs(trial.instant.pressure - _extrapolated(state, trial.length))))
     pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
     ratio = trial.length / last
@@ -710,6 +731,12 @@ def _estimate(scene: Scene, state: State, trial: _Trial, segment: Segment, event
     if segment.control == "approach":
         scalar_error *= fading
     return share * _error_constant(trial, last) * max(fading * pressure_error, scalar_error)
+
+
+def _unresolved_approach(scene: Scene, now: Instant) -> float:
+    """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
+    pressure = now.force / (now.pressure.size * scene.halfspace.cell_area)
+    return _ROUNDING * scene.compliance(now.time) * pressure * scene.halfspace.largest_influence
 
 
 def _error_constant(trial: _Trial, last: float) -> float:

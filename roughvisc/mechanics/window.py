@@ -122,10 +122,14 @@ class Reach:
         Where pressure is.
     spacing : tuple of float
         Cell sides. [m]
+    single : bool
+        Whether single precision does: 1e-6 of the largest displacement, in half the time.
     """
 
-    def __init__(self, window: Window, spacing: tuple[float, float]) -> None:
+    def __init__(self, window: Window, spacing: tuple[float, float], *, single: bool = False) -> None:
         self._window = window
+        self._type = np.float32 if single else np.float64
+        self._scale = max(spacing)  # the range of single precision is small
         lengths = [n + m - 1 for n, m in zip(window.domain, window.shape, strict=True)]
         self._padded = [fft.next_fast_len(n, real=True) for n in lengths]
         # signed distance from a cell of the window to one of the domain, wrapped around where the sum is negative
@@ -135,24 +139,25 @@ class Reach:
             steps[steps >= n] -= length  # from n - 1 down to 1 - m; what lies between is never read
             distances.append(np.abs(np.clip(steps, 1 - m, n - 1) - first))
         quadrant = love_kernel((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
-        self._symbol = fft.rfft2(quadrant[np.ix_(*distances)])
+        self._symbol = fft.rfft2((quadrant[np.ix_(*distances)] / self._scale).astype(self._type))
 
     def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:
         """Displacement of the domain under a pressure in the window over the contact modulus, some rows at a time. [m]
 
         What is made of them stays in the cache.
         """
-        spread = self.spread(pressure)
+        largest = float(np.max(np.abs(pressure), initial=0.0)) or 1.0
+        spread = self.spread((pressure / largest).astype(self._type))
         for start in range(0, len(spread), _BLOCK):
             rows = slice(start, start + _BLOCK)
             along_y = fft.irfft(spread[rows], n=self._padded[1], axis=1, overwrite_x=True)
-            yield rows, along_y[:, : self._window.domain[1]]
+            yield rows, np.multiply(along_y[:, : self._window.domain[1]], largest * self._scale, dtype=float)
 
-    def spread(self, pressure: Array) -> NDArray[np.complex128]:
+    def spread(self, pressure: NDArray) -> NDArray:
         """The displacement as its transform along y."""
         nx, (mx, my) = self._window.domain[0], self._padded
         along_y = fft.rfft(pressure, n=my, axis=1)
-        spread = np.empty((nx, along_y.shape[1]), complex)
+        spread = np.empty((nx, along_y.shape[1]), along_y.dtype)
         for start in range(0, along_y.shape[1], _BLOCK):
             block = slice(start, start + _BLOCK)
             columns = fft.fft(along_y[:, block], n=mx, axis=0)

@@ -55,6 +55,8 @@ class March:
         Largest contact fraction.
     whole : bool
         Whether the coarse marches came to their end in the time that they were given.
+    level : float
+        Largest approach: what lies deeper cannot be touched. [m]
     """
 
     steps: float
@@ -63,6 +65,7 @@ class March:
     damped: float
     contact: float
     whole: bool
+    level: float = math.inf
 
 
 def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
@@ -119,7 +122,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         memory=settings.solve.memory,
     )
     steps = rows = damped = 0
-    reached = contact = 0.0
+    reached = contact = level = 0.0
     work, instants = 0, [0.0]
     until = time.perf_counter() + _MARCH
     kept = set(scene.times or ())
@@ -129,6 +132,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         rows += times is None or now in kept
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, float(np.mean(step.shown.pressure > 0)))
+        level = max(level, step.level)
         work, reached = step.state.convolutions, now
         instants.append(now)
         if time.perf_counter() > until:
@@ -139,9 +143,8 @@ def _march(case: Case, height: xr.DataArray) -> March:
         half = len(instants) // 2
         pace = (reached - instants[half]) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
-    return March(
-        steps * stretch, len(kept) or rows * stretch, work * stretch, damped / max(steps, 1), contact, bool(whole)
-    )
+    kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
+    return March(steps * stretch, kept_rows, work * stretch, part, contact, bool(whole), level)
 
 
 def _is_damped(scene: Scene, length: float) -> bool:
@@ -193,11 +196,12 @@ def _work(cells: float) -> float:
     return cells * math.log2(cells + 2)
 
 
-def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution: float) -> float:
-    """Seconds for a case in one process with one thread. [s]"""
+def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0) -> float:
+    """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
+    convolution *= _work(window * cells) / _work(cells)
     modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
-    stepping = found.steps * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
+    stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
     writing = found.rows * cells * 8 * len(case.settings.keep.fields) * _WRITE
     again = _AGAIN if case.settings.solve.grid_error else 1.0
     return found.convolutions * convolution * again + stepping + writing

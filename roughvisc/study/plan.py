@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -18,10 +19,10 @@ from roughvisc.mechanics.engine import Engine, engine_for
 from roughvisc.mechanics.memory import Modes
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, wall_time
+from roughvisc.study.notes import left_out
 from roughvisc.study.results import parameters_of
 from roughvisc.study.run import result_folder
-from roughvisc.study.scene import Ground
-from roughvisc.variables import FIELDS
+from roughvisc.study.scene import Ground, follows
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
@@ -52,11 +53,20 @@ _COLUMNS = {
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, or why it cannot be had."""
+    """A surface's height, or why it cannot be had.
+
+    ``windows`` are those that follow a contact on it, from small to large: the least gap beyond each [m], and the part
+    of the cells that it takes.
+    """
 
     height: xr.DataArray | None
     grows: bool
     problem: str
+    windows: tuple[tuple[float, float], ...] = ()
+
+    def solved_on(self, level: float) -> float:
+        """Part of the cells that are solved on where the approach comes to a level. [m]"""
+        return next((part for outside, part in self.windows if outside > level), 1.0)
 
 
 def plan(
@@ -164,10 +174,14 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        ground = Ground(height, case.settings.surface.missing)
+        ground = Ground(height, case.settings.surface.missing, follow=True)
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "")
+    windows = []
+    while not ground.window.whole:
+        windows.append((ground.window.outside, math.prod(ground.window.shape) / height.size))
+        ground.widen()
+    return _Surface(height, ground.can_grow(), "", tuple(windows))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -214,22 +228,26 @@ def _row(
     if surface is None or surface.height is None:
         return row
     height, grows = surface.height, surface.grows and free and solve.edge == "error"
+    window = bool(surface.windows) and follows(solve.boundary, solve.edge, solve.method)
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
-        engine = engines.of(case, grows)
+        engine = engines.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
     exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
-    row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": _left_out(case, engine)}
+    keep = case.settings.keep
+    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all", window)
+    row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
-    cells = height.size
+    cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
+    part = surface.solved_on(found.level) if window else 1.0
     return row | {
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,
         "rows": found.rows,
         "convolutions": found.convolutions,
-        "wall_time": wall_time(case, cells, found, engine, stopwatch.seconds(height, solve.boundary)),
+        "wall_time": wall_time(case, cells, found, engine, convolution, part),
         "memory": memory(case, cells, found, engine),
         "disk": disk(case, cells, found),
     }
@@ -244,23 +262,6 @@ def _scheme(case: Case, engine: Engine, found: March) -> str:
         return f"no memory: each step by itself, steps {steps}"
     damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     return f"piecewise-linear pressure{damped}, steps {steps}"
-
-
-def _left_out(case: Case, engine: Engine) -> str:
-    """What nothing asks for, and is therefore not modelled, computed or kept."""
-    out = []
-    if engine.note.startswith("no memory"):
-        out.append("history (the material is elastic)")
-    elif engine.memory.acts_on == "displacement":
-        out.append("convolutions of the past")
-    if case.settings.solve.boundary == "periodic":
-        out.append("padding")
-    absent = [name for name in FIELDS if name not in case.settings.keep.fields]
-    if absent:
-        out.append(f"{' and '.join(absent)} in the file")
-    if case.settings.keep.times != "all":
-        out.append("steps between kept times in the file")
-    return ", ".join(out)
 
 
 # ----------------------------------------------------------------------------------------------------------------

@@ -20,6 +20,9 @@ from roughvisc.variables import STATUS_MEANINGS, annotate
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
 PERIMETER_CORRECTION = 0.088
 
+#: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
+_SINGLE = 1e-4
+
 Array = NDArray[np.float64]
 
 
@@ -37,13 +40,16 @@ class Rows:
         Fields to keep.
     store : RowStore
         Where the rows are kept; what is in it counts as rows of an earlier part of the march.
+    tolerance : float
+        Of the march: where it leaves room for single precision, what lies beyond a window is computed so.
     """
 
-    def __init__(self, ground: Ground, fields: Sequence[str], store: RowStore) -> None:
+    def __init__(self, ground: Ground, fields: Sequence[str], store: RowStore, tolerance: float) -> None:
         self._ground = ground
         self._fields = tuple(fields)
         self._store = store
-        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing))
+        single = tolerance >= _SINGLE
+        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, single=single))
         self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
 
     def __len__(self) -> int:

@@ -18,6 +18,7 @@ from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.stepper import Scene
 from roughvisc.mechanics.window import Window, whole_domain, window_around
+from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
 from roughvisc.topography.indenters import grown
 
@@ -52,6 +53,8 @@ class Ground:
         self._extent = float(_FIRST_EXTENT)
         if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT)
+        #: Whether the march begins on a window of the surface.
+        self.followed = not self.window.whole
 
     def _lay(self, height: xr.DataArray) -> None:
         self.height = _checked(height)
@@ -86,14 +89,18 @@ class Ground:
                 return None
             self._lay(larger)
         else:
-            before = self.window
-            while self.window == before:
-                self._extent *= GROWTH
-                self.window = window_around(self.gap, int(self._extent))
+            self.widen()
         self.growths += 1
         first = (self._cell("x", x) - self.window.first[0], self._cell("y", y) - self.window.first[1])
         halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
         return replace(scene, halfspace=halfspace, **self.shown()), first
+
+    def widen(self) -> None:
+        """Go on to the next larger window, which is the whole surface in the end."""
+        before = self.window
+        while self.window == before:
+            self._extent *= GROWTH
+            self.window = window_around(self.gap, int(self._extent))
 
     def shown(self) -> dict[str, Any]:
         """What a scene takes from the surface."""
@@ -112,6 +119,11 @@ class Ground:
         domain = (self.height.shape[0], self.height.shape[1])
         first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
         return Window(domain, first, (shape[0], shape[1]))
+
+
+def follows(boundary: str, edge: str, method: str) -> bool:
+    """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
+    return boundary == "free" and edge == "error" and method == "fast"
 
 
 def prepare(
@@ -141,13 +153,16 @@ def prepare(
         raise InputError(f"time_step is {time_step!r}: expected 'auto' or a positive number [s]")
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
+    check_times(program, time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
     _check_approach(program, boundary, ground.gap[ground.present])
+    halfspace = ground.halfspace(boundary)
+    check_loads(program, material, halfspace, ground.gap[ground.present])
     engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
     scene = Scene(
-        halfspace=ground.halfspace(boundary),
+        halfspace=halfspace,
         material=material,
         memory=engine.memory,
         program=program,

@@ -18,18 +18,13 @@ from roughvisc.mechanics.seed import march_seed
 from roughvisc.mechanics.stepper import march
 from roughvisc.study.checkpoint import Keeper, Reached
 from roughvisc.study.grid_error import with_grid_error
+from roughvisc.study.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.records import RowsInMemory
 from roughvisc.study.rows import Rows
-from roughvisc.study.scene import Ground, prepare
+from roughvisc.study.scene import Ground, follows, prepare
 from roughvisc.variables import FIELDS, annotate
 
 log = logging.getLogger("roughvisc")
-
-#: What a result says of a material without instantaneous compliance.
-NO_JUMP = (
-    "The material has no instantaneous compliance: each cell that comes into contact makes the pressure jump. The "
-    "tolerance is kept on the approach; the pressure (L1) may miss it at times just after cells came into contact."
-)
 
 Progress = Callable[[float, float], None]
 Method = Literal["fast", "seed"]
@@ -178,8 +173,7 @@ def _press(
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    follow = boundary == "free" and edge == "error" and method == "fast"
-    ground = Ground(height, missing, follow=follow)
+    ground = Ground(height, missing, follow=follows(boundary, edge, method))
     scene, engine = prepare(
         ground,
         material,
@@ -202,7 +196,7 @@ def _press(
         larger = ground.enlarge(scene)
         assert larger is not None, "it grew before"
         scene = larger[0]
-    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows)
+    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows, tolerance)
     spent = reached.wall_time - began
     kept = None if scene.times is None else set(scene.times)
     report, close = _reporter(progress)
@@ -226,8 +220,12 @@ def _press(
         "memory": engine.note,
         "series_error": engine.series_error,
         "material_note": material.note,
-        "accuracy_note": "" if scene.compliance(0.0) > 0 else NO_JUMP,
+        "accuracy_note": accuracy_note(scene, dataset),
+        "slope_note": slope_note(ground.height, boundary, float(dataset["approach"].max())),
+        "left_out": left_out(engine, boundary, method, fields, times is None, ground.followed),
     }
+    if described["slope_note"]:
+        log.warning("%s", described["slope_note"])
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset
 

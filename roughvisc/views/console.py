@@ -19,6 +19,7 @@ from roughvisc.views.axes import unit_for
 if TYPE_CHECKING:
     from roughvisc.study.profile import Profile
     from roughvisc.study.task import Outcome
+    from roughvisc.study.validate import Comparison
 
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
@@ -149,6 +150,41 @@ def plan_tables(costs: xr.Dataset) -> Group:
     if total > 1:
         parts += [Text(), _case_table(costs, varied)]
     return Group(*parts)
+
+
+def print_validation(console: Console, found: Sequence[Comparison]) -> None:
+    """What was held against closed forms: a table, or plain lines of it where there is no terminal.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    found : sequence of Comparison
+        Of :func:`roughvisc.validate`.
+    """
+    heading = ("case", "compared", "error", "expected", "verdict")
+    rows = [
+        (
+            "" if i and found[i - 1].case == one.case else one.case,
+            one.compared,
+            f"{one.error:.1e}",
+            f"{one.expected:.1e}",
+            "ok" if one.passed else "FAILED",
+        )
+        for i, one in enumerate(found)
+    ]
+    if console.is_terminal:
+        table = Table(box=None, pad_edge=False)
+        for name in heading:
+            table.add_column(name, justify="right" if name in ("error", "expected") else "left")
+        for row in rows:
+            table.add_row(*map(Text, row), style="" if row[-1] == "ok" else "bold red")
+        console.print(table)
+    else:
+        widths = [max(len(row[i]) for row in (heading, *rows)) for i in range(len(heading))]
+        for row in (heading, *rows):
+            line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
+            console.print(Text(line.rstrip()), soft_wrap=True)
 
 
 #: What is modelled, shown once if it is the same in all cases.

@@ -21,6 +21,7 @@ from roughvisc.views.fields import maps
 from roughvisc.views.histories import history
 from roughvisc.views.loops import hysteresis
 from roughvisc.views.sections import section
+from roughvisc.views.stability import stability_map
 from roughvisc.views.surfaces import surface
 from roughvisc.views.sweep_files import save_sweep_figures
 from roughvisc.views.sweeps import sweep
@@ -38,6 +39,7 @@ __all__ = [
     "save_figures",
     "save_sweep_figures",
     "section",
+    "stability_map",
     "surface",
     "sweep",
     "trade",

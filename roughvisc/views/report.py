@@ -36,6 +36,8 @@ _PICTURED = 60
 _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
+#: Attributes in which a result speaks of its limits.
+_NOTES = ("material_note", "accuracy_note", "slope_note")
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -280,7 +282,9 @@ def _study(dataset: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
         "program": program_words(case["program"]) if "program" in case else [],
         "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
         "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
-        "notes": [str(dataset.attrs[key]) for key in ("material_note", "accuracy_note") if key in dataset.attrs],
+        "notes": [
+            str(dataset.attrs[key]) for key in ("material_note", "accuracy_note", "slope_note") if key in dataset.attrs
+        ],
         "history": str(dataset.attrs.get("history", "")).splitlines(),
         "toml": study_text(case) if case else "",
     }

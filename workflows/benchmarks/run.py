@@ -2,7 +2,8 @@
 
     python workflows/benchmarks/run.py [--small] [--only seed,tamaas,scaling,sweep] [--out benchmarks.nc]
 
-Every figure is a ratio or a count measured in one run, at equal or smaller measured error.
+Every figure is a ratio or a count measured in one run, at equal or smaller measured error. Times are processor times,
+of one thread. Tamaas and ContactMechanics are compared with where they are installed.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import against_contact_mechanics
 import against_seed
 import against_tamaas
 import scaling
@@ -21,12 +23,14 @@ import sweep_overhead
 SMALL = {
     "seed": {"sizes": ((32, 10),), "repeats": 1},
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
+    "contact_mechanics": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
     "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96},
     "sweep": {"count": 3, "workers": 1, "alone": 1, "cells": 32},
 }
 PARTS = {
     "seed": against_seed.measure,
     "tamaas": against_tamaas.measure,
+    "contact_mechanics": against_contact_mechanics.measure,
     "scaling": scaling.measure,
     "sweep": sweep_overhead.measure,
 }

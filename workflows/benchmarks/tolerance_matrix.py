@@ -1,6 +1,6 @@
 """Is the tolerance kept? Materials x loading programs x tolerances, measured against runs at a tenth of the tolerance.
 
-    python workflows/tolerance_matrix.py [OUT.nc] [FIGURE.png]
+    python workflows/benchmarks/tolerance_matrix.py [OUT.nc] [FIGURE.png]
 
 The error is the largest over eight kept times: of the pressure (L1, over the largest force so far) and of the approach
 (over its largest value so far), on the same grid. Power laws without a glassy part are judged on the approach.
@@ -45,14 +45,14 @@ def programs(load, approach):
 
 def column(task):
     """Errors over tolerance and steps for all tolerances of one material and program."""
-    material, name = MATERIALS[task[0]], task[1]
+    material, name, tolerances = MATERIALS[task[0]], task[1], task[2]
     radius = 0.36 * SIZE
     load = 4 * radius**3 / (3 * RADIUS) / float(material.contact_compliance(SPAN))
     program = programs(load, radius**2 / RADIUS)[name]
     ball = rv.sphere(RADIUS, SIZE, GRID)
     kept = program.duration * np.arange(1, 9) / 8
     runs = {}
-    for tolerance in (*TOLERANCES, TOLERANCES[-1] / 10):
+    for tolerance in (*tolerances, tolerances[-1] / 10):
         steps = []
         runs[tolerance] = rv.simulate(
             ball,
@@ -66,7 +66,7 @@ def column(task):
         )
         runs[tolerance].attrs["steps"] = len(steps)
     found = []
-    for tolerance in TOLERANCES:
+    for tolerance in tolerances:
         run, exact = runs[tolerance], runs[tolerance / 10]
         force = np.maximum.accumulate(exact.pressure.sum(("x", "y")).values)
         largest = np.maximum.accumulate(np.abs(exact.approach.values))
@@ -77,16 +77,27 @@ def column(task):
     return found
 
 
-def main(out="tolerance_matrix.nc", figure="tolerance_matrix.png", materials=tuple(MATERIALS), workers=2):
+def main(
+    out="tolerance_matrix.nc",
+    figure="tolerance_matrix.png",
+    materials=tuple(MATERIALS),
+    tolerances=TOLERANCES,
+    workers=2,
+):
+    """The whole matrix; each tolerance is a tenth of the one before. ``workers`` 0: in this process."""
     names = tuple(programs(1, 1))
-    with ProcessPoolExecutor(workers) as pool:
-        cells = list(pool.map(column, [(m, p) for m in materials for p in names]))
-    values = np.array(cells).reshape(len(materials), len(names), len(TOLERANCES), 4)
+    tasks = [(m, p, tolerances) for m in materials for p in names]
+    if workers:
+        with ProcessPoolExecutor(workers) as pool:
+            cells = list(pool.map(column, tasks))
+    else:
+        cells = [column(task) for task in tasks]
+    values = np.array(cells).reshape(len(materials), len(names), len(tolerances), 4)
     dims = ("material", "program", "tolerance")
     quantities = ("error_over_tolerance", "pressure_error_over_tolerance", "approach_error_over_tolerance", "steps")
     ds = xr.Dataset(
         {q: (dims, values[..., i]) for i, q in enumerate(quantities)},
-        coords={"material": list(materials), "program": list(names), "tolerance": list(TOLERANCES)},
+        coords={"material": list(materials), "program": list(names), "tolerance": list(tolerances)},
     )
     ds.to_netcdf(out, engine="netcdf4")
     draw(ds).savefig(figure, dpi=200)
@@ -102,7 +113,9 @@ def main(out="tolerance_matrix.nc", figure="tolerance_matrix.png", materials=tup
 
 def draw(ds):
     fig = Figure(figsize=(10, 4.6), layout="constrained")
-    for axes, part in zip(fig.subplots(1, len(ds.tolerance), sharey=True), range(len(ds.tolerance)), strict=True):
+    for axes, part in zip(
+        fig.subplots(1, len(ds.tolerance), sharey=True, squeeze=False)[0], range(len(ds.tolerance)), strict=True
+    ):
         error, steps = ds.error_over_tolerance.isel(tolerance=part), ds.steps.isel(tolerance=part)
         image = axes.pcolormesh(np.log10(np.maximum(error, 1e-2)), cmap="cividis", vmin=-2, vmax=0.3)
         for i, j in np.ndindex(*error.shape):

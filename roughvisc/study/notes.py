@@ -1,0 +1,104 @@
+"""What a result says of its own limits: left out since nothing asked for it, or beyond what the method promises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.mechanics.engine import Engine
+from roughvisc.mechanics.stepper import Scene
+from roughvisc.variables import FIELDS
+
+#: What a result says of a material without instantaneous compliance.
+NO_JUMP = (
+    "The material has no instantaneous compliance: each cell that comes into contact makes the pressure jump. The "
+    "tolerance is kept on the approach; the pressure (L1) may miss it at times just after cells came into contact."
+)
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
+#: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
+#: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+LARGEST_SLOPE = 0.3
+#: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
+_AT_ONCE = 0.1
+
+
+def left_out(
+    engine: Engine, boundary: str, method: str, fields: Sequence[str], every_step: bool, window: bool = False
+) -> str:
+    """What nothing asks for, and is therefore not modelled, computed or kept."""
+    out = []
+    if engine.note.startswith("no memory"):
+        out.append("history (the material is elastic)")
+    elif engine.memory.acts_on == "displacement" and method == "fast":
+        out.append("convolutions of the past")
+    if boundary == "periodic":
+        out.append("padding")
+    if window:
+        out.append("what lies too deep to be touched")
+    absent = [name for name in FIELDS if name not in fields]
+    if absent:
+        out.append(f"{' and '.join(absent)} in the file")
+    if not every_step:
+        out.append("steps between kept times in the file")
+    return ", ".join(out)
+
+
+def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
+    """Where the tolerance is not promised, or was not reached; empty if it is."""
+    notes = []
+    at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
+    if at_once == 0:
+        notes.append(NO_JUMP)
+    elif at_once < _AT_ONCE * final:
+        notes.append(
+            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: the pressure nearly jumps in each "
+            "cell that comes into contact. The tolerance is kept on the approach; the pressure (L1) may miss it at "
+            "times just after cells came into contact."
+        )
+    errors = dataset["time_error"].values
+    missed = np.flatnonzero(errors > scene.tolerance)  # a missing estimate is none
+    if missed.size and scene.time_step is None:
+        notes.append(
+            f"The estimated error of the time steps, {errors[missed].max():.2g} at most, exceeds the tolerance before "
+            f"{missed.size} of {errors.size} kept times: the shortest steps taken did not resolve what happened."
+        )
+    return " ".join(notes)
+
+
+def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
+    """What to say of a surface that is too steep for small slopes; empty if it is not.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    boundary : {"free", "periodic"}
+        In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
+    approach : float
+        The largest at kept times. [m]
+    """
+    slope = loaded_slope(height, np.inf if boundary == "periodic" else approach)
+    if not slope > LARGEST_SLOPE:
+        return ""
+    return (
+        f"The rms slope of the loaded surface is {slope:.2g}: the method takes slopes as small, and leaves out what is "
+        f"of the order of its square. Beyond {LARGEST_SLOPE:g} the results are a rough guess."
+    )
+
+
+def loaded_slope(height: xr.DataArray, depth: float) -> float:
+    """Root mean square slope between neighbouring cells of which one lies within a depth [m] of the highest."""
+    values = height.values
+    highest = np.nanmax(values)
+    squares = 0.0
+    for axis, name in enumerate(("x", "y")):
+        if values.shape[axis] == 1:
+            continue
+        first, second = np.delete(values, -1, axis), np.delete(values, 0, axis)
+        loaded = np.fmax(first, second) >= highest - depth
+        steps = (second - first)[loaded & np.isfinite(first) & np.isfinite(second)]
+        side = float(height[name][1] - height[name][0])
+        squares += float(np.mean((steps / side) ** 2)) if steps.size else 0.0
+    return float(np.sqrt(squares))

@@ -1,0 +1,468 @@
+"""At the ends of every axis: right to a stated tolerance, or refused with a clear message; never NaN, never endless."""
+
+import logging
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc import closed_forms
+
+long = pytest.mark.long
+ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1
+R, SIZE, SHAPE = 10.0, 2.6, (33, 31)
+BALL = rv.sphere(R, SIZE, SHAPE)
+ROUGH = rv.self_affine(1.0, (31, 29), hurst=0.8, rms_slope=0.1, seed=1)
+TOLERANCE = 1e-3
+#: Second order in the side of a cell over a contact radius of one: what a cell's mean lies above its centre.
+GRID = (SIZE / 31) ** 2 / 12
+
+
+def simulate(height, material, program, **settings):
+    return rv.simulate(height, material, program, **{"progress": False, "times": 3, "tolerance": TOLERANCE, **settings})
+
+
+def cells(values, dx, dy=None):
+    """Heights on a grid of any shape, also of one cell."""
+    values = np.asarray(values, dtype=float)
+    sides = (dx, dx if dy is None else dy)
+    centres = {a: (np.arange(n) + 0.5) * side for a, n, side in zip("xy", values.shape, sides, strict=True)}
+    return xr.DataArray(values, dims=("x", "y"), coords=centres)
+
+
+def cell_area(ds):
+    return np.prod([2 * float(ds[a][0]) if ds.sizes[a] == 1 else float(ds[a][1] - ds[a][0]) for a in ("x", "y")])
+
+
+def assert_a_contact_state(ds, tolerance=TOLERANCE):
+    """Everything finite, force balanced, no tension, no penetration beyond what the solver's tolerance leaves."""
+    present = np.isfinite(ds.height.values)
+    for name in set(ds.variables) - {"time_error", "gap", "height"}:
+        assert np.isfinite(ds[name].values).all(), name
+    assert np.isfinite(ds.gap.values[:, present]).all()
+    pressure = ds.pressure.values
+    assert (pressure >= 0).all()
+    assert (pressure[:, ~present] == 0).all()
+    assert not np.any((pressure > 0) & (ds.gap.values > 0))
+    np.testing.assert_allclose(pressure.sum((1, 2)) * cell_area(ds), ds.force.values, rtol=1e-12)
+    assert "not_converged" not in {ds.status.attrs["flag_meanings"].split()[i] for i in ds.status.values}
+    if "displacement" in ds:
+        opening = np.nanmax(ds.height.values) - ds.height.values + ds.displacement.values
+        opening -= ds.approach.values[:, None, None]
+        scale = np.nanmax(np.abs(ds.displacement.values)) + np.ptp(ds.height.values[present])
+        assert np.nanmin(opening) >= -30 * tolerance * scale
+
+
+def assert_follows(ds, exact):
+    """The approach within tolerance and grid of the largest exact one."""
+    assert np.isfinite(ds.approach.values).all()
+    error = np.abs(ds.approach.values - exact).max() / np.abs(exact).max()
+    assert error < TOLERANCE + GRID, error
+
+
+def step_load(material, duration, tolerance=TOLERANCE):
+    """A load applied at once that ends on a contact radius of one, with its closed form (Lee, Radok)."""
+    load = 4 / 3 / R / float(material.contact_compliance(duration))
+    times = duration * np.array([0.01, 0.5, 1.0])
+    ds = simulate(BALL, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=tolerance)
+    assert_a_contact_state(ds)
+    return ds, closed_forms.lee_radok_step(R, material, load).approach(times)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# materials and times
+
+
+@pytest.mark.parametrize("exponent", [-12, -6, -3, 0, 3, 6, 12])
+@pytest.mark.parametrize(
+    "material", [rv.maxwell(0.25, 0.25), ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=["maxwell", "zener", "kelvin_voigt"]
+)
+def test_time_over_retardation_time(material, exponent):
+    assert_follows(*step_load(material, 10.0**exponent))
+
+
+@pytest.mark.parametrize("exponent", [-8, -4, -2, 2, 4, 8])
+@pytest.mark.parametrize("duration", [1.0, 1e3])
+def test_shear_modulus_over_kelvin_modulus(exponent, duration):
+    kelvin = 0.25 / 10.0**exponent
+    assert_follows(*step_load(rv.zener(0.25, kelvin, kelvin), duration))
+
+
+@pytest.mark.parametrize("duration", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("exponent", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("glassy", [0.0, 1.0])
+def test_power_law(glassy, exponent, duration):
+    assert_follows(*step_load(rv.PowerLaw(glassy, 1.0, exponent), duration))
+
+
+@pytest.mark.parametrize("count", [1, 2, 12, 60])
+@pytest.mark.parametrize("duration", [1e-11, 1.0, 1e11])
+def test_exponentials_over_24_decades(count, duration):
+    times = tuple(np.geomspace(1e-12, 1e12, count)) if count > 1 else (duration,)
+    material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, times)
+    ds, exact = step_load(material, duration)
+    assert_follows(ds, exact)
+    assert ds.attrs["memory"].startswith(f"{count} exponential")
+
+
+def test_steps_of_all_sizes_in_one_program():
+    """Holds from 1e-15 to 1e15 retardation times, ascending."""
+    program = rv.Program().load(0.1 / R, over=0)
+    for exponent in range(-15, 16, 2):
+        program = program.hold(10.0**exponent)
+    for material in (ZENER, rv.Prony(1.0, 0.0, (1.0, 1.0, 1.0), (1e-9, 1.0, 1e9))):
+        ds = simulate(BALL, material, program, times=program.corners[1:])
+        exact = closed_forms.lee_radok_step(R, material, 0.1 / R).approach(ds.time.values)
+        smallest = float(np.sqrt(exact[0] * R))  # the contact radius: the grid is coarse for it
+        assert np.abs(ds.approach.values - exact).max() < (TOLERANCE + GRID / smallest**2) * exact.max()
+
+
+@pytest.mark.parametrize(
+    ("program", "message"),
+    [
+        (rv.Program().load(1e-3, over=1e15).hold(1e-15), r"program\.1: a segment lasts 1e-15 s where time has reached"),
+        (rv.Program().load(1e-3, over=1e10) + rv.Program.cycle(1e-3, 5e-4, 1e-8, 3), "the period of a cycle lasts"),
+        (rv.Program().load(1e-3, over=1e200), "expected times from 1e-100 to 1e"),
+        (rv.Program().load(1e-3, over=1e-200), "expected times from 1e-100 to 1e"),
+        (rv.Program().load(1e150, over=1.0), "the load reaches 1e"),
+    ],
+)
+def test_what_cannot_be_represented__is_refused(program, message):
+    with pytest.raises(rv.InputError, match=message):
+        simulate(BALL, ZENER, program)
+
+
+def test_steps_that_do_not_move_time__are_refused():
+    with pytest.raises(rv.InputError, match="time_step is 1e-15 s and the program ends at 100 s"):
+        simulate(BALL, ZENER, rv.Program().load(1e-3, over=100.0), time_step=1e-15)
+
+
+def test_shortest_segment__is_computed():
+    """A segment just as short as may be, after a long one."""
+    program = rv.Program().load(0.1 / R, over=1.0).hold(1e9).load(0.2 / R, over=1.0)
+    ds = simulate(BALL, ZENER, program, times=program.corners[1:])
+    assert_follows(ds, closed_forms.lee_radok(closed_forms.Paraboloid(R), ZENER, program).approach(ds.time.values))
+
+
+@pytest.mark.parametrize("count", [100, pytest.param(10_000, marks=long)])
+def test_cycles__settle(count):
+    """The force on a punch under cycles of approach repeats, and its work grows by the same amount each cycle."""
+    punch = rv.flat_punch(1.0, SIZE, (15, 15))
+    program = rv.Program.cycle(1e-2, 5e-3, 1.0, count, control="approach")
+    ends = np.linspace(0, count, 5)
+    ds = simulate(punch, ZENER, program, times=ends, tolerance=1e-2)
+    assert_a_contact_state(ds)
+    assert ds.force.values[2:] == pytest.approx(ds.force.values[-1], rel=1e-2)
+    work = np.diff(ds.work.values)
+    assert work[1:] == pytest.approx(work[-1], rel=1e-2)
+    exact = closed_forms.punch_dissipation(1.0, ZENER, 5e-3, 1.0) * count / 4
+    # a punch of cells has a radius right to half a cell; the error of the force acts over the path of all cycles
+    path = 4 * 5e-3 * count / 4 * float(ds.force.max()) * 1e-2
+    assert abs(work[-1] - exact) < SIZE / 15 / 2 * exact + path
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# loads, lengths, programs
+
+
+@pytest.mark.parametrize("exponent", [-300, -200, -30, -6])
+@pytest.mark.parametrize("material", [ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=["zener", "kelvin_voigt"])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_small_load__is_carried_by_the_highest_cell(boundary, material, exponent):
+    """One cell then: the approach is the load times the compliance times the cell's own influence."""
+    ramp = rv.Program().load(10.0**exponent, over=0.1).hold(1.0)
+    ds = simulate(ROUGH, material, ramp, boundary=boundary, edge="accept", fields=("pressure", "gap", "displacement"))
+    assert_a_contact_state(ds)
+    assert ds.contact_fraction.values[1:] == pytest.approx(1 / ROUGH.size)
+    share = [float(closed_forms.hereditary_integral(m, i, ramp, t)) for t in ds.time.values[1:]
+             for m, i in [(material.contact_compliance, material.contact_integral)]]  # fmt: skip
+    ratio = ds.approach.values[1:] / share
+    assert ratio[0] == pytest.approx(ratio[1], rel=2 * TOLERANCE)
+    if boundary == "free":
+        a, b = (float(ROUGH[axis][1] - ROUGH[axis][0]) for axis in ("x", "y"))
+        love = (2 * a * np.arcsinh(b / a) + 2 * b * np.arcsinh(a / b)) / np.pi  # Johnson, eq. (3.25), at the centre
+        assert ratio == pytest.approx(love / (a * b), rel=2 * TOLERANCE)
+
+
+@pytest.mark.parametrize("load", [1e-3, 1e-2, 1.0, 1e6, 1e12])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_large_load__makes_full_contact_and_no_more(boundary, load):
+    ds = simulate(ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), boundary=boundary, edge="accept")
+    assert_a_contact_state(ds)
+    if load >= 1:
+        assert (ds.contact_fraction == 1).all()
+        if boundary == "periodic":
+            assert ds.approach.values == pytest.approx(float(ROUGH.max() - ROUGH.mean()), rel=1e-9)
+            assert ds.mean_gap.values == pytest.approx(0, abs=1e-15)
+        elif load >= 1e6:  # the heights do not matter: a flat square
+            flat = simulate(0 * ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), edge="accept")
+            assert ds.approach.values == pytest.approx(flat.approach.values, rel=1e-3)
+
+
+def test_load_beyond_the_surface__is_refused_where_rounding_is_all_that_is_left():
+    with pytest.raises(rv.InputError, match="the pressure's variation is lost in its mean"):
+        simulate(ROUGH, ZENER, rv.Program().load(1e90, over=0), boundary="periodic")
+
+
+def test_load_beyond_the_grid__is_refused():
+    with pytest.raises(rv.EdgeContactError, match="reaches the border"):
+        simulate(rv.from_array(BALL.values, 0.1), ZENER, rv.Program().load(1e12, over=0))
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e3])
+def test_lengths__are_neutral(scale):
+    """Nanometres to kilometres, at the same modulus: loads scale with the square."""
+    runs = []
+    for unit in (1.0, scale):
+        program = rv.Program().load(0.08 * unit**2, over=0.5).hold(1.0).load(0.02 * unit**2, over=0.5)
+        ball = rv.sphere(R * unit, SIZE * unit, SHAPE)
+        runs.append(simulate(ball, ZENER, program, times=5, tolerance=1e-4))
+    one, other = runs
+    assert int(one.convolutions.sum()) == int(other.convolutions.sum())
+    for name, power in (("pressure", 0), ("approach", 1), ("contact_area", 2), ("work", 3), ("gap", 1)):
+        expected = one[name].values * scale**power
+        assert np.abs(other[name].values - expected).max() <= 1e-9 * np.abs(expected).max(), name
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e12])
+def test_stiffness_and_load_together__change_nothing(scale):
+    runs = [
+        simulate(BALL, rv.zener(0.25 * s, 0.25 * s, 0.25 * s), rv.Program().load(0.05 * s, over=0.2).hold(1.0))
+        for s in (1.0, scale)
+    ]
+    assert runs[1].approach.values == pytest.approx(runs[0].approach.values, rel=1e-9)
+    assert (
+        np.abs(runs[1].pressure.values / scale - runs[0].pressure.values).max() < 1e-9 * runs[0].pressure.values.max()
+    )
+
+
+@pytest.mark.parametrize("over", [0, 1.0])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_approach__pulls_fully_out_and_comes_back(boundary, over):
+    surface, deep = (BALL, 0.06) if boundary == "free" else (ROUGH, 0.4 * float(ROUGH.max() - ROUGH.mean()))
+    program = rv.Program().approach(deep, over=over).hold(0.5).approach(-deep, over=over).hold(30.0)
+    program = program.approach(deep, over=over)
+    times = [0.25, program.duration - 5 - over, program.duration]
+    ds = simulate(surface, ZENER, program, boundary=boundary, times=times)
+    assert_a_contact_state(ds)
+    assert [ds.status.attrs["flag_meanings"].split()[i] for i in ds.status.values][1] == "open"
+    assert float(ds.force[1]) == 0
+    # after thirty retardation times nothing is left of the dent: as if from rest, from half way on
+    fresh = simulate(surface, ZENER, rv.Program().approach(deep, over=over / 2), boundary=boundary, times=1)
+    assert float(ds.force[-1]) == pytest.approx(float(fresh.force[0]), rel=2 * TOLERANCE)
+
+
+@pytest.mark.parametrize("ratio", [1e-12, 1e-3, 1e3, 1e12])
+def test_jumps_of_any_size(ratio):
+    """Up or down by any factor and back: a punch tells the exact approach."""
+    program = rv.Program().load(1.0, over=0).hold(1.0).load(ratio, over=0).hold(1.0).load(1.0, over=0).hold(1.0)
+    punch = rv.flat_punch(1.0, SIZE, SHAPE)
+    ds = simulate(punch, ZENER, program, times=7)
+    assert_a_contact_state(ds)
+    exact = closed_forms.punch_approach(1.0, ZENER, program, ds.time.values)
+    found = ds.approach.values / ds.approach.values[0] * exact[0]  # what the cells make of the radius apart
+    assert np.abs(found - exact).max() < TOLERANCE * exact.max()
+    ball = simulate(BALL, ZENER, rv.Program().load(1e-2, over=0).hold(1.0).load(1e-2 * ratio, over=0), edge="accept")
+    assert_a_contact_state(ball)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# grids and surfaces
+
+
+@pytest.mark.parametrize(
+    "shape", [(1, 1), (1, 7), (7, 1), (2, 2), (31, 37), (2, 4096), pytest.param((4096, 3), marks=long)], ids=str
+)
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_grids_of_any_shape(shape, boundary):
+    side = 1 / max(shape)
+    height = cells(1e-3 * np.random.default_rng(0).standard_normal(shape), side)
+    fields = ("pressure", "gap", "displacement")
+    program = rv.Program().load(1e-3 * side, over=0).hold(1.0)
+    ds = simulate(height, ZENER, program, boundary=boundary, edge="accept", fields=fields)
+    assert_a_contact_state(ds)
+    deep = 0.3 * float(height.max() - height.mean())
+    program = rv.Program().approach(deep, over=0.1).hold(1.0)
+    if boundary == "periodic" and deep == 0:
+        with pytest.raises(rv.InputError, match="contact is full at 0 m"):
+            simulate(height, ZENER, program, boundary=boundary)
+    else:
+        ds = simulate(height, ZENER, program, boundary=boundary, edge="accept", fields=fields)
+        assert_a_contact_state(ds)
+        assert float(ds.approach[-1]) == deep
+
+
+@pytest.mark.parametrize("shape", [(37, 41), (64, 64), (129, 33), (16, 256), (256, 16)], ids=str)
+def test_hertz__on_cells_of_any_aspect(shape):
+    ds = simulate(rv.sphere(R, SIZE, shape), ELASTIC, rv.Program().load(4 / 3 / R, over=0))
+    coarse = SIZE / min(shape)
+    # with an even number of cells the highest one lies half a side off the apex
+    apex = sum((SIZE / n) ** 2 / 8 for n in shape if n % 2 == 0)
+    assert abs(float(ds.approach[0]) * R - 1) < TOLERANCE + coarse**2 / 12 + apex
+    assert abs(float(ds.contact_area_corrected[0]) / np.pi - 1) < 0.02 * coarse + coarse**1.5 + TOLERANCE
+    assert_a_contact_state(ds)
+
+
+X, Y = np.meshgrid(np.arange(32), np.arange(32), indexing="ij")
+SHAPES = {
+    "flat": 0.0 * X,
+    "spike": np.where((X == 13) & (Y == 17), 0.1, 0.0),
+    "two spikes, equal": np.where(((X == 5) & (Y == 9)) | ((X == 21) & (Y == 25)), 0.1, 0.0),
+    "step": np.where(X < 16, 0.0, -0.1),
+    "checkerboard": 1e-2 * ((X + Y) % 2),
+    "plateau": np.minimum(rv.self_affine(1.0, 32, hurst=0.8, rms_slope=0.1, seed=1).values, 0.0),
+    "equal maxima": np.where((X % 8 == 4) & (Y % 8 == 4), 1e-2, 0.0),
+}
+
+
+@pytest.mark.parametrize("load", [1e-6, 1e-2, 10.0])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_surfaces_of_any_shape(name, boundary, load):
+    height = cells(SHAPES[name], 1 / 32)
+    program = rv.Program().load(load, over=0.1).hold(1.0).load(load / 3, over=0.1)
+    fields = ("pressure", "gap", "displacement")
+    ds = simulate(height, ZENER, program, boundary=boundary, edge="accept", fields=fields)
+    assert_a_contact_state(ds)
+    if name == "flat" and boundary == "periodic":
+        uniform = ds.force.values[:, None, None] * np.ones((32, 32))
+        np.testing.assert_allclose(ds.pressure.values, uniform, rtol=1e-9)
+        assert np.abs(ds.approach.values).max() <= 1e-12 * load
+    if name in ("two spikes, equal", "equal maxima", "checkerboard") and boundary == "periodic":
+        # equal cells in equal surroundings carry equal pressure: exactly known without solving anything
+        highest = SHAPES[name] == SHAPES[name].max()
+        for frame in ds.pressure.values[1:]:
+            assert np.ptp(frame[highest]) <= 30 * TOLERANCE * frame[highest].max()
+
+
+@pytest.mark.parametrize("slope", [1e-9, 1e-4, 1.0, 10.0])
+def test_slopes__scale(slope):
+    """Heights, approach and pressure scale together: as at a slope of 0.1, whatever the slope."""
+    runs = []
+    for rms in (0.1, slope):
+        height = rv.self_affine(1.0, (32, 30), hurst=0.8, rms_slope=rms, seed=1)
+        program = rv.Program().load(0.1 * rms, over=0.1).hold(1.0)
+        runs.append(simulate(height, ZENER, program, boundary="periodic"))
+        assert_a_contact_state(runs[-1])
+    factor = slope / 0.1
+    assert runs[1].approach.values == pytest.approx(runs[0].approach.values * factor, rel=1e-6)
+    assert runs[1].contact_area.values == pytest.approx(runs[0].contact_area.values)
+
+
+@pytest.mark.parametrize(("slope", "warns"), [(0.1, False), (0.25, False), (0.5, True), (10.0, True)])
+def test_slopes_that_are_not_small__warn(slope, warns, caplog):
+    height = rv.self_affine(1.0, (64, 60), hurst=0.8, rms_slope=slope, shortcut=0.2, seed=1)
+    with caplog.at_level(logging.WARNING, "roughvisc"):
+        ds = simulate(height, ELASTIC, rv.Program().load(0.01 * slope, over=0), boundary="periodic")
+    assert ("rms slope of the loaded surface is" in caplog.text) is warns
+    assert ("slope_note" in ds.attrs) is warns
+
+
+def test_slopes_that_are_not_loaded__do_not_warn():
+    """A ball whose flanks are steep, pressed at its tip; a flat punch whose sides are absent."""
+    ball = rv.sphere(1.0, 1.9, (65, 65))
+    tip = simulate(ball, ELASTIC, rv.Program().load(1e-3, over=0))
+    assert "slope_note" not in tip.attrs
+    deep = simulate(ball, ELASTIC, rv.Program().load(0.5, over=0))
+    assert "slope_note" in deep.attrs
+    punch = simulate(rv.flat_punch(1.0, SIZE, SHAPE), ELASTIC, rv.Program().load(1.0, over=0))
+    assert "slope_note" not in punch.attrs
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_scan_with_nine_tenths_missing(boundary):
+    height = rv.self_affine(1.0, (48, 45), hurst=0.8, rms_slope=0.1, seed=1)
+    holes = height.where(np.random.default_rng(1).random(height.shape) > 0.9)
+    program = rv.Program().load(1e-4, over=0.1).hold(1.0).load(1e-2, over=0.1)
+    with pytest.raises(rv.InputError, match="height is missing at"):
+        simulate(holes, ZENER, program, boundary=boundary)
+    fields = ("pressure", "gap", "displacement")
+    ds = simulate(holes, ZENER, program, boundary=boundary, missing="absent", edge="accept", fields=fields)
+    assert_a_contact_state(ds)
+
+
+def test_single_cell_left__carries_all():
+    height = cells(np.where((X == 5) & (Y == 6), 0.0, np.nan), 1 / 32)
+    ds = simulate(height, ZENER, rv.Program().load(1.0, over=0.1).hold(1.0), missing="absent")
+    assert_a_contact_state(ds)
+    assert ds.pressure.values[1:, 5, 6] == pytest.approx(32**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_float32_heights__differ_by_their_rounding(boundary):
+    program = rv.Program().load(1e-2, over=0.1).hold(1.0)
+    runs = [simulate(h, ZENER, program, boundary=boundary, edge="accept") for h in (ROUGH, ROUGH.astype("float32"))]
+    assert runs[1].height.dtype == np.float64
+    rounding = 2**-24 * float(abs(ROUGH).max()) / float(runs[0].approach.max())
+    assert runs[1].approach.values == pytest.approx(runs[0].approach.values, rel=4 * rounding + 1e-3 * TOLERANCE)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# nothing modelled that the scene does not need
+
+
+def counted(height, material, program, **settings):
+    """A run with the number of its accepted steps."""
+    steps = []
+    ds = simulate(height, material, program, progress=lambda now, end: steps.append(now), **settings)
+    return ds, len(steps)
+
+
+def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
+    from roughvisc.mechanics.memory import Modes
+
+    kept = []
+    sound = Modes.advance
+    monkeypatch.setattr(Modes, "advance", lambda *a: kept.append(sound(*a).modes.shape[0]) or sound(*a))
+    ds, steps = counted(BALL, ELASTIC, rv.Program().load(0.1, over=1.0).load(0.01, over=1.0), times=5)
+    assert set(kept) == {0}
+    assert steps == 5
+    assert ds.attrs["memory"] == "no memory: elastic"
+    assert "history (the material is elastic)" in ds.attrs["left_out"]
+
+
+def test_constant_load__takes_few_steps_once_relaxed():
+    """Ten times the hold, hardly more steps; a step only costs one solution that is confirmed."""
+    load = rv.Program().load(0.05, over=0)
+    _, steps = counted(BALL, ZENER, load.hold(30.0), times=[30.0])
+    longer, more = counted(BALL, ZENER, load.hold(3000.0), times=[3000.0])
+    assert more <= steps + 10
+    late, _ = counted(BALL, ZENER, load.hold(30.0).hold(2970.0), times=[30.0, 3000.0])
+    assert int(late.convolutions[1]) < int(late.convolutions[0])
+    assert float(longer.approach[-1]) == pytest.approx(float(late.approach[-1]), rel=TOLERANCE)
+
+
+def test_fields_not_kept__are_neither_stored_nor_paid_for():
+    program = rv.Program().load(0.05, over=0.2).hold(1.0)
+    none, every = (simulate(BALL, ZENER, program, fields=f) for f in ((), ("pressure", "gap", "displacement")))
+    assert not {"pressure", "gap", "displacement"} & set(none.variables)
+    assert int(none.convolutions.sum()) == int(every.convolutions.sum())
+    assert "pressure and gap and displacement in the file" in none.attrs["left_out"]
+    assert "in the file" not in every.attrs["left_out"].replace("steps between kept times in the file", "")
+
+
+def test_periodic__is_not_padded(monkeypatch):
+    from scipy import fft
+
+    sizes = set()
+    sound = fft.rfft2
+    monkeypatch.setattr(fft, "rfft2", lambda field, **kw: sizes.add(field.shape) or sound(field, **kw))
+    monkeypatch.setattr(fft, "rfft", lambda *a, **kw: pytest.fail("a padded transform"))
+    ds = simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
+    assert sizes == {ROUGH.shape}
+    assert "padding" in ds.attrs["left_out"]
+
+
+def test_left_out__is_what_plan_says(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(
+        '[surface]\ngenerate = "wavy"\namplitude = 1e-6\nwavelength = 1e-4\nsize = 1e-4\nshape = 16\n'
+        '[material]\nmodel = "elastic"\nshear_modulus = 1e6\n[[program]]\nload = 1e-4\nover = 0.1\n'
+        '[solve]\nboundary = "periodic"\n[keep]\nfields = ["gap"]\ntimes = 2\n'
+    )
+    case = rv.read_study(study)
+    ds = rv.run(case, tmp_path / "out", progress=False)
+    planned = str(rv.plan([case], tmp_path / "out").left_out.values[0])
+    assert ds.attrs["left_out"] == planned
+    assert planned.startswith("history (the material is elastic), padding, pressure and displacement in the file")

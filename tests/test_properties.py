@@ -1,0 +1,187 @@
+"""Properties of whole runs, over random materials, programs and surfaces: symmetries, scaling, monotony, optimality."""
+
+import importlib
+import pathlib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import roughvisc as rv
+
+TOLERANCE = 1e-3
+SETTINGS = settings(deadline=None, max_examples=8, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+
+decades = st.floats(-2, 2).map(lambda exponent: 10.0**exponent)
+seeds = st.integers(0, 2**31)
+boundaries = st.sampled_from(["free", "periodic"])
+shapes = st.tuples(st.integers(5, 17), st.integers(5, 17))
+
+
+@st.composite
+def materials(draw, scale=1.0):
+    """Materials that can jump, whose moduli may all be multiplied by a factor."""
+    glassy, late, time = draw(decades) / scale, draw(decades) / scale, draw(decades)
+    kind = draw(st.sampled_from(["elastic", "maxwell", "zener", "power law"]))
+    return {
+        "elastic": lambda s: rv.Prony(glassy / s),
+        "maxwell": lambda s: rv.Prony(glassy / s, fluidity=glassy / time / s),
+        "zener": lambda s: rv.Prony(glassy / s, 0.0, (late / s,), (time,)),
+        "power law": lambda s: rv.PowerLaw(glassy / s, late / s, 0.4, time),
+    }[kind]
+
+
+@st.composite
+def surfaces(draw):
+    return rv.self_affine(1.0, draw(shapes), hurst=0.7, rms_slope=0.1, seed=draw(seeds))
+
+
+def load_for(material):
+    return 5e-3 / float(material.contact_compliance(2.0))
+
+
+def simulate(height, material, program, boundary, **options):
+    settings = {"edge": "accept", "times": 4, "tolerance": TOLERANCE, "progress": False}
+    return rv.simulate(height, material, program, boundary=boundary, **{**settings, **options})
+
+
+def ramp(load):
+    return rv.Program().load(load, over=0.5).hold(1.0).load(0.3 * load, over=0.5)
+
+
+def differs(one, other, name, factor=1.0):
+    """Difference of a quantity: in the sum over the grid, over its largest."""
+    a, b = one[name].values, other[name].values / factor
+    axes = tuple(range(1, a.ndim))
+    return float(np.max(np.sum(np.abs(a - b), axis=axes)) / np.max(np.sum(np.abs(a), axis=axes)))
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries)
+def test_mirrored_surface__gives_the_mirrored_result(height, make, boundary):
+    program = ramp(load_for(make(1.0)))
+    one = simulate(height, make(1.0), program, boundary)
+    mirrored = height.copy(data=height.values[::-1])
+    other = simulate(mirrored, make(1.0), program, boundary)
+    other = other.assign(pressure=other.pressure.copy(data=other.pressure.values[:, ::-1]))
+    for name in ("pressure", "approach"):
+        assert differs(one, other, name) < 2 * TOLERANCE
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries)
+def test_turned_surface__gives_the_turned_result(height, make, boundary):
+    program = ramp(load_for(make(1.0)))
+    one = simulate(height, make(1.0), program, boundary)
+    other = simulate(height.T.rename(x="y", y="x"), make(1.0), program, boundary)
+    turned = one.assign(approach=other.approach, pressure=one.pressure.copy(data=other.pressure.values.swapaxes(1, 2)))
+    for name in ("pressure", "approach"):
+        assert differs(one, turned, name) < 2 * TOLERANCE
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries, decades)
+def test_load_and_stiffness_together__change_nothing_but_pressure(height, make, boundary, factor):
+    load = load_for(make(1.0))
+    one = simulate(height, make(1.0), ramp(load), boundary)
+    other = simulate(height, make(factor), ramp(load * factor), boundary)
+    assert differs(one, other, "approach") < 2 * TOLERANCE
+    assert differs(one, other, "pressure", factor) < 2 * TOLERANCE
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries, decades)
+def test_heights_and_load_together__scale_the_approach(height, make, boundary, factor):
+    """The problem is positively homogeneous."""
+    load = load_for(make(1.0))
+    one = simulate(height, make(1.0), ramp(load), boundary)
+    other = simulate(height * factor, make(1.0), ramp(load * factor), boundary)
+    for name in ("approach", "pressure"):
+        assert differs(one, other, name, factor) < 2 * TOLERANCE
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries, st.floats(0.05, 0.95))
+def test_split_segment__changes_nothing_beyond_the_tolerance(height, make, boundary, part):
+    load = load_for(make(1.0))
+    whole = rv.Program().load(load, over=1.0).hold(1.0)
+    split = rv.Program().load(part * load, over=part).load(load, over=1 - part).hold(part).hold(1 - part)
+    one, other = (simulate(height, make(1.0), p, boundary, times=[0.5, 1.0, 2.0]) for p in (whole, split))
+    for name in ("approach", "pressure"):
+        assert differs(one, other, name) < 2 * TOLERANCE
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries)
+def test_more_load__presses_every_cell_at_least_as_much(height, make, boundary):
+    """Elastic contact is monotone in the load; so is a growing viscoelastic one in approach and area."""
+    load = load_for(make(1.0))
+    less, more = (simulate(height, make(1.0), rv.Program().load(f * load, over=1.0), boundary) for f in (1.0, 1.5))
+    slack = 2 * TOLERANCE * float(more.approach.max())
+    assert (more.approach >= less.approach - slack).all()
+    assert (more.contact_area >= less.contact_area).all()
+    assert (np.diff(more.approach) >= -slack).all()
+
+
+@SETTINGS
+@given(surfaces(), materials(), boundaries)
+def test_work_from_rest__is_never_negative(height, make, boundary):
+    load = load_for(make(1.0))
+    program = (
+        rv.Program().load(load, over=0.3).load(0, over=0).hold(0.4).load(2 * load, over=0).load(0.1 * load, over=1)
+    )
+    ds = simulate(height, make(1.0), program, boundary, times=9)
+    assert (ds.work >= -TOLERANCE * float(ds.force.max()) * float(abs(ds.approach).max())).all()
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_elastic_work__is_the_stored_energy_whatever_the_steps(boundary):
+    """Up in few steps or many, out beyond contact: what was put in comes back."""
+    height = rv.self_affine(1.0, (17, 16), hurst=0.7, rms_slope=0.1, seed=3)
+    deep = 0.3 * float(height.max() - height.mean())
+    program = rv.Program().approach(deep, over=1.0).approach(-deep, over=1.0)
+    few, many = (simulate(height, rv.elastic(1.0), program, boundary, times=t) for t in ([1.0, 2.0], 81))
+    assert float(few.work[0]) == pytest.approx(float(many.work[40]), rel=1e-6)
+    path = np.linspace(0, deep, 41)
+    force = many.force.values[:41]
+    assert float(few.work[0]) == pytest.approx(float(np.trapezoid(force, path)), rel=5e-3)
+    assert abs(float(few.work[1])) < 1e-12 * float(few.work[0])
+
+
+@pytest.mark.parametrize(
+    "material", [rv.kelvin_voigt(1.0, 1.0), rv.zener(50.0, 5.0, 0.3), rv.PowerLaw(0.0, 1.0, 0.6)], ids=str
+)
+def test_flat_periodic_surface__is_not_stepped_for_its_rounding(material):
+    """Its approach is zero: rounding relative to rounding once drove the steps to their least."""
+    flat = 0 * rv.self_affine((0.7, 1.0), (5, 6), hurst=0.7, rms_slope=0.1, seed=3)
+    steps = []
+    ds = simulate(flat, material, rv.Program().load(0.017, over=0.1), "periodic", progress=lambda a, b: steps.append(a))
+    assert len(steps) < 500
+    assert np.abs(ds.approach.values).max() < 1e-12
+    np.testing.assert_allclose(ds.pressure.values[-1], 0.017 / 0.7, rtol=1e-9)
+
+
+def test_random_cases__are_contact_states(monkeypatch, capsys):
+    """A few of the cases of workflows/benchmarks/random_cases.py."""
+    monkeypatch.syspath_prepend(str(pathlib.Path(__file__).parents[1] / "workflows" / "benchmarks"))
+    random_cases = importlib.import_module("random_cases")
+    assert random_cases.main(40, seed=7) == 0, capsys.readouterr().out
+    ds = simulate(rv.sphere(1.0, 1.0, 9), rv.elastic(1.0), rv.Program().load(0.1, over=0), "free",
+                  fields=("pressure", "gap", "displacement"), times=1)  # fmt: skip
+    assert random_cases.violations(ds) == []
+    for name, wrong in [("pressure", -ds.pressure), ("force", 2 * ds.force), ("displacement", 0 * ds.displacement),
+                        ("work", -ds.work), ("approach", ds.approach * np.nan)]:  # fmt: skip
+        assert random_cases.violations(ds.assign({name: wrong})), name
+
+
+@pytest.mark.parametrize("method", ["fast", "seed"])
+def test_work_of_a_jump__is_two_fifths_under_a_sphere(method):
+    """Hertz, loaded at once: the stored energy, not half of force times approach."""
+    ball = rv.sphere(1.0, 0.6, 41)
+    ds = simulate(
+        ball, rv.elastic(1.0), rv.Program().load(0.02, over=0).hold(1.0), "free", method=method, time_step=1.0
+    )
+    expected = 0.4 * float(ds.force[0] * ds.approach[0])
+    # of second order in h / a = 0.094
+    assert float(ds.work[-1]) == pytest.approx(expected, rel=1e-2)
