@@ -125,12 +125,13 @@ def test_sweep__of_two_parameters_is_a_map():
     unit = 1e-6 if "mm²" in figure.axes[-1].get_ylabel() else 1.0
     assert np.ma.getmaskarray(cells).sum() == 1, "the case that was left out"
     np.testing.assert_allclose(cells.filled(np.nan).ravel()[1:], expected.values.ravel()[1:] / unit)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Load [N]", "Kelvin viscosity [MPa s]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Load [mN]", "Kelvin viscosity [kPa s]")
     assert ax.get_xscale() == ax.get_yscale() == "log"
     corners = mesh.get_coordinates()
-    assert np.all((corners[0, :-1, 0] < DECADES) & (corners[0, 1:, 0] > DECADES))
+    shown = 1e3 * np.array(DECADES)
+    assert np.all((corners[0, :-1, 0] < shown) & (corners[0, 1:, 0] > shown))
     turned = plot.sweep(ds, along=["material.kelvin_viscosity", "program.0.load"]).axes[0]
-    assert turned.get_xlabel() == "Kelvin viscosity [MPa s]"
+    assert turned.get_xlabel() == "Kelvin viscosity [kPa s]"
 
 
 def test_sweep__of_two_parameters_as_a_family_of_lines():
@@ -139,7 +140,7 @@ def test_sweep__of_two_parameters_as_a_family_of_lines():
     assert [ax.get_title(loc="right") for ax in figure.axes] == ["t = 100 ms", "t = 10 s"]
     (legend,) = figure.legends
     named = [text.get_text() for text in legend.get_texts()]
-    assert named == ["0.001 MPa s", "0.01 MPa s", "0.1 MPa s", "1 MPa s"]
+    assert named == ["1 kPa s", "10 kPa s", "100 kPa s", "1000 kPa s"]
     for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
         assert len(ax.lines) == 4
         for line, power in zip(ax.lines, (3, 4, 5, 6), strict=True):
@@ -150,7 +151,7 @@ def test_sweep__many_lines_have_a_colour_bar_instead_of_a_legend():
     ds = stacked(product(program__0__load=LOADS, material__viscosity=np.geomspace(1e3, 1e6, 12).tolist()), by_load)
     figure = plot.sweep(ds, kind="lines", along="program.0.load")
     assert not figure.legends
-    assert figure.axes[-1].get_ylabel() == "Viscosity [MPa s]"
+    assert figure.axes[-1].get_ylabel() == "Viscosity [kPa s]"
     assert len({line.get_color() for line in figure.axes[0].lines}) == 12
 
 
@@ -178,6 +179,17 @@ def test_sweep__what_follows_from_another_parameter_takes_no_axis():
     ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
     assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
     assert plot.sweep(ds).axes[0].get_xlabel() == "Load [mN]"
+
+
+def test_sweep__over_many_decades_has_the_unit_of_their_middle():
+    holds = product(program__1__hold=np.geomspace(1e-12, 1e12, 9).tolist(), material__compliances=["[1e-8]", "[1e-6]"])
+    first, second = cases_of(stacked(holds)).parameters
+    assert first.label == "Hold [s]"
+    assert second.numeric, "lists of one number are numbers"
+    assert second.levels.tolist() == [1e-8, 1e-6]
+    ax = plot.sweep(stacked(holds, lambda v: v["program.1.hold"] ** 0.25)).axes[0]
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    assert ax.get_ylabel() == "Contact area [m²]"
 
 
 def test_sweep__parameters_of_one_name_are_told_apart():
@@ -221,7 +233,7 @@ def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
     assert len(figure.axes[0].lines) == 100
     assert not figure.legends
     assert figure.axes[1].get_yscale() == "log"
-    assert figure.axes[1].get_ylabel() == "Load [N]"
+    assert figure.axes[1].get_ylabel() == "Load [mN]"
 
 
 def test_histories_of_cases__a_second_parameter_has_line_styles():

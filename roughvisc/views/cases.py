@@ -63,8 +63,8 @@ class Parameter:
 
     @property
     def unit(self) -> Unit:
-        """Unit to show numbers in."""
-        return setting_unit(self.values, self.si) if self.numeric else Unit(1.0, "")
+        """Unit to show numbers in: of numbers over decades, the one that suits their middle."""
+        return setting_unit(middle_of_decades(self.values), self.si) if self.numeric else Unit(1.0, "")
 
     @property
     def label(self) -> str:
@@ -187,11 +187,28 @@ def _histories(dataset: xr.Dataset) -> xr.Dataset:
     return dataset[[name for name in dataset.data_vars if dataset[name].dims == ("time",)]].load()
 
 
+def middle_of_decades(values: np.ndarray) -> np.ndarray:
+    """Values that tell a unit: as they are or, of positive ones over two decades or more, their geometric middle."""
+    known = values[np.isfinite(values)]
+    if known.size and known.min() > 0 and known.max() >= 100 * known.min():
+        return np.sqrt([known.min()]) * np.sqrt(known.max())
+    return values
+
+
+def _numbers(values: np.ndarray) -> np.ndarray:
+    """Numbers, where every value is a list of one number, as of a material with one relaxation."""
+    if values.dtype.kind not in "OU":
+        return values
+    read = [_json(value) for value in values.tolist()]
+    alone = all(isinstance(one, list) and len(one) == 1 and type(one[0]) in (int, float) for one in read)
+    return np.array([one[0] for one in read], dtype=float) if alone else values
+
+
 def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Parameter]:
     """Parameters that vary, without those that follow one to one from another before them."""
     kept: list[Parameter] = []
     for key, values, si in found:
-        one = Parameter(key, values, si, "")
+        one = Parameter(key, _numbers(values), si, "")
         pairs = [len(set(zip(one.places, other.places, strict=True))) for other in kept]
         alike = any(p == len(one.levels) == len(o.levels) for p, o in zip(pairs, kept, strict=True))
         if len(one.levels) > 1 and not alike:

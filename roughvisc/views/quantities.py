@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from roughvisc.variables import VARIABLES
 from roughvisc.views.axes import Unit, unit_for
-from roughvisc.views.cases import Cases
+from roughvisc.views.cases import Cases, middle_of_decades
 
 NAMES = {
     "force": "Force",
@@ -23,7 +25,7 @@ def quantity_unit(cases: Cases, quantity: str, values) -> Unit:
     if quantity == "contact_fraction":
         return Unit(0.01, "%")
     declared = VARIABLES[quantity].units if quantity in VARIABLES else ""
-    return unit_for(values, str(cases.members[0][quantity].attrs.get("units", declared)))
+    return unit_for(middle_of_decades(np.ravel(values)), str(cases.members[0][quantity].attrs.get("units", declared)))
 
 
 def label_of(cases: Cases, quantity: str, unit: Unit) -> str:
