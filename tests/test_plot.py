@@ -23,6 +23,7 @@ SAMPLES = {
     "cycle": lambda: made.hertz_cycle(500, (17, 12), 10),
     "one frame": made.one_frame,
     "open": made.open_contact,
+    "24 decades": lambda: made.hertz_creep((15, 12), times=np.r_[0, np.geomspace(1e-12, 1e12, 25)]),
     "two frames": lambda: made.rough_creep(frames=2),
     "strip": lambda: made.rough_creep((150, 21)).assign_coords(y=(np.arange(21) + 0.5) * 8e-6),
     "pillar": lambda: made.rough_creep((21, 150)).assign_coords(x=(np.arange(21) + 0.5) * 8e-6),
