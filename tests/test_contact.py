@@ -228,3 +228,21 @@ def test_given_approach__is_finite_down_to_rounding(approach, shape, boundary, t
         state = solve_contact(halfspace, gap, approach=approach, tolerance=tolerance / 1e6, start=state.pressure)
     assert np.isfinite(state.pressure).all()
     assert state.load > 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_given_approach__near_full_contact_is_finite_where_the_kernel_is_singular():
+    """A uniform step displaces nothing with periodic boundaries: its curvature is that of rounding, or none."""
+    rng = np.random.default_rng(0)
+    for _ in range(150):
+        shape = tuple(int(n) for n in rng.integers(1, 12, 2))
+        gap = rng.random(shape) * 10 ** rng.uniform(-3, 3)
+        gap -= gap.min()
+        if not gap.any():
+            continue
+        halfspace = HalfSpace(shape, (1.0, rng.choice([0.3, 1.0, 4.0])), "periodic")
+        approach = float(gap.mean() * (1 - 10 ** rng.uniform(-13, -2)))
+        start = rng.random(shape) * 10 if rng.random() < 0.5 else None
+        state = solve_contact(halfspace, gap, approach=approach, tolerance=1e-14, start=start, max_iterations=300)
+        assert np.isfinite(state.pressure).all()
+        assert np.isfinite([state.load, state.bound]).all()

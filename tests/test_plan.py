@@ -1,9 +1,11 @@
 """What a plan says before anything runs, against what the run then takes."""
 
+import io
 import pathlib
 
 import numpy as np
 import pytest
+from rich.console import Console
 from test_run import BALL
 
 import roughvisc as rv
@@ -13,6 +15,7 @@ from roughvisc.study import plan as plan_module
 from roughvisc.study.case import read_cases, vary
 from roughvisc.study.estimate import March, coarse, wall_time
 from roughvisc.study.simulate import simulate
+from roughvisc.views.console import plan_tables
 
 ROUGH = """
 title = "Rough"
@@ -196,3 +199,13 @@ def test_plan__counts_the_window_that_follows_a_small_contact(study):
     assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
     ds = rv.run(case, progress=False)
     assert ds.attrs["left_out"] == planned.left_out.values[0]
+
+
+def test_plan__says_how_much_comes_into_contact(study):
+    pressed_flat = vary(study(ROUGH)[0], {"program.0.load": "5 N"})
+    planned = rv.plan([study(ROUGH)[0], pressed_flat])
+    light, heavy = planned.contact_fraction.values
+    assert 0 < light < heavy == 1
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(plan_tables(planned))
+    assert "to 100 % of the grid" in console.export_text()

@@ -42,6 +42,10 @@ _COLUMNS = {
     "left_out": ("", "what is not modelled, computed or kept, since nothing asks for it"),
     "steps": ("1", "accepted time steps expected"),
     "rows": ("1", "kept times expected"),
+    "contact_fraction": (
+        "1",
+        "largest contact fraction on a coarse grid, which rounds the summits off: rather too much",
+    ),
     "convolutions": ("1", "convolutions expected, one forward and one inverse transform each"),
     "wall_time": ("s", "wall time expected, in one process with one thread"),
     "memory": ("byte", "memory of the process at its peak"),
@@ -246,6 +250,7 @@ def _row(
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,
         "rows": found.rows,
+        "contact_fraction": found.contact,
         "convolutions": found.convolutions,
         "wall_time": wall_time(case, cells, found, engine, convolution, part),
         "memory": memory(case, cells, found, engine),

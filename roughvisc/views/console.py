@@ -138,6 +138,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Cases", f"{total}, {attrs['processes']} side by side"),
         *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
         ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
+        ("Contact at most", _contact(costs)),
         ("Steps a case", _span(costs["steps"], "")),
         ("Convolutions a case", _span(costs["convolutions"], "")),
         ("Wall time a case", _span(costs["wall_time"], "s")),
@@ -209,6 +210,17 @@ def profile_table(profile: Profile) -> Group:
         table.add_row(part, readable(seconds, "s"), f"{profile.share(part):.1%}", f"{calls:,}" if calls else "")
     table.add_row("all", readable(profile.whole, "s"), "100.0%", "", style="bold")
     return Group(table)
+
+
+def _contact(costs: xr.Dataset) -> str:
+    """How much of the grid comes into contact, as far as coarse grids can tell."""
+    largest = 100 * costs["contact_fraction"]
+    low, high = (float(f(largest)) for f in (np.nanmin, np.nanmax)) if largest.notnull().any() else (np.nan, np.nan)
+    if np.isnan(low):
+        return ""
+    texts = dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (low, high))
+    span = " to ".join(texts)
+    return f"about {span} % of the grid, judged on a coarse one"
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:
