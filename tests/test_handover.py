@@ -133,7 +133,8 @@ def test_cf__no_attribute_is_of_a_kind_that_others_cannot_read(file):
 
 
 @pytest.mark.skipif(CHECKER is None, reason="needs compliance-checker")
-def test_cf__a_checker_finds_one_thing_alone(file):
+def test_cf__a_checker_finds_one_thing_alone(computed, tmp_path):
+    file = write_result(computed.assign_attrs(title="Ground steel"), tmp_path / "computed.nc")
     done = subprocess.run([CHECKER, "-t", "cf:1.11", "-f", "json", str(file)], capture_output=True, text=True)
     found = json.loads(done.stdout[done.stdout.index("{") :])["cf:1.11"]
     said = {message for one in found["all_priorities"] for message in one["msgs"]}
