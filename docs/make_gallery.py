@@ -21,7 +21,15 @@ WORKFLOWS = HERE.parent / "workflows"
 FIGURES = {
     "quickstart": {"maps": lambda ds: rv.plot.maps(ds, fields=["pressure"]), "history": rv.plot.history},
     "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
-    "load_sweep": {"area": lambda results: rv.plot.area_against_load(by_load(results))},
+    "load_sweep": {
+        "sweep": rv.plot.sweep,
+        "histories": rv.plot.histories_of_cases,
+        "area": lambda results: rv.plot.area_against_load(by_load(results)),
+    },
+    "two_parameters": {
+        "map": lambda results: rv.plot.sweep(results, "contact_area_corrected"),
+        "lines": lambda results: rv.plot.sweep(results, "approach", times=[0.01, 0.05], kind="lines"),
+    },
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}

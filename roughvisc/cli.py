@@ -385,25 +385,37 @@ def _draw(figure: Any, path: Path) -> None:
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
 def plot(result: Path, out: Path | None) -> None:
-    """Draw the figures of a result, or of all results in a folder.
+    """Draw the figures of a result, of all results in a folder, or of a trade.
+
+    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases.
 
     \b
     Example:
       roughvisc plot results/quickstart --out figures
+      roughvisc plot results/study-trade/trade.nc
     """
     from rich.console import Console
 
     from roughvisc.study.store import open_result
-    from roughvisc.views.plot import save_figures
+    from roughvisc.study.trade_file import is_trade, open_trade
+    from roughvisc.views.plot import save_figures, save_sweep_figures, trade
+    from roughvisc.views.sweep_files import results_of
 
     paths = sorted(p for p in result.glob("*.nc") if not p.name.startswith(".")) if result.is_dir() else [result]
     if not paths:
         raise InputError(f"{result}: holds no results: expected files .nc, as roughvisc run writes them")
     console = Console()
     for path in paths:
+        if path.is_file() and is_trade(path):
+            _draw(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png")
+            _say(console, "Figure", (out or path.parent) / f"{path.stem}.png")
+            continue
         with open_result(path) as dataset:
             for figure in save_figures(dataset, out or path.parent, path.stem):
                 _say(console, "Figure", figure)
+    together = results_of(result) if len(paths) > 1 else None
+    for figure in save_sweep_figures(together, out or result) if together is not None else ():
+        _say(console, "Figure", figure)
 
 
 @main.command()

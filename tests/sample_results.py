@@ -19,10 +19,12 @@ def _histories(fields, force, approach, residual=3e-6):
     touching = fields["pressure"] > 0
     counted = touching.sum(("x", "y")) * cell
     frames = np.arange(fields.sizes["time"])
+    force, approach = np.asarray(force, dtype=float), np.asarray(approach, dtype=float)
     status = np.where(counted > 0, np.where(touching.sum(("x", "y")) == present.sum(), 3, 0), 2)
     return fields.assign(
-        force=("time", np.asarray(force, dtype=float)),
-        approach=("time", np.asarray(approach, dtype=float)),
+        force=("time", force),
+        approach=("time", approach),
+        work=("time", _work(force, approach)),
         contact_area=counted,
         contact_area_corrected=0.97 * counted,
         contact_fraction=counted / (cell * present.sum()),
@@ -34,6 +36,11 @@ def _histories(fields, force, approach, residual=3e-6):
         status=("time", status),
         wall_time=("time", 0.02 * (1 + frames)),
     )
+
+
+def _work(force, approach):
+    """Trapezoidal integral of force over approach."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(approach) * (force[1:] + force[:-1]) / 2)])
 
 
 def _attributes(dataset, title, boundary):
@@ -111,6 +118,7 @@ def hertz_cycle(frames=60, shape=(31, 24), cycles=2):
         contact_area=("time", 2e-7 * lag ** (2 / 3)),
         contact_fraction=("time", 2e-7 / 3e-6 * lag ** (2 / 3)),
         contact_area_corrected=("time", 1.95e-7 * lag ** (2 / 3)),
+        work=("time", _work(0.5 * wave, 2e-5 * lag ** (2 / 3))),
     )
     return _attributes(made, "Sphere in cycles", "free")
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from roughvisc.errors import InputError
 from roughvisc.views import animate as animation
-from roughvisc.views import axes, fields, plot, surfaces
+from roughvisc.views import axes, plot, sections, surfaces
 
 SAMPLES = {
     "creep": made.hertz_creep,
@@ -23,6 +23,7 @@ SAMPLES = {
     "cycle": lambda: made.hertz_cycle(500, (17, 12), 10),
     "one frame": made.one_frame,
     "open": made.open_contact,
+    "24 decades": lambda: made.hertz_creep((15, 12), times=np.r_[0, np.geomspace(1e-12, 1e12, 25)]),
     "two frames": lambda: made.rough_creep(frames=2),
     "strip": lambda: made.rough_creep((150, 21)).assign_coords(y=(np.arange(21) + 0.5) * 8e-6),
     "pillar": lambda: made.rough_creep((21, 150)).assign_coords(x=(np.arange(21) + 0.5) * 8e-6),
@@ -90,7 +91,7 @@ def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
         inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
         assert inside, f"{text!r} runs off the figure"
     for label in labels(figure):
-        bare = label in ("Rel. error", "Contact clusters", "Clusters at least as large")
+        bare = label in ("Rel. error", "Per kept time", "Contact clusters", "Clusters at least as large")
         assert bare or label.endswith("]"), label
 
 
@@ -184,12 +185,19 @@ def test_frame_at__nearest_time_or_counted_from_the_end():
 
 def test_history__data_and_units():
     ds = made.hertz_creep()
-    force, approach, area, accuracy = plot.history(ds).axes[:4]
-    assert [ax.get_ylabel() for ax in (force, approach, area)] == [
+    force, approach, area, gap, work, cost, accuracy = plot.history(ds).axes
+    assert [ax.get_ylabel() for ax in (force, approach, area, gap, work, cost)] == [
         "Force [mN]",
         "Approach [µm]",
         "Contact area [mm²]",
+        "Mean gap [µm]",
+        "Work [µJ]",
+        "Per kept time",
     ]
+    np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
+    np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
+    for name in ("convolutions", "iterations"):
+        np.testing.assert_allclose(lines(cost)[name].get_ydata(), ds[name])
     assert accuracy.get_xlabel() == "Time [s]"
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
@@ -222,6 +230,8 @@ def test_history__of_what_is_there():
     figure = plot.history(ds)
     assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]", "Rel. error"]
     assert [text.get_text() for text in figure.axes[-1].texts] == ["no accuracy recorded"]
+    lowest = [ax.get_ylabel() for ax in plot.history(made.hertz_creep().drop_vars("force")).axes if ax.get_xlabel()]
+    assert lowest == ["Work [µJ]", "Per kept time", "Rel. error"], "the lowest panel of each column, and the one below"
     with pytest.raises(InputError, match="nothing to draw"):
         plot.history(ds[["height", "time_error"]])
 
@@ -369,9 +379,9 @@ def test_section__states_its_exaggeration():
 
 def test_section__gap_and_displacement_give_the_same_surface():
     ds = made.hertz_creep()
-    by_gap = fields.deformed_surface(ds.drop_vars("displacement"), 5)
+    by_gap = sections.deformed_surface(ds.drop_vars("displacement"), 5)
     for other in (ds, ds.drop_vars("gap")):
-        np.testing.assert_allclose(fields.deformed_surface(other, 5), by_gap, atol=1e-10)
+        np.testing.assert_allclose(sections.deformed_surface(other, 5), by_gap, atol=1e-10)
 
 
 def test_section__goes_where_it_is_told():

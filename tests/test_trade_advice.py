@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
+from PIL import Image
 from rich.console import Console
 from test_cli import invoke
 from test_trade import ROUGH, STUDY, case_of, measured
@@ -18,6 +19,7 @@ from roughvisc.study.apply import apply
 from roughvisc.study.case import read_study
 from roughvisc.study.exact import QUANTITIES
 from roughvisc.study.ladder import Setting
+from roughvisc.study.trade_file import write_trade
 from roughvisc.views.trade import _FAMILIES
 from roughvisc.views.trade_table import trade_table
 
@@ -363,6 +365,21 @@ def test_figure__refuses_what_is_no_trade():
         rv.plot.trade(made_up(), ["colour"])
     with pytest.raises(rv.InputError, match="no measured setting"):
         rv.plot.trade(made_up([(Setting(1e-2), np.nan, np.nan)]))
+
+
+def test_plot__draws_the_file_of_a_trade_and_a_folder_of_it(invoke, tmp_path):
+    write_trade(made_up(), tmp_path / "ball-trade" / "trade.nc")
+    for target, out, said in (
+        ("ball-trade/trade.nc", (), "ball-trade/trade.png"),
+        ("ball-trade", ("--out", "figures"), "figures/trade.png"),
+    ):
+        assert invoke("plot", target, *out) == (0, f"Figure: {said}\n", "")
+        with Image.open(tmp_path / said) as picture:
+            assert picture.size[0] > 1000
+    xr.Dataset({"run_time": ("setting", [1.0])}).to_netcdf(tmp_path / "other.nc")
+    status, _, err = invoke("plot", "other.nc")
+    assert status == 2
+    assert "other.nc" in err
 
 
 def test_advice__on_a_measured_scene_can_be_run(tmp_path):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case
 from roughvisc.study.index import NETCDF, Entry, index_of, save_index
+from roughvisc.study.setting_units import unit_of
 from roughvisc.variables import VARIABLES, annotate
 
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
@@ -168,7 +169,9 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
     coords = {"time": first.histories["time"], "x": first.x, "y": first.y}
     dataset = annotate(xr.Dataset(variables, coords=coords, attrs=_attributes(entries)))
     on_case: dict[str, Any] = {"case_key": ("case", np.array([entry.key for entry in entries]))}
-    on_case |= {key: ("case", values, {"long_name": key}) for key, values in parameters.items()}
+    for key, values in parameters.items():
+        unit = unit_of(key, first.case) if values.dtype.kind in "if" else ""
+        on_case[key] = ("case", values, {"long_name": key} | ({"units": unit} if unit else {}))
     return dataset.assign_coords(on_case)
 
 

@@ -57,6 +57,15 @@ def open_trade(path: str | Path) -> xr.Dataset:
     return dataset
 
 
+def is_trade(path: str | Path) -> bool:
+    """Whether a file is one that :func:`write_trade` wrote, as far as its variables tell."""
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+            return "run_time" in file and "quantity" in file.dims
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
 def part_of_one(text: str, name: str) -> float:
     """A relative error from ``1%``, ``0.1 %`` or ``0.01``.
 

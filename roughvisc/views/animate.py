@@ -30,8 +30,6 @@ from roughvisc.views.axes import (
 )
 from roughvisc.views.fields import (
     NAMES,
-    cut_position,
-    deformed_surface,
     draw_map,
     draw_outline,
     outline_colour,
@@ -40,6 +38,7 @@ from roughvisc.views.fields import (
     present,
 )
 from roughvisc.views.observables import contact
+from roughvisc.views.sections import cut_position, deformed_surface
 
 _LONG_NAMES = {"force": "Force", "approach": "Approach", "contact_area": "Contact area"}
 

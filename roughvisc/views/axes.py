@@ -180,7 +180,8 @@ class TimeAxis:
         if self.logarithmic:
             zero = times[0] <= 0
             if zero:
-                ax.set_xscale("symlog", linthresh=self.first, linscale=0.8)
+                decades = math.log10(times[-1] / self.first)
+                ax.set_xscale("symlog", linthresh=self.first, linscale=max(0.8, 0.09 * decades))
                 ax.set_xlim(-0.15 * self.first, 1.2 * times[-1])
             else:
                 ax.set_xscale("log")

@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from roughvisc.views.axes import unit_for
+from roughvisc.study.setting_units import unit_of
+from roughvisc.views.axes import Unit, unit_for
 
 
 def study_text(case: Mapping[str, Any]) -> str:
@@ -58,26 +59,12 @@ def _value(value: Any) -> str:
     return repr(value)
 
 
-#: Unit of a key of a study, where its name tells it.
-_UNITS = {
-    "shear_modulus": "Pa",
-    "kelvin_modulus": "Pa",
-    "bulk_modulus": "Pa",
-    "equilibrium": "Pa",
-    "viscosity": "Pa s",
-    "kelvin_viscosity": "Pa s",
-    "load": "N",
-    "approach": "m",
-    "over": "s",
-    "hold": "s",
-    "period": "s",
-    "radius": "m",
-    "wavelength": "m",
-    "amplitude": "m",
-    "rolloff": "m",
-    "shortcut": "m",
-    "time_step": "s",
-}
+def setting_unit(values: Any, si: str) -> Unit:
+    """Unit with a prefix that suits some values of a setting. [SI]"""
+    if si == "Pa s":
+        unit = unit_for(values, "Pa")
+        return Unit(unit.factor, f"{unit.symbol} s")
+    return unit_for(values, si)
 
 
 def readable_setting(key: str, value: Any) -> str:
@@ -90,13 +77,7 @@ def readable_setting(key: str, value: Any) -> str:
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value if isinstance(value, str) else json.dumps(value)
-    si = _UNITS.get(key.rpartition(".")[2])
-    if si is None:
-        return f"{value:.4g}"
-    if si == "Pa s":
-        unit = unit_for([value], "Pa")
-        return f"{unit.text(value, 4)} s"
-    return unit_for([value], si).text(value, 4)
+    return setting_unit([value], unit_of(key)).text(value, 4)
 
 
 def material_words(material: Mapping[str, Any]) -> str:

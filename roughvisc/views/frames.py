@@ -15,8 +15,9 @@ from PIL import Image
 
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.views.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
-from roughvisc.views.fields import NAMES, colour_map, cut_position, deformed_surface, plane_ratio, plane_unit, present
+from roughvisc.views.fields import NAMES, colour_map, plane_ratio, plane_unit, present
 from roughvisc.views.observables import contact
+from roughvisc.views.sections import cut_position, deformed_surface
 
 #: Frames a case and cells along the longer side of a map, the richest first.
 _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64), (2, 48))

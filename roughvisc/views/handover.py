@@ -11,7 +11,7 @@ import xarray as xr
 from roughvisc.study.store import whole_file
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.views.axes import frame_at, require
-from roughvisc.views.fields import deformed_surface
+from roughvisc.views.sections import deformed_surface
 
 
 def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:

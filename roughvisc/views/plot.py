@@ -13,12 +13,18 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.views.animate import animate
+from roughvisc.views.area_load import area_against_load
 from roughvisc.views.axes import fullest_frame, require
+from roughvisc.views.case_histories import histories_of_cases
 from roughvisc.views.distributions import contact_clusters, distributions
-from roughvisc.views.fields import maps, section
-from roughvisc.views.histories import area_against_load, history, hysteresis
+from roughvisc.views.fields import maps
+from roughvisc.views.histories import history
+from roughvisc.views.loops import hysteresis
+from roughvisc.views.sections import section
 from roughvisc.views.stability import stability_map
 from roughvisc.views.surfaces import surface
+from roughvisc.views.sweep_files import save_sweep_figures
+from roughvisc.views.sweeps import sweep
 from roughvisc.views.trade import trade
 
 __all__ = [
@@ -26,13 +32,16 @@ __all__ = [
     "area_against_load",
     "contact_clusters",
     "distributions",
+    "histories_of_cases",
     "history",
     "hysteresis",
     "maps",
     "save_figures",
+    "save_sweep_figures",
     "section",
     "stability_map",
     "surface",
+    "sweep",
     "trade",
 ]
 

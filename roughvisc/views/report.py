@@ -24,6 +24,7 @@ from roughvisc.views.case_text import material_words, program_words, readable_se
 from roughvisc.views.fields import draw_map, plane_unit
 from roughvisc.views.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
+from roughvisc.views.sweep_files import results_of, sweep_figures
 
 #: Size that all maps may have together. [bytes]
 _MAPS = 5_000_000
@@ -69,15 +70,16 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         source = Path(results)
         sources: list[Any] = _files(source)
         failures = _failures(source) if source.is_dir() else []
+        swept = _swept(source) if len(sources) > 1 else []
         out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)
     else:
-        sources, failures = list(results), []
+        sources, failures, swept = list(results), [], []
         if path is None:
             raise InputError("path is None: expected the name of the page, where Datasets are given")
         out = Path(path)
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
-    page = _page(sources, failures)
+    page = _page(sources, failures, swept)
     with whole_file(out) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return out
@@ -123,7 +125,14 @@ def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
             yield dataset
 
 
-def _page(sources: list[Any], failures: list[dict[str, str]]) -> str:
+def _swept(folder: Path) -> list[dict[str, str]]:
+    """Figures of all cases together."""
+    results = results_of(folder)
+    found = sweep_figures(results) if results is not None else ()
+    return [{"title": title, "src": figure_uri(figure)} for _, title, figure in found]
+
+
+def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
@@ -144,7 +153,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]]) -> str:
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
     if len(everything) > 1:
-        figures.insert(0, _overview(everything))
+        figures = [_overview(everything), *swept, *figures]
     environment = Environment(loader=PackageLoader("roughvisc.views", "."), autoescape=True, trim_blocks=True)
     environment.lstrip_blocks = True
     return environment.get_template("report.html.jinja").render(
