@@ -205,7 +205,7 @@ def _encoding(name: str, variable: xr.Variable, bits: int) -> dict[str, Any]:
 def _filters(variable: xr.Variable, bits: int) -> dict[str, Any]:
     """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
     middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
-    sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 64)].values)
+    sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
     if bits < 52:
         sample = round_bits(sample, bits)
     shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
