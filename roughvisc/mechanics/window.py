@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Cells of the smallest window, and of a border around what lies low enough.
 _SMALLEST, _BORDER = 24, 2
-_BLOCK = 32  # columns or rows transformed together, as in halfspace
+_BLOCK = 64  # columns or rows transformed together (measured)
 
 
 @dataclass(frozen=True)

@@ -152,9 +152,10 @@ class Rows:
             out[window.cells] = arrays["source_pressure"]
             return out
         for rows, displacement in self._reach(window).rows(arrays["source"]):
-            out[rows] = displacement
-            if name == "gap":
-                out[rows] += self._ground.gap[rows]
+            if name == "displacement":
+                out[rows] = displacement
+            else:
+                np.add(displacement, self._ground.gap[rows], out=out[rows])
                 self._settle(out[rows], self._store.plain[index]["grid"]["level"], rows)
         if name == "gap":
             out[window.cells][arrays["source_pressure"] > 0] = 0.0

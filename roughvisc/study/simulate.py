@@ -221,7 +221,7 @@ def _press(
         "series_error": engine.series_error,
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
-        "slope_note": slope_note(ground.height, boundary, float(dataset["approach"].max())),
+        "slope_note": slope_note(ground.height[ground.window.cells], boundary, float(dataset["approach"].max())),
         "left_out": left_out(engine, boundary, method, fields, times is None, ground.followed),
     }
     if described["slope_note"]:
