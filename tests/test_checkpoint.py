@@ -21,7 +21,7 @@ import roughvisc as rv
 from roughvisc.errors import InUseError
 from roughvisc.mechanics.history import Block, HistoryState
 from roughvisc.mechanics.memory import ModesState
-from roughvisc.mechanics.stepper import Instant, State
+from roughvisc.mechanics.scene import Instant, State
 from roughvisc.study import checkpoint as checkpoint_module
 from roughvisc.study import lock as lock_module
 from roughvisc.study import run as run_module

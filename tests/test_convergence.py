@@ -6,7 +6,8 @@ import pytest
 import roughvisc as rv
 from roughvisc.mechanics.engine import engine_for
 from roughvisc.mechanics.halfspace import HalfSpace
-from roughvisc.mechanics.stepper import Scene, march
+from roughvisc.mechanics.scene import Scene
+from roughvisc.mechanics.stepper import march
 
 DURATION = 2.0
 COMMON = np.array([0.5, 1.0, 1.5, 2.0])

@@ -7,7 +7,8 @@ import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.memory import Modes
-from roughvisc.mechanics.stepper import Scene, march
+from roughvisc.mechanics.scene import Scene
+from roughvisc.mechanics.stepper import march
 
 RADIUS = 1.0
 MATERIALS = {

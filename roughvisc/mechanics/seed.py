@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.materials import Prony
-from roughvisc.mechanics.stepper import Instant, Scene, State, Step, at_edge, edge_error, next_event, work_between
+from roughvisc.mechanics.scene import Instant, Scene, State, Step
+from roughvisc.mechanics.stepper import at_edge, edge_error, next_event, work_between
 
 Array = NDArray[np.float64]
 

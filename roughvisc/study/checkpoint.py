@@ -21,7 +21,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import transform_engine
 from roughvisc.mechanics.history import Block, HistoryState
 from roughvisc.mechanics.memory import ModesState
-from roughvisc.mechanics.stepper import Instant, State, Step
+from roughvisc.mechanics.scene import Instant, State, Step
 from roughvisc.study.identity import NUMERICS_REVISION
 from roughvisc.study.records import Damaged, RowFile, read_record, write_record
 from roughvisc.study.store import whole_file

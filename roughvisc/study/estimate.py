@@ -15,8 +15,9 @@ from roughvisc.mechanics.engine import Engine
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.history import History, history_bytes
 from roughvisc.mechanics.memory import Modes, stiff_ratio
+from roughvisc.mechanics.scene import Scene
 from roughvisc.mechanics.seed import march_seed
-from roughvisc.mechanics.stepper import Scene, march
+from roughvisc.mechanics.stepper import march
 from roughvisc.study.case import Case
 from roughvisc.study.scene import Ground, prepare
 

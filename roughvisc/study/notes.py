@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.mechanics.engine import Engine
-from roughvisc.mechanics.stepper import Scene
+from roughvisc.mechanics.scene import Scene
 from roughvisc.variables import FIELDS
 
 #: What a result says of a material without instantaneous compliance.

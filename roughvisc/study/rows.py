@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.stepper import Scene, Step
+from roughvisc.mechanics.scene import Scene, Step
 from roughvisc.mechanics.window import Reach, Window, mean_influence
 from roughvisc.study.records import RowStore
 from roughvisc.study.scene import Ground

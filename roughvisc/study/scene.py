@@ -17,7 +17,7 @@ from roughvisc.mechanics.engine import Engine, Kind, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
-from roughvisc.mechanics.stepper import Scene
+from roughvisc.mechanics.scene import Scene
 from roughvisc.mechanics.window import Window, whole_domain, window_around
 from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
