@@ -336,6 +336,10 @@ def _local_client(processes: int) -> Iterator[Client]:
         "distributed.comm.timeouts.connect": "60s",
         # one long task a worker: nobody reads its statistical profile, and sampling takes time from it
         "distributed.worker.profile.enabled": False,
+        # a process that computes for seconds need not wake up fifty times a second to see whether it is awake
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.tick.limit": "60s",
+        "distributed.worker.memory.monitor-interval": "500ms",
     }
     with (
         dask.config.set(settings),

@@ -26,17 +26,18 @@ STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": 
 
 
 def measure(count=200, workers=CPU_COUNT, alone=20, cells=512):
-    yield sweep(count, workers, alone)
+    for boundary in ("periodic", "free"):
+        yield sweep(count, workers, alone, boundary)
     for boundary in ("periodic", "free"):
         yield storing(cells, boundary)
 
 
-def sweep(count, workers, alone):
+def sweep(count, workers, alone, boundary):
     """Processor time that starting, scheduling and storing add, and how busy the processes are kept.
 
     The bare time is of as many processes at once, since neighbours slow each other down.
     """
-    base = Case.from_json(STUDY)
+    base = vary(Case.from_json(STUDY), {"solve.boundary": boundary, "solve.edge": "accept"})
     cases = [vary(base, {"surface.seed": seed}) for seed in range(count)]
     texts = [case.to_json() for case in cases[: min(alone, count)]]
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
@@ -47,7 +48,7 @@ def sweep(count, workers, alone):
         wall, used = time.perf_counter() - began, processor_time() - used
     assert all(outcome.entry for outcome in outcomes.values())
     return {
-        "case": f"sweep of {count} cases of 64^2 on {workers} processes",
+        "case": f"sweep of {count} {boundary} cases of 64^2 on {workers} processes",
         "seconds": wall,
         "processor_per_case": used / count,
         "overhead": used / (bare * count) - 1,
