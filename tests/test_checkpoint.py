@@ -9,6 +9,7 @@ import random
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from contextlib import nullcontext
 from dataclasses import fields, replace
@@ -534,3 +535,14 @@ def test_memory__does_not_grow_with_kept_rows(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(RowFile, "append", appended)
     run_case(case, tmp_path)
     assert not held_arrays
+
+
+def test_lock__of_a_process_that_is_being_cleared_away_is_waited_for(tmp_path):
+    fcntl = pytest.importorskip("fcntl")
+    path = tmp_path / "lock"
+    with open(path, "w") as dying:
+        fcntl.flock(dying, fcntl.LOCK_EX)
+        threading.Timer(0.3, fcntl.flock, (dying, fcntl.LOCK_UN)).start()
+        with held(path) as lock:
+            lock.check()
+    assert not path.exists()

@@ -82,7 +82,7 @@ class Bench:
 
     def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
-        self._folder, self._report = folder, report
+        self._path, self._report = folder / "run.nc", report
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         self._convolution = Stopwatch().seconds(height, case.settings.solve.boundary)
@@ -136,10 +136,9 @@ class Bench:
             raise NotRun(text) from error
         if complaint := unconverged(dataset):
             raise NotRun(complaint)
-        path = write_result(dataset, self._folder / "run.nc", precision=case.settings.keep.precision)
-        with open_result(path) as kept:
+        with open_result(self._path) as kept:
             dataset = kept.load()
-        return Run(dataset, took, steps, self._memory(case, dataset, steps), path.stat().st_size)
+        return Run(dataset, took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
 
     def _timed(self, case: Case, label: str) -> tuple[float, xr.Dataset, int]:
         steps = 0
@@ -153,7 +152,7 @@ class Bench:
 
         began = time.perf_counter()
         dataset = compute(case, progress=passed)
-        write_result(dataset, self._folder / "run.nc", precision=case.settings.keep.precision)
+        write_result(dataset, self._path, precision=case.settings.keep.precision)
         return time.perf_counter() - began, dataset, steps
 
     def _memory(self, case: Case, dataset: xr.Dataset, steps: int) -> float:

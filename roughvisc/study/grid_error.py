@@ -14,8 +14,15 @@ from roughvisc.study.coarser import coarser, pressure_distance
 
 log = logging.getLogger("roughvisc")
 
-#: Powers of the cell's side with which errors vanish: of the pressure (L1), the approach, the corrected area.
-PRESSURE_ORDER, APPROACH_ORDER, AREA_ORDER = 1.5, 2.0, 1.0
+#: Power of the cell's side with which the error of a quantity vanishes, at most: of the pressure its L1 norm. Measured;
+#: the mean gap follows the displacements, the counted area the cells at its edge.
+ORDERS = {
+    "pressure": 1.5,
+    "approach": 2.0,
+    "contact_area": 1.0,
+    "contact_area_corrected": 1.0,
+    "mean_gap": 2.0,
+}
 
 
 def with_grid_error(
@@ -49,8 +56,9 @@ def with_grid_error(
     pressure = pressure_distance(again, dataset) / max(float(dataset["force"].max()), 1e-300)
     approach = _change(again["approach"].values, dataset["approach"].values)
     area = _change(again["contact_area_corrected"].values, dataset["contact_area_corrected"].values)
-    error = np.maximum(pressure / (ratio**PRESSURE_ORDER - 1), approach / (ratio**APPROACH_ORDER - 1))
-    return dataset.assign(grid_error=("time", error), grid_error_area=("time", area / (ratio**AREA_ORDER - 1)))
+    over = {name: ratio**order - 1 for name, order in ORDERS.items()}
+    error = np.maximum(pressure / over["pressure"], approach / over["approach"])
+    return dataset.assign(grid_error=("time", error), grid_error_area=("time", area / over["contact_area_corrected"]))
 
 
 def _change(found: np.ndarray, wanted: np.ndarray) -> np.ndarray:

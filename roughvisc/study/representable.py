@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.halfspace import Boundary
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 
@@ -52,8 +52,10 @@ def check_times(program: Program, time_step: float | Literal["auto"]) -> None:
         )
 
 
-def check_loads(program: Program, material: Material, halfspace: HalfSpace, gap: NDArray[np.float64]) -> None:
-    """Refuse a load under which rounding is all that is left of the surface.
+def check_loads(
+    program: Program, material: Material, boundary: Boundary, sides: tuple[float, float], gap: NDArray[np.float64]
+) -> None:
+    """Refuse a load under which rounding is all that is left of a surface with these sides [m] and undeformed gaps [m].
 
     Raises
     ------
@@ -65,9 +67,8 @@ def check_loads(program: Program, material: Material, halfspace: HalfSpace, gap:
     if load > LARGEST:
         raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
     heights = float(np.ptp(gap))
-    if halfspace.boundary == "free" or heights == 0:
+    if boundary == "free" or heights == 0:
         return
-    sides = [n * side for n, side in zip(halfspace.shape, halfspace.spacing, strict=True)]
     displaced = load / math.prod(sides) * float(material.contact_compliance(program.duration)) * max(sides)
     if displaced > MOST_HEIGHTS * heights:
         raise InputError(

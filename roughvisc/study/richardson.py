@@ -8,16 +8,8 @@ import xarray as xr
 
 from roughvisc.study.coarser import pressure_distance
 from roughvisc.study.exact import QUANTITIES, relative
+from roughvisc.study.grid_error import ORDERS
 
-#: Power of the cell's side with which the error of a quantity vanishes, at most. Measured; the mean gap follows the
-#: displacements, the counted area the cells at its edge.
-ORDERS = {
-    "pressure": 1.5,
-    "approach": 2.0,
-    "contact_area": 1.0,
-    "contact_area_corrected": 1.0,
-    "mean_gap": 2.0,
-}
 #: Roache's safety factors: where three grids show an order near the one expected, and where they do not.
 _SEEN, _NOT_SEEN = 1.25, 3.0
 #: An order is near the one expected within this; no lower one is believed.

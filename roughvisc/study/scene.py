@@ -159,16 +159,16 @@ def prepare(
     check_times(program, time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    (nx, ny), (dx, dy) = ground.gap.shape, ground.spacing
+    check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
+    _check_approach(program, boundary, ground.gap[ground.present])
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
         ground.widen()
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
-    _check_approach(program, boundary, ground.gap[ground.present])
-    halfspace = ground.halfspace(boundary)
-    check_loads(program, material, halfspace, ground.gap[ground.present])
     engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
     scene = Scene(
-        halfspace=halfspace,
+        halfspace=ground.halfspace(boundary),
         material=material,
         memory=engine.memory,
         program=program,
