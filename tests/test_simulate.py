@@ -311,10 +311,10 @@ def test_threads__change_no_bit(monkeypatch):
 def test_window__after_a_jump_is_foreseen(solved_on):
     """One coarse grid to foresee it, and one window from then on."""
     ball = rv.sphere(1e-3, size=1.2e-3, shape=(301, 297))
-    ds = simulate(ball, rv.elastic(1e6), rv.Program().load(2e-3, over=0).hold(1.0))
+    ds = simulate(ball, rv.elastic(1e6), rv.Program().load(2e-2, over=0).hold(1.0))
     assert len(solved_on) == 2
     assert solved_on[1] < (301, 297)
-    assert float(ds.force[-1]) == 2e-3
+    assert float(ds.force[-1]) == 2e-2
 
 
 def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on):
