@@ -195,18 +195,17 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         If a variable's dimensions are not the declared ones.
     """
     annotated = dataset.copy()
-    for name in annotated.variables:
+    for name, variable in dataset.variables.items():
         if name not in VARIABLES:
             raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
         declared = VARIABLES[str(name)]
-        found = annotated[name].dims
-        if found[-len(declared.dims) :] != declared.dims:
-            raise ValueError(f"variable {name!r} has dimensions {found}, declared are {declared.dims}")
-        if annotated[name].dtype != np.dtype(declared.dtype) and annotated[name].dtype.kind not in "fUO":
-            annotated[name] = annotated[name].astype(declared.dtype)
-        annotated[name].attrs.update(declared.attributes())
+        if variable.dims[-len(declared.dims) :] != declared.dims:
+            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {declared.dims}")
+        if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
+            annotated[name] = variable.astype(declared.dtype)
+        annotated.variables[name].attrs.update(declared.attributes())
     if "status" in annotated:
-        annotated["status"].attrs.update(
+        annotated.variables["status"].attrs.update(
             flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),
             flag_meanings=" ".join(STATUS_MEANINGS),
         )

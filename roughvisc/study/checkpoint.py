@@ -176,7 +176,7 @@ class Keeper:
         self._folder = folder
         self._key = key
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
-        self._check, self._interval, self._steps, self._stop = check, seconds, steps, stop
+        self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
         self._latest = self.saved
         self._pending, self._last_save = 0, time.monotonic()
 
@@ -219,7 +219,7 @@ class Keeper:
         if self._latest is self.saved or self._latest.state is None:
             return
         began = time.monotonic()
-        self._check()
+        self.check()
         self.rows.sync()  # first: a checkpoint counts on its rows
         save_checkpoint(self._paths[0], self._latest, self._key)
         self._paths.reverse()
@@ -228,7 +228,7 @@ class Keeper:
 
     def remove(self) -> None:
         """Remove all that was kept: the result is written, or cannot be had."""
-        self._check()
+        self.check()
         self.rows.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 

@@ -27,6 +27,8 @@ _HEAD = struct.Struct("<4sIII")
 _MARK = b"rvr2"
 _KINDS = "fiub"
 _SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
+#: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
+_WAITING = 8 << 20
 
 
 class Damaged(Exception):
@@ -158,7 +160,7 @@ class RowsInMemory:
 
 
 class RowFile:
-    """Rows of a run in a file: in memory are their plain values only.
+    """Rows of a run in a file: in memory are their plain values only, and the arrays of the last few.
 
     Parameters
     ----------
@@ -171,16 +173,16 @@ class RowFile:
     def __init__(self, path: Path, check: Callable[[], None]) -> None:
         self._check = check
         self.plain: list[dict[str, Any]] = []
-        self._begins = [0]
+        self._begins = [0]  # of the rows in the file, and where the next is to begin
+        self._waiting: list[Mapping[str, Array]] = []
         self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Take up a row; if that fails it is as if it had not been tried."""
-        self._check()
-        self._stream.seek(self._begins[-1])
-        size = write_record(self._stream, plain, arrays)
-        self._begins.append(self._begins[-1] + size)
+        """Take up a row, whose arrays are not changed any more."""
         self.plain.append(plain)
+        self._waiting.append(arrays)
+        if sum(array.nbytes for row in self._waiting for array in row.values()) > _WAITING:
+            self._write()
 
     def keep_first(self, rows: int) -> bool:
         """Cut away all but the first rows; whether these are there and whole. If not, nothing is cut."""
@@ -194,11 +196,14 @@ class RowFile:
             return False
         self._check()
         self._stream.truncate(begins[-1])
-        self.plain, self._begins = plain, begins
+        self.plain, self._begins, self._waiting = plain, begins, []
         return True
 
     def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
         """Arrays of a row, those of these names at least."""
+        written = len(self._begins) - 1
+        if row >= written:
+            return self._waiting[row - written]
         self._stream.seek(self._begins[row])
         return read_record(self._stream, names)[1]
 
@@ -210,11 +215,22 @@ class RowFile:
 
     def sync(self) -> None:
         """Have all rows on the disk."""
+        self._write()
         os.fsync(self._stream.fileno())
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; rows that were not written by then are lost."""
         self._stream.close()
+
+    def _write(self) -> None:
+        """Write the rows that wait; on a full disk those that do not fit wait on."""
+        while self._waiting:
+            written = len(self._begins) - 1
+            self._check()
+            self._stream.seek(self._begins[-1])
+            size = write_record(self._stream, self.plain[written], self._waiting[0])
+            self._begins.append(self._begins[-1] + size)
+            del self._waiting[0]
 
 
 def _frames(whole: tuple[int, ...], frame: Frame) -> Any:

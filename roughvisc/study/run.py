@@ -242,7 +242,9 @@ def run_case(
 def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper) -> None:
     """Compute what is missing of a case and write its file."""
     try:
-        keep(compute(case, progress=progress, keeper=keeper), case, folder)
+        dataset = compute(case, progress=progress, keeper=keeper)
+        keeper.check()
+        keep(dataset, case, folder)
     except InUseError:
         raise
     except RoughviscError:  # it would fail again in the same way

@@ -138,8 +138,10 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
                     file.setncatts({"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs))
                     for dimension, size in dataset.sizes.items():
                         file.createDimension(str(dimension), size)
-                for name, variable in dataset.variables.items():
-                    _write(file, str(name), variable, precision)
+                # all are declared before any is written: each change of mode would write the file's metadata anew
+                declared = [_declare(file, str(name), v, precision) for name, v in dataset.variables.items()]
+                for written, variable in zip(declared, dataset.variables.values(), strict=True):
+                    _write(written, variable, precision)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             number = errno.ENOSPC if full else errno.EIO
@@ -158,27 +160,39 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
             file.close()
 
 
-def _write(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None) -> None:
-    """Write a variable; a field over (time, x, y) one layer of chunks after the other: no more of it is in memory."""
-    field = variable.dims == ("time", "x", "y")
-    bits = 52 if precision is None or not field else significant_bits(precision)
-    encoding = _encoding(name, variable, bits)
+def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None) -> netCDF4.Variable:
+    """Make room for a variable, with its attributes."""
+    encoding = _encoding(name, variable, precision)  # outside the lock, which reading a sample may need
     with NETCDF:
-        written = file.createVariable(name, variable.dtype, variable.dims, **encoding)
-        written.set_auto_maskandscale(False)
-        written.setncatts(plain_attributes(variable.attrs))
-        if field and precision is not None:
-            written.relative_precision = precision
-            written.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
-    together = _chunks(variable.shape)[0] if field else 0
-    for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if field else [...]:
-        values = round_bits(variable[layer].values, bits)  # outside the lock, which reading it may need
+        declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
+        declared.set_auto_maskandscale(False)
+        declared.setncatts(plain_attributes(variable.attrs))
+        if _is_field(variable) and precision is not None:
+            declared.relative_precision = precision
+            bits = significant_bits(precision)
+            declared.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
+    return declared
+
+
+def _write(written: netCDF4.Variable, variable: xr.Variable, precision: float | None) -> None:
+    """Write a variable; a field over (time, x, y) one layer of chunks after the other: no more of it is in memory."""
+    together = _chunks(variable.shape)[0] if _is_field(variable) else 0
+    for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
+        values = variable[layer].values  # outside the lock, too
+        if together:
+            values = round_bits(values, significant_bits(precision))
         with NETCDF:
             written[layer] = values
 
 
-def significant_bits(precision: float) -> int:
-    """Bits of a double's fraction to keep, so that rounding changes it by less than that part."""
+def _is_field(variable: xr.Variable) -> bool:
+    return variable.dims == ("time", "x", "y")
+
+
+def significant_bits(precision: float | None) -> int:
+    """Bits of a double's fraction to keep, so that rounding changes it by less than that part; None: by nothing."""
+    if precision is None:
+        return 52
     return min(max(math.ceil(-math.log2(precision)) - 1, 0), 52)
 
 
@@ -192,13 +206,13 @@ def round_bits(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
     return np.where(np.isfinite(values), whole.view(float), values)
 
 
-def _encoding(name: str, variable: xr.Variable, bits: int) -> dict[str, Any]:
+def _encoding(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and name in MAY_BE_MISSING:
         encoding["fill_value"] = variable.dtype.type(np.nan)
     if variable.nbytes > _TINY:
         encoding["chunksizes"] = _chunks(variable.shape)
-        encoding |= _filters(variable, bits)
+        encoding |= _filters(variable, significant_bits(precision) if _is_field(variable) else 52)
     return encoding
 
 

@@ -5,12 +5,14 @@ which every step is kept, against the same that are not stored.
 """
 
 import multiprocessing
-import resource
 import tempfile
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import psutil
 from dask.system import CPU_COUNT
 
 from roughvisc.study import records, rows, run
@@ -25,45 +27,46 @@ STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": 
 "solve": {"boundary": "periodic", "tolerance": 2e-4}, "keep": {"fields": ["pressure", "gap"], "times": 20}}"""
 
 
-def measure(count=200, workers=CPU_COUNT, alone=20, cells=512):
+def measure(count=200, workers=CPU_COUNT, cells=512):
     for boundary in ("periodic", "free"):
-        yield sweep(count, workers, alone, boundary)
+        yield sweep(count, workers, boundary)
     for boundary in ("periodic", "free"):
         yield storing(cells, boundary)
 
 
-def sweep(count, workers, alone, boundary):
+def sweep(count, workers, boundary):
     """Processor time that starting, scheduling and storing add, and how busy the processes are kept.
 
-    The bare time is of as many processes at once, since neighbours slow each other down.
+    The bare time is of the same cases on as many processes at once, since neighbours slow each other down.
     """
     base = vary(Case.from_json(STUDY), {"solve.boundary": boundary, "solve.edge": "accept"})
     cases = [vary(base, {"surface.seed": seed}) for seed in range(count)]
-    texts = [case.to_json() for case in cases[: min(alone, count)]]
+    texts = [case.to_json() for case in cases]
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
-        bare = sum(pool.map(computing, [texts] * workers)) / workers
+        bare = sum(pool.map(computing, [texts[first::workers] for first in range(workers)]))
     with tempfile.TemporaryDirectory() as folder:
-        began, used = time.perf_counter(), processor_time()
-        outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
-        wall, used = time.perf_counter() - began, processor_time() - used
+        began = time.perf_counter()
+        with processor_time() as spent:
+            outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
+        wall, used = time.perf_counter() - began, sum(spent.values())
     assert all(outcome.entry for outcome in outcomes.values())
     return {
         "case": f"sweep of {count} {boundary} cases of 64^2 on {workers} processes",
         "seconds": wall,
         "processor_per_case": used / count,
-        "overhead": used / (bare * count) - 1,
+        "overhead": used / bare - 1,
         "busy": sum(outcome.seconds for outcome in outcomes.values()) / wall / workers,
     }
 
 
 def computing(texts):
-    """Processor time that a case takes that is only computed. [s]"""
+    """Processor time that cases take that are only computed. [s]"""
     cases = [Case.from_json(text) for text in texts]
     run.compute(cases[0], progress=False)  # warm
     began = time.process_time()
     for case in cases:
         run.compute(case, progress=False)
-    return (time.process_time() - began) / len(cases)
+    return time.process_time() - began
 
 
 def storing(cells, boundary):
@@ -100,7 +103,28 @@ def storing(cells, boundary):
     }
 
 
+@contextmanager
 def processor_time():
-    """Of this process and of those that it has ended. [s]"""
-    found = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(usage.ru_utime + usage.ru_stime for usage in found)
+    """Yields a dictionary: processor time of this process and of each that it starts, and those start. [s]
+
+    They are looked at ten times a second, since a process that another one has ended is accounted for nowhere; the
+    time that looking takes is left out.
+    """
+    this, spent, ended, looking = psutil.Process(), {}, threading.Event(), []
+    before = sum(this.cpu_times()[:2])
+
+    def look():
+        while not ended.wait(0.1):
+            for process in this.children(recursive=True):
+                with suppress(psutil.NoSuchProcess):
+                    spent[process.pid] = sum(process.cpu_times()[:2])
+        looking.append(time.thread_time())
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    try:
+        yield spent
+    finally:
+        ended.set()
+        watcher.join()
+        spent[this.pid] = sum(this.cpu_times()[:2]) - before - looking[0]
