@@ -107,6 +107,30 @@ def test_warm_start__saves_iterations():
     assert warm.iterations < 0.7 * cold.iterations
 
 
+@pytest.mark.parametrize("known", [{"load": 30.0}, {"approach": 3.0}], ids=["load", "approach"])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_known_displacement_of_the_start__saves_one_convolution(boundary, known):
+    halfspace, gap = HalfSpace((31, 28), (1.0, 1.0), boundary), rough_gap((31, 28))
+    start = solve_contact(halfspace, gap, load=20.0, tolerance=1e-6).pressure
+    plain = solve_contact(halfspace, gap, start=start, tolerance=1e-8, **known)
+    told = solve_contact(
+        halfspace, gap, start=start, start_displacement=halfspace.displacement(start), tolerance=1e-8, **known
+    )
+    assert told.convolutions == plain.convolutions - 1
+    assert told.iterations == plain.iterations > 0
+    assert told.pressure == pytest.approx(plain.pressure, rel=1e-9, abs=1e-12)
+
+
+def test_known_displacement_of_a_solution__is_computed_anew():
+    """What an extrapolation adds to its rounding must not pile up from step to step."""
+    halfspace, gap = HalfSpace((31, 28), (1.0, 1.0)), rough_gap((31, 28))
+    solved = solve_contact(halfspace, gap, load=20.0, tolerance=1e-6)
+    off = solved.displacement * (1 + 1e-9)
+    again = solve_contact(halfspace, gap, load=20.0, tolerance=1e-4, start=solved.pressure, start_displacement=off)
+    assert (again.iterations, again.convolutions) == (0, 1)
+    assert again.displacement == pytest.approx(solved.displacement, rel=1e-13)
+
+
 @given(exponent=st.integers(-290, 12), boundary=st.sampled_from(["free", "periodic"]))
 @settings(max_examples=30, deadline=None)
 def test_loads__of_any_size_are_balanced(exponent, boundary):

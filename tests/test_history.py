@@ -77,7 +77,7 @@ def test_enlarged__is_the_same_history_on_a_larger_grid():
     for memory in (History(rv.zener(1.0, 1.0, 1.0)), Modes(rv.zener(1.0, 1.0, 1.0), "pressure")):
         _, state = run(memory, steps, fields)
         alpha, carried = memory.predict(state, 0.1, "linear")
-        moved = memory.enlarged(state, (6, 9), (2, 3))
+        moved = memory.enlarged(state, (6, 9), (2, 3), np.cumsum)
         alpha_moved, carried_moved = memory.predict(moved, 0.1, "linear")
         assert alpha_moved == alpha
         assert np.array_equal(carried_moved[2:5, 3:7], carried)

@@ -20,6 +20,7 @@ ALLOWED = {
     "study": {"errors", "variables", "units", "mechanics", "topography"},
     "views": {"errors", "variables", "study"},
     "cli": {"errors", "variables", "units", "mechanics", "topography", "study", "views", "__init__"},
+    "__main__": {"cli"},
 }
 #: libraries that a floor may not import at all
 FORBIDDEN = {

@@ -1,5 +1,7 @@
 """The march through time: order, tolerance, events, contact lost and found, going on from a state."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -74,13 +76,52 @@ def test_chosen_steps__keep_the_tolerance(name, tolerance):
         assert np.abs(found.pressure - exact.pressure).sum() < tolerance * exact.pressure.sum()
 
 
-def test_both_forms_of_memory__give_the_same_numbers():
-    steps = [
+def test_forms_of_memory__give_the_same_numbers():
+    forms = ("displacement", "pressure", "both")
+    found = [
         list(march(scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, acts_on=form, tolerance=1e-8)))
-        for form in ("displacement", "pressure")
+        for form in forms
     ]
-    for a, b in zip(*steps, strict=True):
-        assert a.shown.approach == pytest.approx(b.shown.approach, rel=1e-7, abs=1e-12)
+    for one, *others in zip(*found, strict=True):
+        for other in others:
+            assert other.shown.approach == pytest.approx(one.shown.approach, rel=1e-7, abs=1e-12)
+            assert np.abs(other.displacement - one.displacement).max() <= 1e-7 * np.abs(one.displacement).max()
+    spent = {form: steps[-1].state.convolutions for form, steps in zip(forms, found, strict=True)}
+    assert spent["displacement"] == spent["both"] == spent["pressure"] - (len(found[0]) - 1)
+    for pressures, both in zip(found[1], found[2], strict=True):
+        assert np.abs(both.effective - pressures.effective).max() <= 1e-6 * pressures.effective.max()
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2"])
+def test_memory_of_both__outlives_a_change_of_the_grid(rule):
+    """On the larger grid, what is carried displaces it as the carried pressure does."""
+    small, large, offset = HalfSpace((9, 7), (0.1, 0.1)), HalfSpace((14, 11), (0.1, 0.1)), (3, 2)
+    memory = Modes(MATERIALS["two_branches"], "both")
+    state, rng = memory.start(small.shape), np.random.default_rng(1)
+    for _ in range(3):
+        pressure = rng.random(small.shape)
+        state = memory.advance(state, 0.3, "linear", np.stack([pressure, small.displacement(pressure)]))
+    moved = memory.enlarged(state, large.shape, offset, large.displacement)
+    before, after = memory.predict(state, 0.2, rule)[1], memory.predict(moved, 0.2, rule)[1]
+    assert np.array_equal(after[0][3:12, 2:9], before[0])
+    assert np.count_nonzero(after[0]) == before[0].size
+    assert after[1] == pytest.approx(large.displacement(after[0]), rel=1e-12)
+
+
+def test_extrapolated_start__costs_no_convolution_while_contact_grows():
+    """A step then takes two convolutions an iteration, and one more where contact recedes."""
+    held = list(march(scene(MATERIALS["maxwell"], STEP_LOAD, time_step=0.1, tolerance=1e-6)))[3:]
+    cost = [(b.state.convolutions - a.state.convolutions) for a, b in pairwise(held)]
+    solved = [(b.state.iterations - a.state.iterations) for a, b in pairwise(held)]
+    assert all(solved)
+    assert cost == [2 * n for n in solved]
+    unloading = rv.Program().load(0.05, over=0.1).load(0.01, over=1.0)
+    steps = list(march(scene(MATERIALS["maxwell"], unloading, time_step=0.1, tolerance=1e-6)))[4:]
+    more = [
+        b.state.convolutions - a.state.convolutions - 2 * (b.state.iterations - a.state.iterations)
+        for a, b in pairwise(steps)
+    ]
+    assert set(more) == {0, 1}  # one where a cell lifts off
 
 
 def test_march__goes_on_from_any_state_bit_for_bit():

@@ -16,6 +16,9 @@ from roughvisc.mechanics.series import series_of
 SERIES_SHARE = 0.1
 #: A series is certified from this part of the program's length to its whole.
 SHORTEST_AGE = 1e-6
+#: Up to so many exponentials are remembered as pressures and as displacements where the grid may change: the passes
+#: over the grid that each of them takes cost less than the convolution that this saves (measured at 128 squared).
+_MOST_TWICE = 3
 #: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
 _SHORTEST_STEP = 1e-3
 
@@ -61,7 +64,7 @@ def engine_for(
     tolerance : float
         Relative error that the whole computation is allowed.
     acts_on : {"displacement", "pressure"}
-        The form that a recursive memory takes.
+        The form that a recursive memory takes; one of pressures may be one of both.
     kind : {"auto", "direct"}
         ``direct``: the direct history, whatever the material; dearer, and independent of any series.
 
@@ -86,7 +89,7 @@ def engine_for(
             )
         return Engine(History(material), 0.0, "direct history of every pressure, as asked for")
     if isinstance(material, Prony):
-        return Engine(Modes(material, acts_on), 0.0, _terms(material))
+        return Engine(_recursive(material, acts_on), 0.0, _terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
         glassy = float(material.contact_compliance(0.0))
         return Engine(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
@@ -99,7 +102,12 @@ def engine_for(
             f"direct history of every pressure (the best series, {series.error:.1e} off, missed the tolerance); about "
             f"{history_bytes(1e4, 1e3) / 1e6:.0f} MB for 1000 steps with 10000 cells in contact",
         )
-    return Engine(Modes(series.prony, acts_on), series.error, certified)
+    return Engine(_recursive(series.prony, acts_on), series.error, certified)
+
+
+def _recursive(series: Prony, acts_on: ActsOn) -> Modes:
+    twice = acts_on == "pressure" and len(series.times) + bool(series.fluidity) <= _MOST_TWICE
+    return Modes(series, "both" if twice else acts_on)
 
 
 def _terms(series: Prony) -> str:

@@ -6,6 +6,7 @@ nothing of the rest of the grid; a step costs one weighted sum over the past and
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,7 +107,13 @@ class History:
         """The same state: no step reaches behind the present instant by a rule of its own."""
         return state
 
-    def enlarged(self, state: HistoryState, shape: tuple[int, int], offset: tuple[int, int]) -> HistoryState:
+    def enlarged(
+        self,
+        state: HistoryState,
+        shape: tuple[int, int],
+        offset: tuple[int, int],
+        displaced: Callable[[Array], Array],
+    ) -> HistoryState:
         """State on a larger grid, in which the present one begins at ``offset``."""
 
         def moved(block: Block) -> Block:

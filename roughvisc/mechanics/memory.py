@@ -12,6 +12,7 @@ nothing of contact, transforms or grids; its state is a plain value.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -26,15 +27,15 @@ Array = NDArray[np.float64]
 #: ``bdf2``: second order, damps what relaxes within a step. ``euler``: its start. ``right``: constant, jumping at
 #: the start of the step.
 Rule = Literal["linear", "bdf2", "euler", "right"]
-ActsOn = Literal["displacement", "pressure"]
+ActsOn = Literal["displacement", "pressure", "both"]
 
 
 class Memory(Protocol):
-    """What the stepper asks of a memory. ``field`` is ``v`` or ``p`` as ``acts_on`` says."""
+    """What the stepper asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
 
     @property
     def acts_on(self) -> ActsOn:
-        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa]."""
+        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa], or ``(p, v)``."""
         ...
 
     @property
@@ -58,8 +59,13 @@ class Memory(Protocol):
         """State in which no step reaches behind the present instant: after a jump or a corner."""
         ...
 
-    def enlarged(self, state: Any, shape: tuple[int, int], offset: tuple[int, int]) -> Any:
-        """State on a larger grid, in which the present one begins at ``offset``; of pressures only."""
+    def enlarged(
+        self, state: Any, shape: tuple[int, int], offset: tuple[int, int], displaced: Callable[[Array], Array]
+    ) -> Any:
+        """State on a larger grid, in which the present one begins at ``offset``; not of displacements alone.
+
+        ``displaced`` gives the displacement at unit compliance under a pressure there.
+        """
         ...
 
 
@@ -69,9 +75,9 @@ class ModesState:
 
     Attributes
     ----------
-    modes : ndarray, shape (m, nx, ny)
+    modes : ndarray, shape (m, nx, ny) or (m, 2, nx, ny)
         Internal variables ``z_i`` with ``tau_i z_i' = field - z_i``; for a fluidity ``z' = field``.
-    field : ndarray, shape (nx, ny)
+    field : ndarray, shape (nx, ny) or (2, nx, ny)
         Field at the present instant.
     earlier : ndarray or None
         ``modes`` one step ago, where the next step may use them.
@@ -93,8 +99,9 @@ class Modes:
     ----------
     material : Prony
         The series.
-    acts_on : {"displacement", "pressure"}
-        What the fields are; the pressure form survives a change of grid and costs one convolution a step.
+    acts_on : {"displacement", "pressure", "both"}
+        What the fields are; the pressure form survives a change of grid and costs one convolution a step, both
+        together survive it and cost none.
     """
 
     material: Prony
@@ -103,7 +110,8 @@ class Modes:
 
     def start(self, shape: tuple[int, int]) -> ModesState:
         """State at rest."""
-        return ModesState(np.zeros((len(self._weights), *shape)), np.zeros(shape))
+        field = (2, *shape) if self.acts_on == "both" else shape
+        return ModesState(np.zeros((len(self._weights), *field)), np.zeros(field))
 
     def predict(self, state: ModesState, step: float, rule: Rule) -> tuple[float, Array]:
         """``alpha`` [1/Pa] and the carried field of a step ahead. [s]"""
@@ -137,12 +145,25 @@ class Modes:
         """State whose next step does not reach behind the present instant."""
         return ModesState(state.modes, state.field)
 
-    def enlarged(self, state: ModesState, shape: tuple[int, int], offset: tuple[int, int]) -> ModesState:
-        """State on a larger grid: pressure is zero in what is new."""
-        if self.acts_on != "pressure":
-            raise ValueError("displacements reach beyond the grid: only a memory of pressures can be enlarged")
-        earlier = None if state.earlier is None else padded(state.earlier, shape, offset)
-        return ModesState(padded(state.modes, shape, offset), padded(state.field, shape, offset), earlier, state.step)
+    def enlarged(
+        self,
+        state: ModesState,
+        shape: tuple[int, int],
+        offset: tuple[int, int],
+        displaced: Callable[[Array], Array],
+    ) -> ModesState:
+        """State on a larger grid: pressure is zero in what is new, and displaces all of it."""
+        if self.acts_on == "displacement":
+            raise ValueError("displacements reach beyond the grid: a memory of them alone cannot be enlarged")
+
+        def moved(fields: Array) -> Array:
+            larger = padded(fields, shape, offset)
+            for pair in larger.reshape(-1, 2, *shape) if self.acts_on == "both" else ():
+                pair[1] = displaced(pair[0])
+            return larger
+
+        earlier = None if state.earlier is None else moved(state.earlier)
+        return ModesState(moved(state.modes), moved(state.field), earlier, state.step)
 
     @property
     def _factor(self) -> float:

@@ -101,12 +101,15 @@ class Instant:
         [Pa]
     force, approach : float
         [N], [m]
+    unit_displacement : ndarray, shape (nx, ny), or None
+        Displacement that the pressure causes at unit compliance; None where that is not known. [Pa m]
     """
 
     time: float
     pressure: Array
     force: float
     approach: float
+    unit_displacement: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -161,12 +164,29 @@ class State:
     iterations: int = 0
     convolutions: int = 0
 
-    def extrapolated(self, length: float) -> Array:
-        """Pressure a step ahead by the last two; the last one where there is no other. [Pa]"""
-        if self.before is None or length == 0:
-            return self.now.pressure
-        ratio = length / (self.now.time - self.before.time)
-        return np.maximum(self.now.pressure + ratio * (self.now.pressure - self.before.pressure), 0)
+    def extrapolated(self, length: float) -> tuple[Array, Array | None]:
+        """Pressure a step ahead by the last two, the last one where there is no other, and its unit displacement.
+
+        The latter is None where it would cost a convolution: where pressure is cut at zero.
+        """
+        now, before = self.now, self.before
+        if before is None or length == 0:
+            return now.pressure, now.unit_displacement
+        ratio = length / (now.time - before.time)
+        pressure = _beyond(before.pressure, now.pressure, ratio)
+        if np.min(pressure) < 0:
+            return np.maximum(pressure, 0, out=pressure), None
+        if now.unit_displacement is None or before.unit_displacement is None:
+            return pressure, None
+        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio)
+
+
+def _beyond(before: Array, now: Array, ratio: float) -> Array:
+    """``now + ratio * (now - before)``."""
+    there = now - before
+    there *= ratio
+    there += now
+    return there
 
 
 @dataclass(frozen=True)
@@ -213,7 +233,6 @@ class Trial:
     instant: Instant
     displacement: Array
     effective: Array | None
-    field: Array  # what the memory acts on
     length: float
     rule: Rule
     bound: float = 0.0

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,13 +84,14 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 
 def _rest(scene: Scene) -> State:
-    now = Instant(0.0, np.zeros(scene.halfspace.shape), 0.0, scene.lowest(scene.gap))
-    return State(now, np.zeros(scene.halfspace.shape), scene.memory.start(scene.halfspace.shape))
+    nothing = np.zeros(scene.halfspace.shape)
+    now = Instant(0.0, nothing, 0.0, scene.lowest(scene.gap), nothing)
+    return State(now, nothing, scene.memory.start(scene.halfspace.shape))
 
 
 def _at_rest(scene: Scene, state: State) -> Trial:
     nothing = np.zeros(scene.halfspace.shape)
-    return Trial(state.now, nothing, nothing if scene.memory.acts_on == "pressure" else None, nothing, 0.0, "linear")
+    return Trial(state.now, nothing, None if scene.memory.acts_on == "displacement" else nothing, 0.0, "linear")
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -103,55 +105,69 @@ def _attempt(
 
     ``share`` scales the contact solver's tolerance.
     """
-    alpha, carried = scene.memory.predict(state.memory, length, rule)
-    effective = carried if scene.memory.acts_on == "pressure" else None
-    if effective is not None:
-        carried = scene.halfspace.displacement(effective)
+    alpha, effective, carried = _predicted(scene, state.memory, length, rule)
     gap = scene.gap + carried
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
         nothing = np.zeros_like(gap)
-        return Trial(Instant(time, nothing, 0.0, approach), carried, effective, nothing, length, rule)
+        return Trial(Instant(time, nothing, 0.0, approach, nothing), carried, effective, length, rule)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
+    start, unit_displacement = state.extrapolated(length)
     contact = solve_contact(
         scene.halfspace,
         gap,
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
         tolerance=max(_ALGEBRAIC[control] * scene.tolerance * share, 1e-14),
-        start=state.extrapolated(length) * alpha,
+        start=start * alpha,
+        start_displacement=None if unit_displacement is None else unit_displacement * alpha,
         present=scene.present,
     )
-    pressure = contact.pressure / alpha
     instant = Instant(
         time,
-        pressure,
+        contact.pressure / alpha,
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
+        contact.displacement / alpha,
     )
     carried += contact.displacement
     return Trial(
         instant,
         carried,
         None if effective is None else effective + contact.pressure,
-        pressure if scene.memory.acts_on == "pressure" else contact.displacement / alpha,
         length,
         rule,
         contact.bound,
         contact.converged,
         contact.iterations,
-        contact.convolutions + (effective is not None),
+        contact.convolutions + (scene.memory.acts_on == "pressure"),
     )
+
+
+def _predicted(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
+    """``alpha`` of a step, and what is carried into it: the effective pressure, if known, and the displacement."""
+    alpha, carried = scene.memory.predict(memory, length, rule)
+    if scene.memory.acts_on == "displacement":
+        return alpha, None, carried
+    if scene.memory.acts_on == "both":
+        return alpha, carried[0], carried[1]
+    return alpha, carried, scene.halfspace.displacement(carried)
 
 
 def _committed(scene: Scene, state: State, trial: Trial) -> State:
     """State after an accepted trial."""
-    memory = scene.memory.advance(state.memory, trial.length, trial.rule, trial.field)
     now = trial.instant
+    assert now.unit_displacement is not None
+    fields = {"pressure": now.pressure, "displacement": now.unit_displacement}
+    both = scene.memory.acts_on == "both"
+    field = np.stack(list(fields.values())) if both else fields[scene.memory.acts_on]
+    memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
+    if both:  # held once
+        now = replace(now, pressure=field[0], unit_displacement=field[1])
     touching = now.force > 0
     return replace(
         state,
@@ -233,14 +249,16 @@ def _enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
         raise edge_error(scene, time)
     scene, offset = larger
     shape = scene.halfspace.shape
-    memory = scene.memory.enlarged(state.memory, shape, offset)
+    memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
 
     def moved(instant: Instant) -> Instant:
-        return replace(instant, pressure=padded(instant.pressure, shape, offset))
+        return replace(instant, pressure=padded(instant.pressure, shape, offset), unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
-    glassy, carried = scene.memory.predict(memory, 0.0, "linear")
-    displacement = scene.halfspace.displacement(carried + glassy * now.pressure)
+    glassy, _, carried = _predicted(scene, memory, 0.0, "linear")
+    unit_displacement = scene.halfspace.displacement(now.pressure)
+    now = replace(now, unit_displacement=unit_displacement)
+    displacement = carried + glassy * unit_displacement
     return scene, replace(state, now=now, displacement=displacement, before=before, memory=memory)
 
 
@@ -381,9 +399,7 @@ def _closing_time(scene: Scene, state: State, segment: Segment, event: float) ->
         value = segment.value(time - state.began, state.start)
         if segment.control == "load":
             return value == 0
-        _, carried = scene.memory.predict(state.memory, time - now, "linear")
-        if scene.memory.acts_on == "pressure":
-            carried = scene.halfspace.displacement(carried)
+        _, _, carried = _predicted(scene, state.memory, time - now, "linear")
         return value <= min(scene.lowest(scene.gap + carried), scene.outside)
 
     if segment.control == "load":

@@ -31,7 +31,7 @@ def left_out(
     out = []
     if engine.note.startswith("no memory"):
         out.append("history (the material is elastic)")
-    elif engine.memory.acts_on == "displacement" and method == "fast":
+    elif engine.memory.acts_on != "pressure" and method == "fast":
         out.append("convolutions of the past")
     if boundary == "periodic":
         out.append("padding")

@@ -1,0 +1,5 @@
+"""``python -m roughvisc``: the command line."""
+
+from roughvisc.cli import main
+
+main()
