@@ -194,7 +194,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     ValueError
         If a variable's dimensions are not the declared ones.
     """
-    annotated = dataset.copy()
+    other = {}
     for name, variable in dataset.variables.items():
         if name not in VARIABLES:
             raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
@@ -202,8 +202,10 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         if variable.dims[-len(declared.dims) :] != declared.dims:
             raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {declared.dims}")
         if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
-            annotated[name] = variable.astype(declared.dtype)
-        annotated.variables[name].attrs.update(declared.attributes())
+            other[name] = variable.astype(declared.dtype)
+    annotated = dataset.assign(other)  # once: each assignment merges the whole
+    for name, variable in annotated.variables.items():
+        variable.attrs.update(VARIABLES[str(name)].attributes())
     if "status" in annotated:
         annotated.variables["status"].attrs.update(
             flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),

@@ -5,6 +5,7 @@ A :class:`HalfSpace` knows a grid and its boundary. It knows neither material, t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Literal
 
@@ -19,14 +20,17 @@ from roughvisc.mechanics.kernel import free_space_symbol, periodic_symbol
 Array = NDArray[np.float64]
 Boundary = Literal["free", "periodic"]
 
-# Columns transformed together: the block and its transform stay in the cache (measured at 128 to 1024 squared).
-_BLOCK = 32
+# Points of the columns transformed together, but at least so many columns, and rows: they stay in the cache (measured
+# at 64 to 1024 squared).
+_POINTS, _COLUMNS, _ROWS = 1 << 13, 32, 128
 # Cells from which several threads are faster than one (measured: slower at 512 squared, faster at 1024 squared).
 _THREADED = 1024**2
 
 
 class HalfSpace:
     """Surface of an elastic half-space of unit contact compliance, sampled by equal rectangular cells.
+
+    Not for two threads at once: the transforms share their working memory from one call to the next.
 
     Parameters
     ----------
@@ -94,16 +98,31 @@ class HalfSpace:
         """
         if self.boundary == "periodic":
             return self._filtered(pressure, self._symbol)
-        (nx, ny), (mx, my) = self.shape, self._padded
+        (nx, ny), my = self.shape, self._padded[1]
         # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
         # columns go forward, are multiplied and come back while they stay in the cache.
-        rows = fft.rfft(pressure, n=my, axis=1, workers=self.workers)
-        for start in range(0, rows.shape[1], _BLOCK):
-            block = slice(start, start + _BLOCK)
-            columns = fft.fft(rows[:, block], n=mx, axis=0, workers=self.workers)
+        spectrum, room = self._working_memory
+        for rows in _blocks(nx, _ROWS):
+            spectrum[rows] = fft.rfft(pressure[rows], n=my, axis=1, workers=self.workers)
+        for block in _blocks(my // 2 + 1, room.shape[1]):
+            columns = room[:, : block.stop - block.start]
+            columns[:nx] = spectrum[:, block]
+            columns[nx:] = 0
+            columns = fft.fft(columns, axis=0, overwrite_x=True, workers=self.workers)
             columns *= self._symbol[:, block]
-            rows[:, block] = fft.ifft(columns, axis=0, overwrite_x=True, workers=self.workers)[:nx]
-        return fft.irfft(rows, n=my, axis=1, overwrite_x=True, workers=self.workers)[:, :ny]
+            columns = fft.ifft(columns, axis=0, overwrite_x=True, workers=self.workers)
+            spectrum[:, block] = columns[:nx]
+        displacement = np.empty(self.shape)
+        for rows in _blocks(nx, _ROWS):
+            displacement[rows] = fft.irfft(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
+        return displacement
+
+    @cached_property
+    def _working_memory(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Transforms along y, and some columns of their transforms: taken anew each time, half of it is page faults."""
+        mx, count = self._padded[0], self._padded[1] // 2 + 1
+        together = min(max(_POINTS // mx, _COLUMNS), count)
+        return np.empty((self.shape[0], count), complex), np.empty((mx, together), complex)
 
     def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
@@ -135,6 +154,10 @@ class HalfSpace:
         field_q = fft.rfft2(field, workers=self.workers)
         field_q *= symbol
         return fft.irfft2(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+
+
+def _blocks(length: int, size: int) -> Iterator[slice]:
+    return (slice(first, min(first + size, length)) for first in range(0, length, size))
 
 
 def transform_engine() -> str:

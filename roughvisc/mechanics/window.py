@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 # Cells of the smallest window, and of a border around what lies low enough.
 _SMALLEST, _BORDER = 24, 2
+# A window of more than this part of the domain's cells spares too little for what it costs to leave it again.
+_LARGEST = 0.6
 _BLOCK = 64  # columns or rows transformed together (measured)
 
 
@@ -72,7 +74,8 @@ def window_around(gap: Array, extent: int) -> Window:
     Returns
     -------
     Window
-        With sides that transform well, and nowhere at the border of the domain: the whole of it otherwise.
+        With sides that transform well, nowhere at the border of the domain and not most of it: the whole of it
+        otherwise.
     """
     lowest = [np.min(gap, axis=1), np.min(gap, axis=0)]  # of each row and column
     levels = np.unique(np.concatenate(lowest))
@@ -93,8 +96,10 @@ def window_around(gap: Array, extent: int) -> Window:
         if start <= 0 or start + length >= cells:
             return whole_domain((gap.shape[0], gap.shape[1]))
         sides.append(slice(start, start + length))
-    beyond = [np.delete(side, cells) for side, cells in zip(lowest, sides, strict=True)]
     shape = (sides[0].stop - sides[0].start, sides[1].stop - sides[1].start)
+    if shape[0] * shape[1] > _LARGEST * gap.size:
+        return whole_domain((gap.shape[0], gap.shape[1]))
+    beyond = [np.delete(side, cells) for side, cells in zip(lowest, sides, strict=True)]
     outside = float(min(np.min(beyond[0]), np.min(beyond[1])))
     return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside)
 

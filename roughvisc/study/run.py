@@ -21,6 +21,7 @@ from roughvisc.mechanics.halfspace import transform_engine
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.checkpoint import Keeper
 from roughvisc.study.lock import held
+from roughvisc.study.malloc import keep_memory
 from roughvisc.study.simulate import press
 from roughvisc.study.store import open_result, write_result
 from roughvisc.variables import STATUS_MEANINGS
@@ -205,6 +206,7 @@ def run_case(
     if is_result_of(case, path) and not _leftovers(path):
         return path
     made = [place for place in (folder, *folder.parents) if not place.exists()]
+    keep_memory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with held(folder / f".{case.key}.lock") as lock:

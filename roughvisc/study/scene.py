@@ -56,8 +56,6 @@ class Ground:
         self._extent = float(_FIRST_EXTENT)
         if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT)
-        #: Whether the march begins on a window of the surface.
-        self.followed = not self.window.whole
 
     def _lay(self, height: xr.DataArray) -> None:
         self.height = _checked(height)

@@ -185,6 +185,7 @@ def _press(
         edge=edge,
         memory=memory,
     )
+    followed = not ground.window.whole
     unknown = [name for name in fields if name not in FIELDS]
     if unknown:
         raise InputError(f"fields holds {unknown[0]!r}: expected some of {', '.join(FIELDS)}")
@@ -222,7 +223,7 @@ def _press(
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": slope_note(ground.height[ground.window.cells], boundary, float(dataset["approach"].max())),
-        "left_out": left_out(engine, boundary, method, fields, times is None, ground.followed),
+        "left_out": left_out(engine, boundary, method, fields, times is None, followed),
     }
     if described["slope_note"]:
         log.warning("%s", described["slope_note"])

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy import fft
@@ -149,7 +146,6 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
     with _one_at_a_time:
         if sweep in _stopped:
             return Outcome(key, "interrupted")
-        keep_memory()
         report(0.0, 0.0)
         try:
             case = Case.from_json(text)
@@ -167,20 +163,3 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
 def stop_sweep(sweep: str) -> None:
     """Have the cases of a sweep stop at their next step, in this process."""
     _stopped.add(sweep)
-
-
-@cache
-def keep_memory() -> bool:
-    """Have the C library keep freed memory for the next array, as it does by itself outside Dask's workers.
-
-    Dask's nannies set ``MALLOC_TRIM_THRESHOLD_``, with which every temporary array is mapped and unmapped anew: a
-    convolution takes up to 1.8 times as long.
-    """
-    if not sys.platform.startswith("linux"):
-        return False
-    try:
-        mallopt: Any = ctypes.CDLL("libc.so.6").mallopt
-    except (OSError, AttributeError):  # not the GNU C library
-        return False
-    m_trim_threshold, m_mmap_threshold = -1, -3
-    return bool(mallopt(m_mmap_threshold, 32 << 20) and mallopt(m_trim_threshold, 256 << 20))

@@ -1,0 +1,26 @@
+"""The C library's memory: freed arrays are to be used again, not given back to the system and asked for anew."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from functools import cache
+from typing import Any
+
+
+@cache
+def keep_memory() -> bool:
+    """Have the C library keep freed memory for the next array, in the whole process; say whether that was possible.
+
+    As it comes it gives large arrays back at once, and the next ones are mapped and cleared anew: a run at 256 to 512
+    squared takes 10 to 15 % longer, and on Dask's workers, whose nannies set ``MALLOC_TRIM_THRESHOLD_``, a convolution
+    up to 1.8 times as long.
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        mallopt: Any = ctypes.CDLL("libc.so.6").mallopt
+    except (OSError, AttributeError):  # not the GNU C library
+        return False
+    m_trim_threshold, m_mmap_threshold = -1, -3
+    return bool(mallopt(m_mmap_threshold, 32 << 20) and mallopt(m_trim_threshold, 256 << 20))
