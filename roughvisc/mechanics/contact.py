@@ -38,6 +38,10 @@ _PATIENCE = 30
 _GROWTH = 1.3
 # No step goes farther than this many times its trial: along a uniform pressure the periodic kernel has no curvature.
 _FARTHEST = 30.0
+# A cold start on so many cells a side is guessed on every so-many-eth cell, and taken from there if no more than this
+# part of them is in contact. Measured at 256 to 512 squared, 5 % in contact: 0.6 of the time; at 30 and 95 % the guess
+# saves no iteration, and costs 5 % of the time.
+_COARSE_FROM, _STRIDE, _SPARSE = 256, 8, 0.25
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -84,6 +88,7 @@ def solve_contact(
     start_displacement: Array | None = None,
     present: Mask | None = None,
     max_iterations: int = 1000,
+    overwrite: bool = False,
 ) -> ContactState:
     """Contact state under given load or given approach.
 
@@ -107,6 +112,8 @@ def solve_contact(
         Cells where there is material; None: all.
     max_iterations : int
         The state reached by then is returned as not converged.
+    overwrite : bool
+        Whether `gap`, `start` and `start_displacement` may be used up, which spares copies of them.
 
     Returns
     -------
@@ -116,8 +123,28 @@ def solve_contact(
         raise ValueError("give either a load or an approach")
     if present is not None and present.all():
         present = None
+    if not overwrite:
+        gap = np.array(gap, dtype=float)
+        start = None if start is None else np.array(start, dtype=float)
+        start_displacement = None if start_displacement is None else np.array(start_displacement, dtype=float)
+    if load is not None and present is None and (start is None or not np.any(start > 0)):
+        start, start_displacement = _guessed(halfspace, gap, load), None
     problem = _Problem(halfspace, gap, load, approach, tolerance, present)
     return problem.solve(start, start_displacement, max_iterations)
+
+
+def _guessed(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
+    """First guess of a pressure from a coarser grid; None where that does not pay. [-]"""
+    if min(gap.shape) < _COARSE_FROM:
+        return None
+    few = gap[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE]
+    spacing = (_STRIDE * halfspace.spacing[0], _STRIDE * halfspace.spacing[1])
+    coarse = HalfSpace((few.shape[0], few.shape[1]), spacing, halfspace.boundary)
+    found = solve_contact(coarse, few, load=load / _STRIDE**2, tolerance=0.03).pressure
+    if np.count_nonzero(found) > _SPARSE * found.size:
+        return None
+    cells = [np.minimum(np.arange(n) // _STRIDE, m - 1) for n, m in zip(gap.shape, few.shape, strict=True)]
+    return found[np.ix_(*cells)]
 
 
 class _Problem:
@@ -147,8 +174,9 @@ class _Problem:
         self.scale = self.unit / self.length
         self.load = None if load is None else load / self.unit
         self.target = math.nan if approach is None else 1.0  # approach above the lowest point
-        self.gap = gap - self.lowest
-        self.gap /= self.length
+        gap -= self.lowest
+        gap /= self.length
+        self.gap = gap
         self.convolutions = 0
         self._scratch: NDArray[np.float32] | None = None
 
@@ -164,16 +192,17 @@ class _Problem:
         if displacement is None:
             displacement = self.displacement(pressure)
         before, curvature = displacement, 0.0  # of the last step, for conjugation
-        last_step: Array | None = None
+        last_face, last_step = None, np.zeros(0)
+        total = np.empty_like(displacement)
         length = 1 / self.scale  # the preconditioner is the inverse up to boundaries and the contact's outline
         best, since, spacer = math.inf, 0, False
         cells = np.flatnonzero(grid)
         for iteration in range(max_iterations + 1):
-            total = self.gap + displacement
+            np.add(self.gap, displacement, out=total)
             duality_gap, energy, level, converged = self.judge(cells, grid[cells], displacement, total)
             if converged and extrapolated and iteration == 0:  # its rounding must not pile up from step to step
                 displacement = self.displacement(pressure)
-                total = self.gap + displacement
+                np.add(self.gap, displacement, out=total)
                 duality_gap, energy, level, converged = self.judge(cells, grid[cells], displacement, total)
             if converged or iteration == max_iterations:
                 break
@@ -189,25 +218,24 @@ class _Problem:
                 trial, face, held, residual = self.projected_gradient(pressure, total, level)
             else:
                 search = self.precondition(residual, face)
-                if last_step is not None and curvature > 0:
+                if last_face is not None and curvature > 0:
                     changed = displacement.reshape(-1)[face] - before.reshape(-1)[face]
-                    beta = float(np.sum(search * changed)) / curvature
-                    if beta > 0:
-                        conjugate = search - beta * self.tangent(last_step.reshape(-1)[face])
-                        if float(np.sum(residual * conjugate)) > 0:
-                            search = conjugate
+                    total.reshape(-1)[face] = 0  # not needed any more: room for the last step
+                    total.reshape(-1)[last_face] = last_step
+                    search = self.conjugate(search, residual, changed / curvature, total.reshape(-1)[face])
+                    del changed
                 trial = self.cut(held - length * search)
+                del search
             step = trial - held
             slope = float(np.sum(step * residual))
             if not slope < 0:  # no descent: forget the history, then the preconditioner too
                 if spacer:
                     break  # the projected gradient does not descend either: this is the minimum, to rounding
-                spacer, last_step, length = last_step is None, None, 1 / self.scale
+                spacer, last_face, length = last_face is None, None, 1 / self.scale
                 continue
             grid[face] = trial
             moved = self.displacement(pressure)
-            changed = moved.reshape(-1)[face] - displacement.reshape(-1)[face]
-            curvature = float(np.sum(step * changed))
+            curvature = float(np.sum(step * (moved.reshape(-1)[face] - displacement.reshape(-1)[face])))
             full = min(-slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
             fraction, cut = self.fraction(held, trial, step, full)
             before = displacement
@@ -216,14 +244,16 @@ class _Problem:
             else:
                 trial = np.maximum(held + fraction * step, 0)
                 grid[face] = trial
-                displacement = displacement + fraction * (moved - displacement)
+                moved -= displacement
+                moved *= fraction
+                moved += displacement
+                displacement = moved
                 curvature *= fraction  # of the whole step with the change by its part
             cells = face[trial > 0]
             if spacer:
-                spacer, last_step = False, None
+                spacer, last_face = False, None
             else:
-                last_step = np.zeros_like(pressure)
-                last_step.reshape(-1)[face] = step
+                last_face, last_step = face, step
                 length *= min(max(full, 0.3), _GROWTH if cut else 3.0)
         return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration)
 
@@ -234,12 +264,15 @@ class _Problem:
             if self.load is None:
                 pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)
         else:
-            pressure = np.maximum(start, 0) / self.unit
+            pressure = np.maximum(start, 0, out=start)
+            pressure /= self.unit
         if self.present is not None:
             pressure = np.where(self.present, pressure, 0.0)
         factor = 1.0 if self.load is None else self.load / float(np.sum(pressure))
         pressure *= factor
-        return pressure, None if displacement is None else displacement * (factor / self.length)
+        if displacement is not None:
+            displacement *= factor / self.length
+        return pressure, displacement
 
     def displacement(self, pressure: Array) -> Array:
         self.convolutions += 1
@@ -316,6 +349,15 @@ class _Problem:
         scratch[face] = 0
         return self.tangent(pressure.astype(float) * size)
 
+    def conjugate(self, search: Array, residual: Array, changed: Array, last_step: Array) -> Array:
+        """Search direction conjugate to the last step; ``changed`` is its displacement over its curvature."""
+        beta = float(np.sum(search * changed))
+        if beta > 0:
+            conjugate = search - beta * self.tangent(last_step)
+            if float(np.sum(residual * conjugate)) > 0:
+                return conjugate
+        return search
+
     def cut(self, pressure: Array) -> Array:
         """Nearest admissible pressure in the manner of Polonsky and Keer: cut at zero, then scaled to the load."""
         pressure = np.maximum(pressure, 0)
@@ -358,11 +400,15 @@ class _Problem:
         load = float(np.sum(pressure))
         approach = level
         if self.load is not None:  # weighted by pressure: its error is of second order
-            approach = level + float(np.sum(pressure * (self.gap + displacement - level))) / load
+            cells = np.flatnonzero(pressure)
+            excess = self.gap.reshape(-1)[cells] + displacement.reshape(-1)[cells] - level
+            approach = level + float(np.sum(pressure.reshape(-1)[cells] * excess)) / load
         bound = math.sqrt(2 * max(duality_gap, 0.0) / energy) if energy > 0 else 0.0
+        pressure *= self.unit
+        displacement *= self.length
         return ContactState(
-            pressure=pressure * self.unit,
-            displacement=displacement * self.length,
+            pressure=pressure,
+            displacement=displacement,
             approach=approach * self.length + self.lowest,
             load=load * self.unit,
             bound=bound,

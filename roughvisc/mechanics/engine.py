@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from roughvisc.errors import InputError
 from roughvisc.mechanics.history import History, history_bytes
 from roughvisc.mechanics.materials import Material, Prony
@@ -19,6 +21,8 @@ SHORTEST_AGE = 1e-6
 #: Up to so many exponentials are remembered as pressures and as displacements where the grid may change: the passes
 #: over the grid that each of them takes cost less than the convolution that this saves (measured at 128 squared).
 _MOST_TWICE = 3
+#: Compliance at the end of a step over its mean in it, from which steps may ring: they do from 1.5.
+_RINGING = 1.45
 #: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
 _SHORTEST_STEP = 1e-3
 
@@ -89,7 +93,7 @@ def engine_for(
             )
         return Engine(History(material), 0.0, "direct history of every pressure, as asked for")
     if isinstance(material, Prony):
-        return Engine(_recursive(material, acts_on), 0.0, _terms(material))
+        return Engine(_recursive(material, acts_on, duration), 0.0, _terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
         glassy = float(material.contact_compliance(0.0))
         return Engine(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
@@ -102,12 +106,22 @@ def engine_for(
             f"direct history of every pressure (the best series, {series.error:.1e} off, missed the tolerance); about "
             f"{history_bytes(1e4, 1e3) / 1e6:.0f} MB for 1000 steps with 10000 cells in contact",
         )
-    return Engine(_recursive(series.prony, acts_on), series.error, certified)
+    return Engine(_recursive(series.prony, acts_on, duration), series.error, certified)
 
 
-def _recursive(series: Prony, acts_on: ActsOn) -> Modes:
+def _recursive(series: Prony, acts_on: ActsOn, duration: float) -> Modes:
     twice = acts_on == "pressure" and len(series.times) + bool(series.fluidity) <= _MOST_TWICE
-    return Modes(series, "both" if twice else acts_on)
+    rules = Modes.rules if _may_ring(series, duration) else tuple(rule for rule in Modes.rules if rule != "bdf2")
+    return Modes(series, "both" if twice else acts_on, rules)
+
+
+def _may_ring(material: Material, duration: float) -> bool:
+    """Whether in some step pressure taken as linear would ring; if not, no step needs the state before the last."""
+    if duration == 0:
+        return False
+    steps = duration * np.geomspace(1e-9, 1.0, 100)
+    mean = material.mean_contact_compliance(np.zeros_like(steps), steps)
+    return bool(np.any(material.contact_compliance(steps) > _RINGING * mean))
 
 
 def _terms(series: Prony) -> str:

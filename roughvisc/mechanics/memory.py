@@ -80,7 +80,7 @@ class ModesState:
     field : ndarray, shape (nx, ny) or (2, nx, ny)
         Field at the present instant.
     earlier : ndarray or None
-        ``modes`` one step ago, where the next step may use them.
+        ``modes`` one step ago, where the next step may use them by the two-step rule.
     step : float
         Length of the last step. [s]
     """
@@ -139,7 +139,7 @@ class Modes:
             if before[i]:
                 mode += before[i] * state.field
             mode += after[i] * field
-        return ModesState(modes, field, state.modes, step)
+        return ModesState(modes, field, state.modes if "bdf2" in self.rules else None, step)
 
     def restart(self, state: ModesState) -> ModesState:
         """State whose next step does not reach behind the present instant."""

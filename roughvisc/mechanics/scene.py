@@ -164,28 +164,29 @@ class State:
     iterations: int = 0
     convolutions: int = 0
 
-    def extrapolated(self, length: float) -> tuple[Array, Array | None]:
+    def extrapolated(self, length: float, scale: float = 1.0) -> tuple[Array, Array | None]:
         """Pressure a step ahead by the last two, the last one where there is no other, and its unit displacement.
 
-        The latter is None where it would cost a convolution: where pressure is cut at zero.
+        Both are scaled. The latter is None where it would cost a convolution: where pressure is cut at zero.
         """
         now, before = self.now, self.before
         if before is None or length == 0:
-            return now.pressure, now.unit_displacement
+            return now.pressure * scale, None if now.unit_displacement is None else now.unit_displacement * scale
         ratio = length / (now.time - before.time)
-        pressure = _beyond(before.pressure, now.pressure, ratio)
+        pressure = _beyond(before.pressure, now.pressure, ratio, scale)
         if np.min(pressure) < 0:
             return np.maximum(pressure, 0, out=pressure), None
         if now.unit_displacement is None or before.unit_displacement is None:
             return pressure, None
-        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio)
+        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale)
 
 
-def _beyond(before: Array, now: Array, ratio: float) -> Array:
-    """``now + ratio * (now - before)``."""
+def _beyond(before: Array, now: Array, ratio: float, scale: float) -> Array:
+    """``scale * (now + ratio * (now - before))``."""
     there = now - before
     there *= ratio
     there += now
+    there *= scale
     return there
 
 

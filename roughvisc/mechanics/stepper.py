@@ -116,29 +116,35 @@ def _attempt(
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
-    start, unit_displacement = state.extrapolated(length)
+    start, start_displacement = state.extrapolated(length, alpha)
     contact = solve_contact(
         scene.halfspace,
         gap,
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
         tolerance=max(_ALGEBRAIC[control] * scene.tolerance * share, 1e-14),
-        start=start * alpha,
-        start_displacement=None if unit_displacement is None else unit_displacement * alpha,
+        start=start,
+        start_displacement=start_displacement,
         present=scene.present,
+        overwrite=True,
     )
+    pressure, displacement = contact.pressure, contact.displacement
+    carried += displacement
+    if effective is not None:
+        effective += pressure
+    pressure /= alpha
+    displacement /= alpha
     instant = Instant(
         time,
-        contact.pressure / alpha,
+        pressure,
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
-        contact.displacement / alpha,
+        displacement,
     )
-    carried += contact.displacement
     return Trial(
         instant,
         carried,
-        None if effective is None else effective + contact.pressure,
+        effective,
         length,
         rule,
         contact.bound,
