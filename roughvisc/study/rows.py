@@ -139,7 +139,7 @@ class Rows:
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
         """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
-        return float(np.mean(self._ground.gap)) + float(np.sum(source * self._mean_influence(window))) - level
+        return self._ground.mean_gap + float(np.sum(source * self._mean_influence(window))) - level
 
     def _frame(self, name: str, index: int, out: Array) -> Array:
         """A field of a row over the final domain, written to ``out``, which holds zeros."""
