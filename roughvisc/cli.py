@@ -159,7 +159,8 @@ def _run_all(
     """Compute and sum up a sweep."""
     from contextlib import ExitStack
 
-    from roughvisc.study.sweep import LOG, connect, run_cases
+    from roughvisc.study.cluster import connect
+    from roughvisc.study.sweep import LOG, run_cases
     from roughvisc.study.watch import watcher
     from roughvisc.views.console import sweep_table
 

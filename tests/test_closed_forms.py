@@ -306,6 +306,15 @@ def test_ting__step_is_lee_radok():
     np.testing.assert_allclose(contact.pressure(r, 1.3), press.pressure(r, 1.3), rtol=1e-9)
 
 
+def test_ting__pressure_under_the_apex_of_a_cone_is_infinite():
+    program = Program().load(1.0, over=1.0).load(0.0, over=1.0)
+    contact = cf.ting(cf.Cone(0.2), ZENER, program)
+    times = np.array([0.5, 1.5, 2.0])
+    assert contact.pressure(0.0, times).tolist() == [np.inf, np.inf, 0.0]
+    near = contact.pressure(np.geomspace(1e-2, 1e-8, 7) * contact.radius(0.5), 0.5)
+    assert np.diff(near) == pytest.approx(np.full(6, np.diff(near)[-1]), rel=1e-3)  # it grows as the logarithm
+
+
 def test_ting__refuses_what_grows_again():
     fall = Program().load(1.0, over=0.0).hold(1.0).load(0.2, over=0.0).hold(1.0)
     with pytest.raises(InputError, match="grows again"):

@@ -24,10 +24,11 @@ from roughvisc.errors import InputError, InUseError, RoughviscError
 from roughvisc.study import task as task_module
 from roughvisc.study.baggage import pack
 from roughvisc.study.case import Case, read_cases, vary
+from roughvisc.study.cluster import connect
 from roughvisc.study.failures import record_path
 from roughvisc.study.index import INDEX
 from roughvisc.study.store import open_result, write_result
-from roughvisc.study.sweep import connect, run_cases, sweep
+from roughvisc.study.sweep import run_cases, sweep
 from roughvisc.study.watch import Silence, Watch
 
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'

@@ -148,6 +148,18 @@ def test_budget__stops_a_run_that_takes_longer_than_expected(tmp_path):
         bench.run(Setting(1e-2))
 
 
+def test_expected_time__counts_the_window_and_not_the_whole_domain(tmp_path):
+    """A contact a twentieth as wide as its domain: all that differs is whether it may reach the border."""
+    case = vary(case_of(tmp_path), {"surface.shape": [301, 307], "program.0.load": 1e-5})
+    benches = [
+        Bench(vary(case, {"solve.edge": edge}), case.height(), tmp_path, 1e4, print) for edge in ("error", "accept")
+    ]
+    for bench in benches:
+        bench._convolution = 1.0
+    followed, whole = (bench.expected(Setting(1e-4)) for bench in benches)
+    assert followed < 0.1 * whole
+
+
 def test_reference__that_would_take_too_long_is_refused(tmp_path):
     with pytest.raises(rv.InputError, match=r"study\.toml: surface: the run that all others are measured against"):
         measured(case_of(tmp_path, ROUGH), Setting(1e-2), budget=1e-6)

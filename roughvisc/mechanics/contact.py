@@ -199,33 +199,36 @@ class _Problem:
         cells = np.flatnonzero(grid)
         for iteration in range(max_iterations + 1):
             np.add(self.gap, displacement, out=total)
-            duality_gap, energy, level, converged = self.judge(cells, grid[cells], displacement, total)
+            duality_gap, energy, level, converged = self.judge(cells, grid.take(cells), displacement, total)
             if converged and extrapolated and iteration == 0:  # its rounding must not pile up from step to step
                 displacement = self.displacement(pressure)
                 np.add(self.gap, displacement, out=total)
-                duality_gap, energy, level, converged = self.judge(cells, grid[cells], displacement, total)
+                duality_gap, energy, level, converged = self.judge(cells, grid.take(cells), displacement, total)
             if converged or iteration == max_iterations:
                 break
             best, since = (duality_gap, 0) if duality_gap < best / 2 else (best, since + 1)
             if since >= _PATIENCE:
                 spacer, since, best = True, 0, duality_gap
 
-            face = self.face(cells, total, level)
-            residual = total.reshape(-1)[face]
+            face = self.face(pressure, total, level)
+            residual = total.take(face)
             residual -= level if self.load is None else float(np.mean(residual))
-            held = grid[face]
+            held = grid.take(face)
             if spacer:
                 trial, face, held, residual = self.projected_gradient(pressure, total, level)
             else:
                 search = self.precondition(residual, face)
                 if last_face is not None and curvature > 0:
-                    changed = displacement.reshape(-1)[face] - before.reshape(-1)[face]
-                    total.reshape(-1)[face] = 0  # not needed any more: room for the last step
+                    changed = displacement.take(face)
+                    changed -= before.take(face)
+                    changed /= curvature
+                    total.fill(0)  # not needed any more: room for the last step
                     total.reshape(-1)[last_face] = last_step
-                    search = self.conjugate(search, residual, changed / curvature, total.reshape(-1)[face])
+                    search = self.conjugate(search, residual, changed, total.take(face))
                     del changed
-                trial = self.cut(held - length * search)
-                del search
+                search *= -length
+                search += held
+                trial = self.cut(search)
             step = trial - held
             slope = float(np.sum(step * residual))
             if not slope < 0:  # no descent: forget the history, then the preconditioner too
@@ -235,14 +238,19 @@ class _Problem:
                 continue
             grid[face] = trial
             moved = self.displacement(pressure)
-            curvature = float(np.sum(step * (moved.reshape(-1)[face] - displacement.reshape(-1)[face])))
+            changed = moved.take(face)
+            changed -= displacement.take(face)
+            curvature = float(np.sum(step * changed))
+            del changed
             full = min(-slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
             fraction, cut = self.fraction(held, trial, step, full)
             before = displacement
             if fraction == 1:
                 displacement = moved
             else:
-                trial = np.maximum(held + fraction * step, 0)
+                trial = fraction * step
+                trial += held
+                np.maximum(trial, 0, out=trial)
                 grid[face] = trial
                 moved -= displacement
                 moved *= fraction
@@ -284,8 +292,7 @@ class _Problem:
         self, cells: Cells, pressure: Array, displacement: Array, total: Array
     ) -> tuple[float, float, float, bool]:
         """Bound on ``f(p) - min f``, ``p.Kp``, the level of the contact, and whether the bound is small enough."""
-        own = displacement.reshape(-1)[cells]
-        here = total.reshape(-1)[cells]
+        own, here = displacement.take(cells), total.take(cells)
         energy = float(np.sum(pressure * own))
         lowest = (
             float(np.min(total)) if self.present is None else float(np.min(total, where=self.present, initial=math.inf))
@@ -298,7 +305,8 @@ class _Problem:
             level = self.target
             gap = self.gap_under_approach(pressure, displacement, here, lowest)
         # with rounding of the sums above; a pressure of nothing has no error to speak of
-        floor = 8 * _EPSILON * load * float(np.max(np.abs(here), initial=1.0))
+        largest = max(float(np.max(here, initial=1.0)), -float(np.min(here, initial=-1.0)))
+        floor = 8 * _EPSILON * load * largest
         return gap, energy, level, gap <= self.tolerance * energy + floor and load > 0
 
     def gap_under_approach(self, pressure: Array, displacement: Array, here: Array, lowest: float) -> float:
@@ -326,12 +334,12 @@ class _Problem:
             self._uniform = (1 / float(np.min(inside)), float(np.sum(inside)))
         return self._uniform
 
-    def face(self, cells: Cells, total: Array, level: float) -> Cells:
+    def face(self, pressure: Array, total: Array, level: float) -> Cells:
         """Cells that may change pressure: those in contact and those that would penetrate."""
         mask = total < level
         if self.present is not None:
             mask &= self.present
-        mask.reshape(-1)[cells] = True
+        mask |= pressure > 0
         return np.flatnonzero(mask)
 
     def tangent(self, vector: Array) -> Array:
@@ -345,9 +353,10 @@ class _Problem:
         scratch = self._scratch.reshape(-1)
         size = float(np.max(np.abs(residual), initial=0.0)) or 1.0  # the range of single precision is small
         scratch[face] = residual / size
-        pressure = self.halfspace.approximate_inverse(self._scratch).reshape(-1)[face]
-        scratch[face] = 0
-        return self.tangent(pressure.astype(float) * size)
+        pressure = self.halfspace.approximate_inverse(self._scratch).take(face).astype(float)
+        scratch.fill(0)
+        pressure *= size
+        return self.tangent(pressure)
 
     def conjugate(self, search: Array, residual: Array, changed: Array, last_step: Array) -> Array:
         """Search direction conjugate to the last step; ``changed`` is its displacement over its curvature."""
@@ -359,8 +368,8 @@ class _Problem:
         return search
 
     def cut(self, pressure: Array) -> Array:
-        """Nearest admissible pressure in the manner of Polonsky and Keer: cut at zero, then scaled to the load."""
-        pressure = np.maximum(pressure, 0)
+        """The pressure made admissible in the manner of Polonsky and Keer: cut at zero, then scaled to the load."""
+        np.maximum(pressure, 0, out=pressure)
         if self.load is not None:
             pressure *= self.load / float(np.sum(pressure))
         return pressure
@@ -383,8 +392,10 @@ class _Problem:
             return (1.0, full > 1) if full > 0.5 else (full, False)
         if full <= 1:
             return full, False
-        falling = step < 0
-        limit = float(np.min(held[falling] / -step[falling], initial=math.inf))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # of its own pressure, in the cell that reaches zero first
+            steepest = float(np.fmin.reduce(step / held, initial=math.inf))
+        limit = -1 / steepest if steepest < 0 else math.inf
         return min(full, limit), full > limit
 
     def state(

@@ -200,7 +200,7 @@ class SingleMaximum:
         return np.where(t < self.time_of_maximum, growing, self.material.contact_compliance(late) * now - memory)
 
     def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
-        """Pressure at ``r`` [m] and ``t`` [s], which are broadcast. [Pa]"""
+        """Pressure at ``r`` [m] and ``t`` [s], which are broadcast; infinite under the apex of a cone. [Pa]"""
         r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
         t1, grown = self._twin(t)
         radius = self.indenter.radius_at_scaled_force(grown)
@@ -214,7 +214,7 @@ class SingleMaximum:
             with np.errstate(invalid="ignore"):
                 return self.relaxation.rate(now - s) * (final - np.minimum(then, final))
 
-        memory = _between(self.corners, growth, entry, t1, r, t, final)
+        memory = np.where(np.isinf(final), 0.0, _between(self.corners, growth, entry, t1, r, t, final))
         return np.where(r < radius, self.relaxation(t - entry) * final + memory, 0.0)
 
 

@@ -13,9 +13,10 @@ import xarray as xr
 from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.engine import engine_for
 from roughvisc.study.case import Case
-from roughvisc.study.estimate import March, Stopwatch, march_of, memory
+from roughvisc.study.estimate import March, Stopwatch, march_of, memory, solved_on, windows, work
 from roughvisc.study.ladder import Setting, changed, shape_of
 from roughvisc.study.run import compute, unconverged
+from roughvisc.study.scene import Ground, follows
 from roughvisc.study.store import open_result, write_result
 
 Report = Callable[[str, float, float], None]
@@ -85,7 +86,12 @@ class Bench:
         self._path, self._report = folder / "run.nc", report
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
-        self._convolution = Stopwatch().seconds(height, case.settings.solve.boundary)
+        solve = case.settings.solve
+        self._convolution = Stopwatch().seconds(height, solve.boundary)
+        self._window = 1.0  # what a convolution costs over one of the whole domain
+        if follows(solve.boundary, solve.edge, "fast"):
+            part = solved_on(windows(Ground(height, "absent", follow=True)), self._found.level)
+            self._window = work(part * height.size) / work(height.size)
         self._calibration = 1.0
 
     @property
@@ -107,7 +113,7 @@ class Bench:
         if setting.method == "seed":
             convolutions = steps**2 / 2 + steps * each * _SEED_SOLVE
         else:
-            convolutions = steps * each * cells**0.15
+            convolutions = steps * each * cells**0.15 * self._window
         return _ONCE + _STEP * steps + convolutions * self._convolution * cells * self._calibration
 
     def run(self, setting: Setting) -> Run:

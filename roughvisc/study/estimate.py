@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,7 +171,7 @@ class Stopwatch:
         alike = [grid for grid in self._found if grid[1] == boundary]
         if self._left <= 0 and alike:  # as N log N from the grid nearest in size
             nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
-            return self._found[nearest] * _work(height.size) / _work(math.prod(nearest[0]))
+            return self._found[nearest] * work(height.size) / work(math.prod(nearest[0]))
         cells = height.size
         if cells > _TIMED:
             height = coarse(height, math.isqrt(_TIMED))
@@ -190,16 +191,33 @@ class Stopwatch:
             if now - began > min(0.5, self._left) or gap.max() == 0:
                 break
         self._left -= time.perf_counter() - began
-        return seconds * _work(cells) / _work(height.size)
+        return seconds * work(cells) / work(height.size)
 
 
-def _work(cells: float) -> float:
+def windows(ground: Ground) -> tuple[tuple[float, float], ...]:
+    """Windows that follow a contact on a surface, from the present one to the largest, which the ground is left with.
+
+    The least gap beyond each [m], and the part of the cells that it takes.
+    """
+    found = []
+    while not ground.window.whole:
+        found.append((ground.window.outside, math.prod(ground.window.shape) / ground.gap.size))
+        ground.widen()
+    return tuple(found)
+
+
+def solved_on(windows: Iterable[tuple[float, float]], level: float) -> float:
+    """Part of the cells that are solved on where the approach comes to a level. [m]"""
+    return next((part for outside, part in windows if outside > level), 1.0)
+
+
+def work(cells: float) -> float:
     return cells * math.log2(cells + 2)
 
 
 def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0) -> float:
     """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
-    convolution *= _work(window * cells) / _work(cells)
+    convolution *= work(window * cells) / work(cells)
     modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
     stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9

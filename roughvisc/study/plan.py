@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -18,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.engine import Engine, engine_for
 from roughvisc.mechanics.memory import Modes
 from roughvisc.study.case import Case, read_cases
-from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, wall_time
+from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, solved_on, wall_time, windows
 from roughvisc.study.notes import left_out
 from roughvisc.study.results import parameters_of
 from roughvisc.study.run import result_folder
@@ -57,20 +56,12 @@ _COLUMNS = {
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, or why it cannot be had.
-
-    ``windows`` are those that follow a contact on it, from small to large: the least gap beyond each [m], and the part
-    of the cells that it takes.
-    """
+    """A surface's height and its :func:`windows`, or why it cannot be had."""
 
     height: xr.DataArray | None
     grows: bool
     problem: str
     windows: tuple[tuple[float, float], ...] = ()
-
-    def solved_on(self, level: float) -> float:
-        """Part of the cells that are solved on where the approach comes to a level. [m]"""
-        return next((part for outside, part in self.windows if outside > level), 1.0)
 
 
 def plan(
@@ -181,11 +172,7 @@ def _surface(case: Case) -> _Surface:
         ground = Ground(height, case.settings.surface.missing, follow=True)
     except InputError as error:
         return _Surface(None, False, str(error))
-    windows = []
-    while not ground.window.whole:
-        windows.append((ground.window.outside, math.prod(ground.window.shape) / height.size))
-        ground.widen()
-    return _Surface(height, ground.can_grow(), "", tuple(windows))
+    return _Surface(height, ground.can_grow(), "", windows(ground))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -245,7 +232,7 @@ def _row(
     if found is None or problem:
         return row
     cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
-    part = surface.solved_on(found.level) if window else 1.0
+    part = solved_on(surface.windows, found.level) if window else 1.0
     return row | {
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,

@@ -63,7 +63,8 @@ class Ground:
         self.present: NDArray[np.bool_] = np.isfinite(values)
         _check_missing(self.height, self.present, self._missing)
         #: Undeformed gap at first touch, zero at absent cells. [m]
-        self.gap = np.where(self.present, np.max(values[self.present]) - values, 0.0)
+        self.gap = np.nanmax(values) - values
+        self.gap[~self.present] = 0.0
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
         self.spacing = (_side(self.height, "x"), _side(self.height, "y"))
