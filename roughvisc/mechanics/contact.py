@@ -14,6 +14,7 @@ The method is that of constrained conjugate gradients on an evolving contact are
 3. Every step descends, and a projected-gradient step is taken wherever progress stalls (a spacer step), so that
    convergence is proven. No normal run needs it.
 4. Stopped on the duality gap, a bound on the error that costs nothing, not on the stagnation of the pressure.
+5. Without a first guess, a sparse contact is found on every eighth cell first.
 
 .. [1] I. A. Polonsky, L. M. Keer, Wear 231 (1999) 206.
 """
