@@ -1,5 +1,6 @@
 """Records on the disk: what is read is what was written, bit for bit, or it is said to be damaged."""
 
+import errno
 import io
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roughvisc.study.records import Damaged, read_record, write_record
+from roughvisc.study import records
+from roughvisc.study.records import Damaged, RowFile, read_record, write_record
 
 
 def field(share, seed, shape=(37, 41)):
@@ -49,3 +51,44 @@ def test_record__that_is_torn_or_changed_is_damaged(share):
     for bad in (whole[: size - 1], whole[:10], whole[:-9] + b"\x01" + whole[-8:], b"xxxx" + whole[4:]):
         with pytest.raises(Damaged):
             read_record(io.BytesIO(bad))
+
+
+def test_waiting_rows__are_weighed_once_each(tmp_path):
+    """A run may keep any number of rows without fields between two checkpoints."""
+    weighed = 0
+
+    class Fields(dict):
+        def values(self):
+            nonlocal weighed
+            weighed += 1
+            return super().values()
+
+    rows = RowFile(tmp_path / "rows", lambda: None)
+    for number in range(50):
+        rows.append({"row": number}, Fields())
+    assert weighed == 50
+    rows.close()
+
+
+def test_waiting_rows__that_do_not_fit_wait_on(tmp_path, monkeypatch):
+    written = []
+
+    def write(stream, plain, arrays):
+        if plain["row"] == 2 and len(written) == 2:
+            written.append("full")
+            raise OSError(errno.ENOSPC, "No space left on device")
+        written.append(plain["row"])
+        return write_record(stream, plain, arrays)
+
+    monkeypatch.setattr(records, "write_record", write)
+    rows = RowFile(tmp_path / "rows", lambda: None)
+    fields = [{"p": field(1.0, number)} for number in range(4)]
+    for number, arrays in enumerate(fields):
+        rows.append({"row": number}, arrays)
+    with pytest.raises(OSError, match="No space left"):
+        rows.sync()
+    rows.sync()
+    assert written == [0, 1, "full", 2, 3]
+    for number, arrays in enumerate(fields):
+        assert rows.arrays(number, "p")["p"].tobytes() == arrays["p"].tobytes()
+    rows.close()

@@ -111,7 +111,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     approach = max(
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
-    difference = float(np.sum(np.abs(trial.instant.pressure - state.extrapolated(trial.length)[0])))
+    difference = float(np.sum(np.abs(trial.instant.pressure - state.extrapolated(trial.length))))
     pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
     ratio = trial.length / last
     if segment.control == "load":

@@ -164,21 +164,33 @@ class State:
     iterations: int = 0
     convolutions: int = 0
 
-    def extrapolated(self, length: float, scale: float = 1.0) -> tuple[Array, Array | None]:
-        """Pressure a step ahead by the last two, the last one where there is no other, and its unit displacement.
+    def extrapolated(self, length: float) -> Array:
+        """Pressure a step ahead by the last two, cut at zero; the last one where there is no other. [Pa]"""
+        if self.before is None or length == 0:
+            return self.now.pressure
+        ahead = _beyond(self.before.pressure, self.now.pressure, self._ratio(length), 1.0)
+        return np.maximum(ahead, 0, out=ahead)
 
-        Both are scaled. The latter is None where it would cost a convolution: where pressure is cut at zero.
+    def first_guess(self, length: float, scale: float) -> tuple[Array, Array | None]:
+        """The extrapolated pressure and its unit displacement, both scaled, in memory of their own.
+
+        The latter is None where it would cost a convolution: where pressure is cut at zero.
         """
         now, before = self.now, self.before
         if before is None or length == 0:
             return now.pressure * scale, None if now.unit_displacement is None else now.unit_displacement * scale
-        ratio = length / (now.time - before.time)
+        ratio = self._ratio(length)
         pressure = _beyond(before.pressure, now.pressure, ratio, scale)
         if np.min(pressure) < 0:
             return np.maximum(pressure, 0, out=pressure), None
         if now.unit_displacement is None or before.unit_displacement is None:
             return pressure, None
         return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale)
+
+    def _ratio(self, length: float) -> float:
+        """Of a step's length to that of the last one."""
+        assert self.before is not None
+        return length / (self.now.time - self.before.time)
 
 
 def _beyond(before: Array, now: Array, ratio: float, scale: float) -> Array:

@@ -116,7 +116,7 @@ def _attempt(
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
-    start, start_displacement = state.extrapolated(length, alpha)
+    start, start_displacement = state.first_guess(length, alpha)
     contact = solve_contact(
         scene.halfspace,
         gap,

@@ -175,13 +175,15 @@ class RowFile:
         self.plain: list[dict[str, Any]] = []
         self._begins = [0]  # of the rows in the file, and where the next is to begin
         self._waiting: list[Mapping[str, Array]] = []
+        self._weight = 0  # of those that wait [bytes]
         self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Take up a row, whose arrays are not changed any more."""
         self.plain.append(plain)
         self._waiting.append(arrays)
-        if sum(array.nbytes for row in self._waiting for array in row.values()) > _WAITING:
+        self._weight += sum(array.nbytes for array in arrays.values())
+        if self._weight > _WAITING:
             self._write()
 
     def keep_first(self, rows: int) -> bool:
@@ -196,7 +198,8 @@ class RowFile:
             return False
         self._check()
         self._stream.truncate(begins[-1])
-        self.plain, self._begins, self._waiting = plain, begins, []
+        self.plain, self._begins = plain, begins
+        self._waiting, self._weight = [], 0
         return True
 
     def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
@@ -224,13 +227,17 @@ class RowFile:
 
     def _write(self) -> None:
         """Write the rows that wait; on a full disk those that do not fit wait on."""
-        while self._waiting:
-            written = len(self._begins) - 1
-            self._check()
-            self._stream.seek(self._begins[-1])
-            size = write_record(self._stream, self.plain[written], self._waiting[0])
-            self._begins.append(self._begins[-1] + size)
-            del self._waiting[0]
+        first = len(self._begins) - 1
+        try:
+            if self._waiting:
+                self._check()
+            for row, arrays in enumerate(self._waiting, first):
+                self._stream.seek(self._begins[-1])
+                size = write_record(self._stream, self.plain[row], arrays)
+                self._begins.append(self._begins[-1] + size)
+        finally:
+            del self._waiting[: len(self._begins) - 1 - first]
+            self._weight = sum(array.nbytes for arrays in self._waiting for array in arrays.values())
 
 
 def _frames(whole: tuple[int, ...], frame: Frame) -> Any:
