@@ -10,6 +10,7 @@ from roughvisc import closed_forms
 from roughvisc.mechanics import halfspace
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.study import scene
+from roughvisc.study.records import RowsInMemory
 from roughvisc.study.scene import kept_times
 from roughvisc.variables import FIELDS, VARIABLES, annotate
 
@@ -321,3 +322,20 @@ def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on
     with pytest.raises(rv.InputError, match="expected at most 1e\\+100 N"):
         simulate(two_hills(), program=rv.Program().load(1e200, over=0))
     assert not solved_on
+
+
+@pytest.mark.parametrize("size", [1.2e-3, 0.3e-3], ids=["window", "whole"])
+def test_kept_rows__hold_nothing_but_what_they_keep(size, monkeypatch):
+    """A field that is a part of a larger array would keep all of that in memory."""
+    kept = []
+    append = RowsInMemory.append
+
+    def appended(self, plain, arrays):
+        kept.extend(arrays.values())
+        append(self, plain, arrays)
+
+    monkeypatch.setattr(RowsInMemory, "append", appended)
+    ball = rv.sphere(1e-3, size=size, shape=(101, 97))
+    simulate(ball, ZENER, rv.Program().load(1e-4, over=0).hold(1.0), times=3, fields=FIELDS)
+    assert kept
+    assert all(array.base is None for array in kept)

@@ -90,7 +90,7 @@ class Rows:
             "mean_gap": mean_gap,
         }
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
-        self._store.append({"row": row, "grid": grid}, arrays)
+        self._store.append({"row": row, "grid": grid}, _of_their_own(arrays))
 
     def dataset(self, scene: Scene, method: str) -> xr.Dataset:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
@@ -184,6 +184,15 @@ class Rows:
         else:
             meaning = "converged"
         return STATUS_MEANINGS.index(meaning)
+
+
+def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
+    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
+    own: dict[int, Array] = {}
+    for array in arrays.values():
+        if id(array) not in own:
+            own[id(array)] = array if array.base is None else array.copy()
+    return {name: own[id(array)] for name, array in arrays.items()}
 
 
 def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
