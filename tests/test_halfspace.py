@@ -73,3 +73,25 @@ def test_displacement__does_not_depend_on_threads():
 def test_boundary__is_named_when_unknown():
     with pytest.raises(InputError, match=r"boundary is 'open': expected 'free' or 'periodic'"):
         HalfSpace((4, 4), (1.0, 1.0), "open")
+
+
+def unfolded(corner):
+    return np.block([[corner[::-1, ::-1], corner[::-1]], [corner[:, ::-1], corner]])
+
+
+@pytest.mark.parametrize("shape", GRIDS)
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
+    corner = np.random.default_rng(3).random(shape)
+    quarter = HalfSpace(shape, (1.3, 0.7), boundary, mirrored=True)
+    surface = HalfSpace(quarter.surface_shape, (1.3, 0.7), boundary)
+    assert surface.shape == (2 * shape[0], 2 * shape[1])
+    assert quarter.cell_area == 4 * surface.cell_area
+    for operator, precision in (("displacement", 1e-13), ("approximate_inverse", 1e-5)):
+        kind = np.float64 if operator == "displacement" else np.float32
+        expected = getattr(surface, operator)(unfolded(corner).astype(kind))
+        found = getattr(quarter, operator)(corner.astype(kind))
+        assert found.dtype == kind
+        np.testing.assert_allclose(unfolded(found), expected, rtol=0, atol=precision * np.abs(expected).max())
+    if max(shape) > 1:  # of one cell and its images nothing is periodic
+        assert quarter.largest_influence == pytest.approx(surface.largest_influence, rel=1e-12)

@@ -245,9 +245,9 @@ def solved_on(monkeypatch):
     shapes = []
     begin = HalfSpace.__init__
 
-    def noted(self, shape, *rest):
+    def noted(self, shape, *rest, **named):
         shapes.append(shape)
-        begin(self, shape, *rest)
+        begin(self, shape, *rest, **named)
 
     monkeypatch.setattr(HalfSpace, "__init__", noted)
     return shapes

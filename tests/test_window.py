@@ -67,3 +67,36 @@ def test_whole_domain__leaves_nothing_out():
     window = whole_domain((5, 7))
     assert window.whole
     assert np.zeros((5, 7))[window.cells].shape == (5, 7)
+
+
+@given(extent=st.integers(1, 200), curved=st.floats(0.1, 10))
+def test_mirrored_window__holds_all_that_lies_lower_than_what_is_outside(extent, curved):
+    x, y = np.arange(65) + 0.5, np.arange(75) + 0.5
+    gap = np.abs(1e-3 * (x[:, None] ** 2 + curved * y**2) - 0.2)
+    gap -= gap.min()
+    window = window_around(gap, extent, mirrored=True)
+    beyond = np.ones(gap.shape, bool)
+    beyond[window.cells] = False
+    assert window.mirrored
+    assert window.first == (0, 0)
+    if window.whole:
+        assert math.isinf(window.outside)
+        return
+    assert window.outside == gap[beyond].min() > 0
+    assert gap[window.cells].min() == 0
+    assert all(m < n for m, n in zip(window.shape, gap.shape, strict=True))
+
+
+@pytest.mark.parametrize("spacing", [(1e-6, 1e-6), (2.0, 0.7)])
+@pytest.mark.parametrize("shape", [(11, 8), (21, 27), (1, 1)])
+def test_mirrored_reach__is_that_of_the_window_with_its_images(spacing, shape):
+    corner, domain = np.random.default_rng(0).random(shape), (21, 27)
+    pressure = np.block([[corner[::-1, ::-1], corner[::-1]], [corner[:, ::-1], corner]])
+    first = (domain[0] - shape[0], domain[1] - shape[1])
+    expected = HalfSpace((42, 54), spacing).displacement(padded(pressure, (42, 54), first))
+    window = Window(domain, (0, 0), shape, mirrored=True)
+    found = np.concatenate([rows for _, rows in Reach(window, spacing).rows(corner)])
+    np.testing.assert_allclose(found, expected[21:, 27:], rtol=1e-12)
+    quick = np.concatenate([rows for _, rows in Reach(window, spacing, single=True).rows(1e-300 * corner)])
+    np.testing.assert_allclose(1e300 * quick, expected[21:, 27:], rtol=0, atol=1e-6 * expected.max())
+    assert np.sum(corner * mean_influence(window, spacing)) == pytest.approx(np.mean(expected), rel=1e-12)

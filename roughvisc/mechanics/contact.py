@@ -140,7 +140,7 @@ def _guessed(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
         return None
     few = gap[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE]
     spacing = (_STRIDE * halfspace.spacing[0], _STRIDE * halfspace.spacing[1])
-    coarse = HalfSpace((few.shape[0], few.shape[1]), spacing, halfspace.boundary)
+    coarse = HalfSpace((few.shape[0], few.shape[1]), spacing, halfspace.boundary, mirrored=halfspace.mirrored)
     found = solve_contact(coarse, few, load=load / _STRIDE**2, tolerance=0.03).pressure
     if np.count_nonzero(found) > _SPARSE * found.size:
         return None

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.kernel import free_space_symbol, periodic_symbol
+from roughvisc.mechanics.transforms import transforms
 
 Array = NDArray[np.float64]
 Boundary = Literal["free", "periodic"]
@@ -43,6 +43,9 @@ class HalfSpace:
     workers : int, optional
         Threads of the transforms on large grids; None: as ``scipy.fft.set_workers`` has it, one where nobody has
         set it. Smaller grids are slower with several, and get one.
+    mirrored : bool
+        Whether the cells are a quarter of the surface: beyond the first row and the first column their mirror images
+        carry the same pressure. All of it is displaced by all of them.
     """
 
     def __init__(
@@ -51,25 +54,32 @@ class HalfSpace:
         spacing: tuple[float, float],
         boundary: Boundary = "free",
         workers: int | None = None,
+        *,
+        mirrored: bool = False,
     ) -> None:
         if boundary not in ("free", "periodic"):
             raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
         self.shape = shape
         self.spacing = spacing
         self.boundary = boundary
+        self.mirrored = mirrored
         self.workers = workers if shape[0] * shape[1] >= _THREADED else 1
+        self._transforms = transforms(mirrored)
+        #: Number of cells of the surface, mirror images included.
+        self.surface_shape = (self._transforms.images * shape[0], self._transforms.images * shape[1])
         if boundary == "free":
-            self._padded = tuple(2 * fft.next_fast_len(n, real=True) for n in shape)
-            symbol = free_space_symbol((self._padded[0], self._padded[1]), spacing)
+            padded = [2 * fft.next_fast_len(n, real=True) for n in self.surface_shape]
+            symbol = free_space_symbol((padded[0], padded[1]), spacing)
+            self._points = (padded[0] // self._transforms.images, padded[1] // self._transforms.images)
         else:
-            self._padded = shape
-            symbol = periodic_symbol(shape, spacing)
-        self._symbol = _both_signs(symbol, self._padded[0])
+            symbol = periodic_symbol(self.surface_shape, spacing)
+            self._points = shape
+        self._symbol = self._transforms.arranged(symbol, self._points)
 
     @property
     def cell_area(self) -> float:
-        """Area of one cell. [m2]"""
-        return self.spacing[0] * self.spacing[1]
+        """Area that one cell stands for, its mirror images included. [m2]"""
+        return self._transforms.images**2 * self.spacing[0] * self.spacing[1]
 
     @cached_property
     def largest_influence(self) -> float:
@@ -98,31 +108,32 @@ class HalfSpace:
         """
         if self.boundary == "periodic":
             return self._filtered(pressure, self._symbol)
-        (nx, ny), my = self.shape, self._padded[1]
+        along, (nx, ny), my = self._transforms, self.shape, self._points[1]
         # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
         # columns go forward, are multiplied and come back while they stay in the cache.
         spectrum, room = self._working_memory
         for rows in _blocks(nx, _ROWS):
-            spectrum[rows] = fft.rfft(pressure[rows], n=my, axis=1, workers=self.workers)
-        for block in _blocks(my // 2 + 1, room.shape[1]):
+            spectrum[rows] = along.of_rows(pressure[rows], n=my, axis=1, workers=self.workers)
+        for block in _blocks(spectrum.shape[1], room.shape[1]):
             columns = room[:, : block.stop - block.start]
             columns[:nx] = spectrum[:, block]
             columns[nx:] = 0
-            columns = fft.fft(columns, axis=0, overwrite_x=True, workers=self.workers)
+            columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=self.workers)
             columns *= self._symbol[:, block]
-            columns = fft.ifft(columns, axis=0, overwrite_x=True, workers=self.workers)
+            columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=self.workers)
             spectrum[:, block] = columns[:nx]
         displacement = np.empty(self.shape)
         for rows in _blocks(nx, _ROWS):
-            displacement[rows] = fft.irfft(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
+            displacement[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
         return displacement
 
     @cached_property
-    def _working_memory(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    def _working_memory(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Transforms along y, and some columns of their transforms: taken anew each time, half of it is page faults."""
-        mx, count = self._padded[0], self._padded[1] // 2 + 1
+        mx, count = self._points[0], self._transforms.width(self._points[1])
         together = min(max(_POINTS // mx, _COLUMNS), count)
-        return np.empty((self.shape[0], count), complex), np.empty((mx, together), complex)
+        kind = complex if self._transforms.is_complex else float
+        return np.empty((self.shape[0], count), kind), np.empty((mx, together), kind)
 
     def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
@@ -146,25 +157,15 @@ class HalfSpace:
 
     @cached_property
     def _inverse_symbol(self) -> NDArray[np.float32]:
-        symbol = periodic_symbol(self.shape, self.spacing)
+        symbol = periodic_symbol(self.surface_shape, self.spacing)
         symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or self.spacing[0]
-        return _both_signs(1 / symbol, self.shape[0]).astype(np.float32)
+        return self._transforms.arranged(1 / symbol, self.shape).astype(np.float32)
 
     def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
-        field_q = fft.rfft2(field, workers=self.workers)
+        field_q = self._transforms.of_field(field, workers=self.workers)
         field_q *= symbol
-        return fft.irfft2(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+        return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
 
 
 def _blocks(length: int, size: int) -> Iterator[slice]:
     return (slice(first, min(first + size, length)) for first in range(0, length, size))
-
-
-def transform_engine() -> str:
-    """What the last digits depend on: results are equal to the last bit only where this is the same."""
-    return f"scipy.fft {scipy.__version__}, numpy {np.__version__}"
-
-
-def _both_signs(symbol: Array, length: int) -> Array:
-    """Symbol for all wave numbers along x, positive then negative, as ``scipy.fft`` orders them."""
-    return np.concatenate([symbol, symbol[1 : length - length // 2][::-1]])

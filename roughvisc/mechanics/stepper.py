@@ -235,12 +235,13 @@ def at_edge(scene: Scene, pressure: Array) -> bool:
     """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
     if scene.halfspace.boundary != "free" or scene.accept_edge:
         return False
-    return any(bool(np.any(side > 0)) for side in (pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]))
+    borders = (-1,) if scene.halfspace.mirrored else (0, -1)
+    return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
 
 
 def edge_error(scene: Scene, time: float) -> EdgeContactError:
     """The error to raise where the grid cannot grow."""
-    nx, ny = scene.halfspace.shape
+    nx, ny = scene.halfspace.surface_shape
     return EdgeContactError(
         f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
         "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.mechanics.kernel import love_kernel, rectangle_displacement
+from roughvisc.mechanics.kernel import free_space_symbol, love_kernel, rectangle_displacement
+from roughvisc.mechanics.transforms import transforms
 
 Array = NDArray[np.float64]
 
@@ -37,12 +39,15 @@ class Window:
         Cell of the domain at which the window begins, and its number of cells.
     outside : float
         Least undeformed gap beyond the window; infinite where the window is the whole domain. [m]
+    mirrored : bool
+        Whether the domain is a quarter of a surface that is its own mirror image beyond the first row and column.
     """
 
     domain: tuple[int, int]
     first: tuple[int, int]
     shape: tuple[int, int]
     outside: float = math.inf
+    mirrored: bool = False
 
     @property
     def whole(self) -> bool:
@@ -56,12 +61,12 @@ class Window:
         return slice(i, i + nx), slice(j, j + ny)
 
 
-def whole_domain(shape: tuple[int, int]) -> Window:
+def whole_domain(shape: tuple[int, int], mirrored: bool = False) -> Window:
     """The window that leaves nothing out."""
-    return Window(shape, (0, 0), shape)
+    return Window(shape, (0, 0), shape, mirrored=mirrored)
 
 
-def window_around(gap: Array, extent: int) -> Window:
+def window_around(gap: Array, extent: int, mirrored: bool = False) -> Window:
     """The window around what lies lowest, about so many cells wide.
 
     Parameters
@@ -70,38 +75,42 @@ def window_around(gap: Array, extent: int) -> Window:
         Undeformed gap of the domain. [m]
     extent : int
         Longest side, in cells: as much of what lies low is taken as fits, at least what lies lowest.
+    mirrored : bool
+        Whether the gap goes on as its mirror image beyond the first row and column: then so does the window.
 
     Returns
     -------
     Window
-        With sides that transform well, nowhere at the border of the domain and not most of it: the whole of it
+        With sides that transform well, nowhere at the domain's border and not most of it: the whole of it
         otherwise.
     """
     lowest = [np.min(gap, axis=1), np.min(gap, axis=0)]  # of each row and column
     levels = np.unique(np.concatenate(lowest))
+    images = 2 if mirrored else 1
 
     def box(level: float) -> list[tuple[int, int]]:
         inside = [np.flatnonzero(side <= level) for side in lowest]
-        return [(int(cells[0]), int(cells[-1]) + 1) for cells in inside]
+        return [(0 if mirrored else int(cells[0]), int(cells[-1]) + 1) for cells in inside]
 
     fits, too_large = 0, len(levels)
     while too_large - fits > 1:
         middle = (fits + too_large) // 2
-        inside = max(last - first for first, last in box(float(levels[middle]))) <= extent
+        inside = images * max(last - first for first, last in box(float(levels[middle]))) <= extent
         fits, too_large = (middle, too_large) if inside else (fits, middle)
     sides = []
     for (first, last), cells in zip(box(float(levels[fits])), gap.shape, strict=True):
-        length = fft.next_fast_len(max(last - first + 2 * _BORDER, _SMALLEST), real=True)
-        start = (first + last - length) // 2
-        if start <= 0 or start + length >= cells:
-            return whole_domain((gap.shape[0], gap.shape[1]))
+        smallest, border = (_SMALLEST // 2, _BORDER) if mirrored else (_SMALLEST, 2 * _BORDER)
+        length = fft.next_fast_len(max(last - first + border, smallest), real=True)
+        start = 0 if mirrored else (first + last - length) // 2
+        if (start <= 0 and not mirrored) or start + length >= cells:
+            return whole_domain((gap.shape[0], gap.shape[1]), mirrored)
         sides.append(slice(start, start + length))
     shape = (sides[0].stop - sides[0].start, sides[1].stop - sides[1].start)
     if shape[0] * shape[1] > _LARGEST * gap.size:
-        return whole_domain((gap.shape[0], gap.shape[1]))
+        return whole_domain((gap.shape[0], gap.shape[1]), mirrored)
     beyond = [np.delete(side, cells) for side, cells in zip(lowest, sides, strict=True)]
     outside = float(min(np.min(beyond[0]), np.min(beyond[1])))
-    return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside)
+    return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside, mirrored)
 
 
 def mean_influence(window: Window, spacing: tuple[float, float]) -> Array:
@@ -110,12 +119,14 @@ def mean_influence(window: Window, spacing: tuple[float, float]) -> Array:
     The kernel is symmetric: it is the displacement of that cell under uniform pressure on the domain, which is a
     rectangle and has a closed form.
     """
+    images, middle = (2, 0.0) if window.mirrored else (1, 0.5)
     centres = [
-        (np.arange(i, i + n) + 0.5) * side for i, n, side in zip(window.first, window.shape, spacing, strict=True)
+        (np.arange(i, i + m) + 0.5 - middle * n) * side
+        for i, m, n, side in zip(window.first, window.shape, window.domain, spacing, strict=True)
     ]
-    sides = (window.domain[0] * spacing[0], window.domain[1] * spacing[1])
+    sides = (images * window.domain[0] * spacing[0], images * window.domain[1] * spacing[1])
     count = window.domain[0] * window.domain[1]
-    return rectangle_displacement(centres[0][:, None] - sides[0] / 2, centres[1] - sides[1] / 2, sides) / count
+    return rectangle_displacement(centres[0][:, None], centres[1], sides) / count
 
 
 class Reach:
@@ -135,16 +146,29 @@ class Reach:
         self._window = window
         self._type = np.float32 if single else np.float64
         self._scale = max(spacing)  # the range of single precision is small
-        lengths = [n + m - 1 for n, m in zip(window.domain, window.shape, strict=True)]
-        self._padded = [fft.next_fast_len(n, real=True) for n in lengths]
+        self._transforms = transforms(window.mirrored)
+        symbol = self._mirrored_symbol(spacing) if window.mirrored else self._general_symbol(spacing)
+        self._points, self._symbol = symbol
+
+    def _general_symbol(self, spacing: tuple[float, float]) -> tuple[tuple[int, int], NDArray[Any]]:
+        """Points of the transforms, and the kernel's."""
+        window = self._window
+        mx, my = (fft.next_fast_len(n + m - 1, real=True) for n, m in zip(window.domain, window.shape, strict=True))
         # signed distance from a cell of the window to one of the domain, wrapped around where the sum is negative
         distances = []
-        for first, m, n, length in zip(window.first, window.shape, window.domain, self._padded, strict=True):
+        for first, m, n, length in zip(window.first, window.shape, window.domain, (mx, my), strict=True):
             steps = np.arange(length)
             steps[steps >= n] -= length  # from n - 1 down to 1 - m; what lies between is never read
             distances.append(np.abs(np.clip(steps, 1 - m, n - 1) - first))
         quadrant = love_kernel((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
-        self._symbol = fft.rfft2((quadrant[np.ix_(*distances)] / self._scale).astype(self._type))
+        return (mx, my), fft.rfft2((quadrant[np.ix_(*distances)] / self._scale).astype(self._type))
+
+    def _mirrored_symbol(self, spacing: tuple[float, float]) -> tuple[tuple[int, int], NDArray[Any]]:
+        """The same for a window in the middle of a surface."""
+        window = self._window
+        mx, my = (fft.next_fast_len(n + m, real=True) for n, m in zip(window.domain, window.shape, strict=True))
+        symbol = free_space_symbol((2 * mx, 2 * my), spacing) / self._scale
+        return (mx, my), self._transforms.arranged(symbol, (mx, my)).astype(self._type)
 
     def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:
         """Displacement of the domain under a pressure in the window over the contact modulus, some rows at a time. [m]
@@ -155,17 +179,17 @@ class Reach:
         spread = self.spread((pressure / largest).astype(self._type))
         for start in range(0, len(spread), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            along_y = fft.irfft(spread[rows], n=self._padded[1], axis=1, overwrite_x=True)
+            along_y = self._transforms.rows_back(spread[rows], n=self._points[1], axis=1, overwrite_x=True)
             yield rows, np.multiply(along_y[:, : self._window.domain[1]], largest * self._scale, dtype=float)
 
     def spread(self, pressure: NDArray) -> NDArray:
         """The displacement as its transform along y."""
-        nx, (mx, my) = self._window.domain[0], self._padded
-        along_y = fft.rfft(pressure, n=my, axis=1)
+        nx, (mx, my) = self._window.domain[0], self._points
+        along_y = self._transforms.of_rows(pressure, n=my, axis=1)
         spread = np.empty((nx, along_y.shape[1]), along_y.dtype)
         for start in range(0, along_y.shape[1], _BLOCK):
             block = slice(start, start + _BLOCK)
-            columns = fft.fft(along_y[:, block], n=mx, axis=0)
+            columns = self._transforms.of_columns(along_y[:, block], n=mx, axis=0)
             columns *= self._symbol[:, block]
-            spread[:, block] = fft.ifft(columns, axis=0, overwrite_x=True)[:nx]
+            spread[:, block] = self._transforms.columns_back(columns, axis=0, overwrite_x=True)[:nx]
         return spread

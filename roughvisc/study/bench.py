@@ -88,10 +88,9 @@ class Bench:
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         solve = case.settings.solve
         self._convolution = Stopwatch().seconds(height, solve.boundary)
-        self._window = 1.0  # what a convolution costs over one of the whole domain
-        if follows(solve.boundary, solve.edge, "fast"):
-            part = solved_on(windows(Ground(height, "absent", follow=True)), self._found.level)
-            self._window = work(part * height.size) / work(height.size)
+        ground = Ground(height, "absent", follow=follows(solve.boundary, solve.edge, "fast"), mirror=True)
+        part = solved_on(windows(ground), self._found.level)
+        self._part = work(part * height.size) / work(height.size)  # what a convolution costs over one of all cells
         self._calibration = 1.0
 
     @property
@@ -113,7 +112,7 @@ class Bench:
         if setting.method == "seed":
             convolutions = steps**2 / 2 + steps * each * _SEED_SOLVE
         else:
-            convolutions = steps * each * cells**0.15 * self._window
+            convolutions = steps * each * cells**0.15 * self._part
         return _ONCE + _STEP * steps + convolutions * self._convolution * cells * self._calibration
 
     def run(self, setting: Setting) -> Run:

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace import transform_engine
 from roughvisc.mechanics.history import Block, HistoryState
 from roughvisc.mechanics.memory import ModesState
 from roughvisc.mechanics.scene import Instant, State, Step
+from roughvisc.mechanics.transforms import transform_engine
 from roughvisc.study.identity import NUMERICS_REVISION
 from roughvisc.study.records import Damaged, RowFile, read_record, write_record
 from roughvisc.study.store import whole_file

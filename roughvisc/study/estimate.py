@@ -195,20 +195,24 @@ class Stopwatch:
 
 
 def windows(ground: Ground) -> tuple[tuple[float, float], ...]:
-    """Windows that follow a contact on a surface, from the present one to the largest, which the ground is left with.
+    """Windows that follow a contact on a surface, from the present one to the whole domain, which is the ground's then.
 
-    The least gap beyond each [m], and the part of the cells that it takes.
+    The least gap beyond each [m], and the part of the surface's cells that it takes.
     """
-    found = []
+
+    def present() -> tuple[float, float]:
+        return ground.window.outside, math.prod(ground.window.shape) / ground.height.size
+
+    found = [present()]
     while not ground.window.whole:
-        found.append((ground.window.outside, math.prod(ground.window.shape) / ground.gap.size))
         ground.widen()
+        found.append(present())
     return tuple(found)
 
 
 def solved_on(windows: Iterable[tuple[float, float]], level: float) -> float:
-    """Part of the cells that are solved on where the approach comes to a level. [m]"""
-    return next((part for outside, part in windows if outside > level), 1.0)
+    """Part of the surface's cells that are solved on where the approach comes to a level. [m]"""
+    return next(part for outside, part in windows if outside > level)
 
 
 def work(cells: float) -> float:

@@ -25,7 +25,13 @@ _AT_ONCE = 0.1
 
 
 def left_out(
-    engine: Engine, boundary: str, method: str, fields: Sequence[str], every_step: bool, window: bool = False
+    engine: Engine,
+    boundary: str,
+    method: str,
+    fields: Sequence[str],
+    every_step: bool,
+    window: bool = False,
+    mirrored: bool = False,
 ) -> str:
     """What nothing asks for, and is therefore not modelled, computed or kept."""
     out = []
@@ -37,6 +43,8 @@ def left_out(
         out.append("padding")
     if window:
         out.append("what lies too deep to be touched")
+    if mirrored:
+        out.append("three quarters of the surface (they are its mirror images)")
     absent = [name for name in FIELDS if name not in fields]
     if absent:
         out.append(f"{' and '.join(absent)} in the file")

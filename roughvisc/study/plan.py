@@ -62,6 +62,7 @@ class _Surface:
     grows: bool
     problem: str
     windows: tuple[tuple[float, float], ...] = ()
+    mirrored: bool = False
 
 
 def plan(
@@ -169,10 +170,10 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        ground = Ground(height, case.settings.surface.missing, follow=True)
+        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True)
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "", windows(ground))
+    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored)
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -219,7 +220,8 @@ def _row(
     if surface is None or surface.height is None:
         return row
     height, grows = surface.height, surface.grows and free and solve.edge == "error"
-    window = bool(surface.windows) and follows(solve.boundary, solve.edge, solve.method)
+    window = len(surface.windows) > 1 and follows(solve.boundary, solve.edge, solve.method)
+    mirrored = surface.mirrored and solve.method == "fast"
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
         engine = engines.of(case, grows or window)
@@ -227,12 +229,12 @@ def _row(
         return row | {"refusal": str(error)}
     exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     keep = case.settings.keep
-    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all", window)
+    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all", window, mirrored)
     row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
     cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
-    part = solved_on(surface.windows, found.level) if window else 1.0
+    part = solved_on(surface.windows[0 if window else -1 :], found.level) if window or mirrored else 1.0
     return row | {
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.scene import Scene, Step
 from roughvisc.mechanics.window import Reach, Window, mean_influence
+from roughvisc.study.mirror import quarter, unfold
 from roughvisc.study.records import RowStore
 from roughvisc.study.scene import Ground
 from roughvisc.variables import STATUS_MEANINGS, annotate
@@ -102,7 +103,7 @@ class Rows:
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         for name in self._fields:
-            frames = self._store.stacked(partial(self._frame, name), self._ground.window.domain)
+            frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)
         variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float))
         if "filled" in height.coords:
@@ -134,7 +135,7 @@ class Rows:
         if self._ground.present.all():
             mean_gap = self._mean_gap(self._window(index), source, grid["level"])
         else:
-            mean_gap = float(np.nanmean(self._frame("gap", index, np.zeros(self._ground.window.domain))))
+            mean_gap = float(np.nanmean(self._fill("gap", index, np.zeros(self._ground.window.domain))))
         return {"contact_fraction": row["contact_area"] / self._area(), "mean_gap": mean_gap}
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
@@ -142,7 +143,15 @@ class Rows:
         return self._ground.mean_gap + float(np.sum(source * self._mean_influence(window))) - level
 
     def _frame(self, name: str, index: int, out: Array) -> Array:
-        """A field of a row over the final domain, written to ``out``, which holds zeros."""
+        """A field of a row over the final surface, written to ``out``, which holds zeros."""
+        if self._ground.mirrored:
+            self._fill(name, index, out[quarter(out.shape)])
+            unfold(out)
+            return out
+        return self._fill(name, index, out)
+
+    def _fill(self, name: str, index: int, out: Array) -> Array:
+        """The same over the domain."""
         window = self._window(index)
         if window.whole:
             out[...] = self._store.arrays(index, name)[name]
@@ -170,7 +179,7 @@ class Rows:
             gap[absent] = np.nan
 
     def _area(self) -> float:
-        """Of the domain. [m2]"""
+        """Of the surface. [m2]"""
         dx, dy = self._ground.spacing
         return dx * dy * self._ground.height.size
 
@@ -197,11 +206,10 @@ def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
 
 def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
     """Area by which counting cells is too large: a part of the perimeter's strip. [m2]"""
-    dx, dy = scene.halfspace.spacing
     faces_x = np.count_nonzero(contact[1:] != contact[:-1])
     faces_y = np.count_nonzero(contact[:, 1:] != contact[:, :-1])
-    if scene.halfspace.boundary == "periodic":
+    if scene.halfspace.boundary == "periodic" and not scene.halfspace.mirrored:
         faces_x += np.count_nonzero(contact[0] != contact[-1])
         faces_y += np.count_nonzero(contact[:, 0] != contact[:, -1])
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    return PERIMETER_CORRECTION * dx * dy * (faces_x + faces_y)
+    return PERIMETER_CORRECTION * scene.halfspace.cell_area * (faces_x + faces_y)

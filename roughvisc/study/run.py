@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
-from roughvisc.mechanics.halfspace import transform_engine
+from roughvisc.mechanics.transforms import transform_engine
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.checkpoint import Keeper
 from roughvisc.study.lock import held

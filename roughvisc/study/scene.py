@@ -19,6 +19,7 @@ from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
 from roughvisc.mechanics.scene import Scene
 from roughvisc.mechanics.window import Window, whole_domain, window_around
+from roughvisc.study.mirror import is_mirrored, quarter
 from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
 from roughvisc.topography.indenters import grown
@@ -45,40 +46,50 @@ class Ground:
         What missing heights mean.
     follow : bool
         Whether to begin with a small window, where all of the surface is present.
+    mirror : bool
+        Whether to solve on a quarter of a surface that is its own mirror image in x and in y.
     """
 
     def __init__(
-        self, height: xr.DataArray, missing: Literal["refuse", "absent"] = "refuse", *, follow: bool = False
+        self,
+        height: xr.DataArray,
+        missing: Literal["refuse", "absent"] = "refuse",
+        *,
+        follow: bool = False,
+        mirror: bool = False,
     ) -> None:
         self._missing = missing
         self.growths = 0
+        self.mirrored = mirror and is_mirrored(_checked(height).values)
         self._lay(height)
         self._extent = float(_FIRST_EXTENT)
         if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
-            self.window = window_around(self.gap, _FIRST_EXTENT)
+            self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
 
     def _lay(self, height: xr.DataArray) -> None:
         self.height = _checked(height)
-        values = self.height.values
+        _check_missing(self.height, np.isfinite(self.height.values), self._missing)
+        #: What is solved for: the surface, or the quarter of it at the end of both axes.
+        self.domain = self.height[quarter(self.height.shape)] if self.mirrored else self.height
+        values = self.domain.values
         self.present: NDArray[np.bool_] = np.isfinite(values)
-        _check_missing(self.height, self.present, self._missing)
-        #: Undeformed gap at first touch, zero at absent cells. [m]
+        #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
         self.gap = np.nanmax(values) - values
         self.gap[~self.present] = 0.0
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
         self.spacing = (_side(self.height, "x"), _side(self.height, "y"))
-        self.window = whole_domain((values.shape[0], values.shape[1]))
+        self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
 
     @property
     def corner(self) -> tuple[float, float]:
         """Centre of the window's first cell. [m]"""
         first = self.window.first
-        return float(self.height["x"].values[first[0]]), float(self.height["y"].values[first[1]])
+        return float(self.domain["x"].values[first[0]]), float(self.domain["y"].values[first[1]])
 
     def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
         """Half-space on the window's grid."""
-        return HalfSpace(self.window.shape, self.spacing, boundary, workers)
+        return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""
@@ -104,7 +115,7 @@ class Ground:
         before = self.window
         while self.window == before:
             self._extent *= GROWTH
-            self.window = window_around(self.gap, int(self._extent))
+            self.window = window_around(self.gap, int(self._extent), self.mirrored)
 
     def shown(self) -> dict[str, Any]:
         """What a scene takes from the surface."""
@@ -116,13 +127,12 @@ class Ground:
 
     def _cell(self, axis: str, position: float) -> int:
         """Index in the domain of the cell at a position. [m]"""
-        return int(np.searchsorted(self.height[axis].values, position))
+        return int(np.searchsorted(self.domain[axis].values, position))
 
     def window_at(self, corner: Sequence[float], shape: Sequence[int]) -> Window:
         """A window of the present domain that was solved on before: its first cell's centre and its shape."""
-        domain = (self.height.shape[0], self.height.shape[1])
         first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
-        return Window(domain, first, (shape[0], shape[1]))
+        return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
 def follows(boundary: str, edge: str, method: str) -> bool:
@@ -160,7 +170,7 @@ def prepare(
     check_times(program, time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
-    (nx, ny), (dx, dy) = ground.gap.shape, ground.spacing
+    (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
     _check_approach(program, boundary, ground.gap[ground.present])
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
@@ -191,11 +201,12 @@ def _foreseen(ground: Ground, program: Program, material: Material) -> float:
         return 0.0
     if segment.control == "approach":
         return value
-    stride = math.ceil(max(ground.gap.shape) / _FORESEEN_ON)
+    stride = math.ceil(max(ground.height.shape) / _FORESEEN_ON)
     gap = ground.gap[::stride, ::stride]
     dx, dy = (stride * side for side in ground.spacing)
-    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy))
-    return solve_contact(halfspace, gap, load=value * glassy / (dx * dy), tolerance=1e-2, max_iterations=50).approach
+    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=ground.mirrored)
+    load = value * glassy / halfspace.cell_area
+    return solve_contact(halfspace, gap, load=load, tolerance=1e-2, max_iterations=50).approach
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:

@@ -173,7 +173,7 @@ def _press(
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    ground = Ground(height, missing, follow=follows(boundary, edge, method))
+    ground = Ground(height, missing, follow=follows(boundary, edge, method), mirror=method == "fast")
     scene, engine = prepare(
         ground,
         material,
@@ -222,8 +222,8 @@ def _press(
         "series_error": engine.series_error,
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
-        "slope_note": slope_note(ground.height[ground.window.cells], boundary, float(dataset["approach"].max())),
-        "left_out": left_out(engine, boundary, method, fields, times is None, followed),
+        "slope_note": slope_note(ground.domain[ground.window.cells], boundary, float(dataset["approach"].max())),
+        "left_out": left_out(engine, boundary, method, fields, times is None, followed, ground.mirrored),
     }
     if described["slope_note"]:
         log.warning("%s", described["slope_note"])

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace import transform_engine
+from roughvisc.mechanics.transforms import transform_engine
 from roughvisc.study.bench import Bench, NotRun, Report
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.exact import QUANTITIES, ClosedForm, closed_form
