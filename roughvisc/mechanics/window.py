@@ -60,6 +60,14 @@ class Window:
         (i, j), (nx, ny) = self.first, self.shape
         return slice(i, i + nx), slice(j, j + ny)
 
+    @property
+    def surface_cells(self) -> tuple[slice, slice]:
+        """Index of its cells in the surface, with their mirror images where there are any."""
+        if not self.mirrored:
+            return self.cells
+        (nx, ny), (mx, my) = self.domain, self.shape
+        return slice(nx - mx, nx + mx), slice(ny - my, ny + my)
+
 
 def whole_domain(shape: tuple[int, int], mirrored: bool = False) -> Window:
     """The window that leaves nothing out."""

@@ -132,10 +132,13 @@ class Rows:
         if tuple(grid["domain"]) == self._ground.window.domain:
             return {}
         source = self._store.arrays(index, "source")["source"]
+        window = self._window(index)
         if self._ground.present.all():
-            mean_gap = self._mean_gap(self._window(index), source, grid["level"])
+            mean_gap = self._mean_gap(window, source, grid["level"])
         else:
-            mean_gap = float(np.nanmean(self._fill("gap", index, np.zeros(self._ground.window.domain))))
+            gap = np.empty(window.domain)
+            self._fill("gap", index, window, gap)
+            mean_gap = float(np.nanmean(gap))
         return {"contact_fraction": row["contact_area"] / self._area(), "mean_gap": mean_gap}
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
@@ -144,22 +147,24 @@ class Rows:
 
     def _frame(self, name: str, index: int, out: Array) -> Array:
         """A field of a row over the final surface, written to ``out``, which holds zeros."""
-        if self._ground.mirrored:
-            self._fill(name, index, out[quarter(out.shape)])
-            unfold(out)
-            return out
-        return self._fill(name, index, out)
-
-    def _fill(self, name: str, index: int, out: Array) -> Array:
-        """The same over the domain."""
         window = self._window(index)
+        touched = out[window.surface_cells] if name == "pressure" else out  # zeros that stay cost nothing
+        if self._ground.mirrored:
+            self._fill(name, index, window, touched[quarter(touched.shape)])
+            unfold(touched)
+        else:
+            self._fill(name, index, window, touched)
+        return out
+
+    def _fill(self, name: str, index: int, window: Window, out: Array) -> None:
+        """Write a field over the domain, the pressure over the window alone."""
         if window.whole:
             out[...] = self._store.arrays(index, name)[name]
-            return out
+            return
         arrays = self._store.arrays(index, "source_pressure", "source")
         if name == "pressure":
-            out[window.cells] = arrays["source_pressure"]
-            return out
+            out[...] = arrays["source_pressure"]
+            return
         for rows, displacement in self._reach(window).rows(arrays["source"]):
             if name == "displacement":
                 out[rows] = displacement
@@ -168,7 +173,6 @@ class Rows:
                 self._settle(out[rows], self._store.plain[index]["grid"]["level"], rows)
         if name == "gap":
             out[window.cells][arrays["source_pressure"] > 0] = 0.0
-        return out
 
     def _settle(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
         """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
