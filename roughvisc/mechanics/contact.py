@@ -179,7 +179,7 @@ class _Problem:
         gap /= self.length
         self.gap = gap
         self.convolutions = 0
-        self._scratch: NDArray[np.float32] | None = None
+        self.room = np.empty_like(gap)  # for what is needed in a part of an iteration
 
     def solve(self, start: Array | None, start_displacement: Array | None, max_iterations: int) -> ContactState:
         """Safeguarded, preconditioned conjugate gradients; see the module's notes.
@@ -192,14 +192,13 @@ class _Problem:
         extrapolated = displacement is not None
         if displacement is None:
             displacement = self.displacement(pressure)
-        before, curvature = displacement, 0.0  # of the last step, for conjugation
-        last_face, last_step = None, np.zeros(0)
-        total = np.empty_like(displacement)
+        change: Array | None = None  # of the displacement by the last step, and its curvature, for conjugation
+        last_face, last_step, curvature = None, np.zeros(0), 0.0
         length = 1 / self.scale  # the preconditioner is the inverse up to boundaries and the contact's outline
         best, since, spacer = math.inf, 0, False
         cells = np.flatnonzero(grid)
         for iteration in range(max_iterations + 1):
-            np.add(self.gap, displacement, out=total)
+            total = np.add(self.gap, displacement, out=self.room)
             duality_gap, energy, level, converged = self.judge(cells, grid.take(cells), displacement, total)
             if converged and extrapolated and iteration == 0:  # its rounding must not pile up from step to step
                 displacement = self.displacement(pressure)
@@ -214,20 +213,18 @@ class _Problem:
             face = self.face(pressure, total, level)
             residual = total.take(face)
             residual -= level if self.load is None else float(np.mean(residual))
-            held = grid.take(face)
             if spacer:
                 trial, face, held, residual = self.projected_gradient(pressure, total, level)
             else:
                 search = self.precondition(residual, face)
-                if last_face is not None and curvature > 0:
-                    changed = displacement.take(face)
-                    changed -= before.take(face)
-                    changed /= curvature
-                    total.fill(0)  # not needed any more: room for the last step
-                    total.reshape(-1)[last_face] = last_step
-                    search = self.conjugate(search, residual, changed, total.take(face))
+                if last_face is not None and change is not None:
+                    self.room.fill(0)
+                    self.room.reshape(-1)[last_face] = last_step
+                    changed = change.take(face) / curvature
+                    search = self.conjugate(search, residual, changed, self.room.take(face))
                     del changed
                 search *= -length
+                held = grid.take(face)
                 search += held
                 trial = self.cut(search)
             step = trial - held
@@ -238,31 +235,27 @@ class _Problem:
                 spacer, last_face, length = last_face is None, None, 1 / self.scale
                 continue
             grid[face] = trial
-            moved = self.displacement(pressure)
-            changed = moved.take(face)
-            changed -= displacement.take(face)
-            curvature = float(np.sum(step * changed))
-            del changed
+            change = None  # its memory is needed
+            change = self.displacement(pressure)
+            change -= displacement
+            curvature = float(np.sum(step * change.take(face)))
             full = min(-slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
             fraction, cut = self.fraction(held, trial, step, full)
-            before = displacement
-            if fraction == 1:
-                displacement = moved
-            else:
+            convex = curvature > 0
+            if fraction != 1:
                 trial = fraction * step
                 trial += held
                 np.maximum(trial, 0, out=trial)
                 grid[face] = trial
-                moved -= displacement
-                moved *= fraction
-                moved += displacement
-                displacement = moved
+                change *= fraction
                 curvature *= fraction  # of the whole step with the change by its part
+            displacement += change
             cells = face[trial > 0]
+            del trial, held, residual
             if spacer:
                 spacer, last_face = False, None
             else:
-                last_face, last_step = face, step
+                last_face, last_step = face if convex else None, step
                 length *= min(max(full, 0.3), _GROWTH if cut else 3.0)
         return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration)
 
@@ -349,13 +342,12 @@ class _Problem:
 
     def precondition(self, residual: Array, face: Cells) -> Array:
         self.convolutions += 1
-        if self._scratch is None:
-            self._scratch = np.zeros(self.halfspace.shape, np.float32)
-        scratch = self._scratch.reshape(-1)
         size = float(np.max(np.abs(residual), initial=0.0)) or 1.0  # the range of single precision is small
-        scratch[face] = residual / size
-        pressure = self.halfspace.approximate_inverse(self._scratch).take(face).astype(float)
-        scratch.fill(0)
+        spread = self.room.reshape(-1).view(np.float32)[: self.room.size]
+        spread.fill(0)
+        spread[face] = (residual / size).astype(np.float32)
+        found = self.halfspace.approximate_inverse(spread.reshape(self.room.shape))
+        pressure = found.take(face).astype(float)
         pressure *= size
         return self.tangent(pressure)
 

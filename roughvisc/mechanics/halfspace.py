@@ -74,7 +74,7 @@ class HalfSpace:
         else:
             symbol = periodic_symbol(self.surface_shape, spacing)
             self._points = shape
-        self._symbol = self._transforms.arranged(symbol, self._points)
+        self._symbol = self._transforms.cropped(symbol, self._points)
 
     @property
     def cell_area(self) -> float:
@@ -119,7 +119,7 @@ class HalfSpace:
             columns[:nx] = spectrum[:, block]
             columns[nx:] = 0
             columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=self.workers)
-            columns *= self._symbol[:, block]
+            along.multiply(columns, self._symbol[:, block])
             columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=self.workers)
             spectrum[:, block] = columns[:nx]
         displacement = np.empty(self.shape)
@@ -159,11 +159,11 @@ class HalfSpace:
     def _inverse_symbol(self) -> NDArray[np.float32]:
         symbol = periodic_symbol(self.surface_shape, self.spacing)
         symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or self.spacing[0]
-        return self._transforms.arranged(1 / symbol, self.shape).astype(np.float32)
+        return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
 
     def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
         field_q = self._transforms.of_field(field, workers=self.workers)
-        field_q *= symbol
+        self._transforms.multiply(field_q, symbol)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
 
 

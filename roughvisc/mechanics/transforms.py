@@ -50,12 +50,16 @@ class Transforms:
         """Numbers that so many points of a row have as their transform."""
         return points // 2 + 1 if self.is_complex else points
 
-    def arranged(self, symbol: Array, points: tuple[int, int]) -> Array:
-        """A symbol of non-negative wave numbers as the transform of so many points has them."""
-        if not self.is_complex:
-            return np.ascontiguousarray(symbol[: points[0], : points[1]])
-        # along x positive wave numbers, then negative ones
-        return np.concatenate([symbol, symbol[1 : points[0] - points[0] // 2][::-1]])
+    def cropped(self, symbol: Array, points: tuple[int, int]) -> Array:
+        """A symbol of non-negative wave numbers, those that the transform of so many points has."""
+        return symbol if self.is_complex else np.ascontiguousarray(symbol[: points[0], : points[1]])
+
+    def multiply(self, transform: NDArray[Any], symbol: NDArray[Any]) -> None:
+        """Multiply a transform of whole columns by a symbol, which is the same for negative wave numbers along x."""
+        first = len(symbol)
+        transform[:first] *= symbol
+        if len(transform) > first:
+            transform[first:] *= symbol[len(transform) - first : 0 : -1]
 
 
 def transforms(mirrored: bool) -> Transforms:

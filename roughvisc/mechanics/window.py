@@ -176,7 +176,7 @@ class Reach:
         window = self._window
         mx, my = (fft.next_fast_len(n + m, real=True) for n, m in zip(window.domain, window.shape, strict=True))
         symbol = free_space_symbol((2 * mx, 2 * my), spacing) / self._scale
-        return (mx, my), self._transforms.arranged(symbol, (mx, my)).astype(self._type)
+        return (mx, my), self._transforms.cropped(symbol, (mx, my)).astype(self._type)
 
     def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:
         """Displacement of the domain under a pressure in the window over the contact modulus, some rows at a time. [m]

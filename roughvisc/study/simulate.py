@@ -18,6 +18,7 @@ from roughvisc.mechanics.seed import march_seed
 from roughvisc.mechanics.stepper import march
 from roughvisc.study.checkpoint import Keeper, Reached
 from roughvisc.study.grid_error import with_grid_error
+from roughvisc.study.malloc import expect_arrays
 from roughvisc.study.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.records import RowsInMemory
 from roughvisc.study.rows import Rows
@@ -174,6 +175,7 @@ def _press(
 ) -> xr.Dataset:
     began = time.perf_counter()
     ground = Ground(height, missing, follow=follows(boundary, edge, method), mirror=method == "fast")
+    expect_arrays(ground.gap.nbytes)
     scene, engine = prepare(
         ground,
         material,
