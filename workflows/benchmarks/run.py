@@ -24,7 +24,7 @@ SMALL = {
     "seed": {"sizes": ((32, 10),), "repeats": 1},
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
     "contact_mechanics": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
-    "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96},
+    "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96, "sparse": 40},
     "sweep": {"count": 3, "workers": 1, "cells": 32},
 }
 PARTS = {

@@ -1,6 +1,7 @@
 """What the benchmarks press: scenes with a closed form or a tight solution, and how errors are measured."""
 
 import time
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -8,8 +9,29 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.study import scene
 
 RADIUS = 1.0
+
+
+@contextmanager
+def without_symmetry():
+    """All of a surface is solved, also where it is its own mirror image."""
+    found, scene.is_mirrored = scene.is_mirrored, lambda height: False
+    try:
+        yield
+    finally:
+        scene.is_mirrored = found
+
+
+@contextmanager
+def without_window():
+    """The whole domain is solved, also where the contact is small."""
+    worth, scene._WORTH_FOLLOWING = scene._WORTH_FOLLOWING, 10**9
+    try:
+        yield
+    finally:
+        scene._WORTH_FOLLOWING = worth
 
 
 def seconds(run, repeats):
