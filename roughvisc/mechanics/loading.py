@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -154,12 +155,16 @@ class Program:
     @property
     def duration(self) -> float:
         """Length of the program. [s]"""
-        return self.corners[-1]
+        return self._corners[-1]
 
     @property
     def corners(self) -> list[float]:
         """Start of the program and end of each segment. [s]"""
-        return [0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist()]
+        return list(self._corners)
+
+    @cached_property
+    def _corners(self) -> tuple[float, ...]:
+        return (0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist())
 
     @property
     def largest_load(self) -> float:
