@@ -159,7 +159,10 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
-    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse. [m]"""
+    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse. [m]
+
+    Contact with periodic boundaries is solved on a quarter of it, and costs no more than that of the surface itself.
+    """
     h = checked(h, "mirror")
     nx, ny = h.shape
     doubled = h.isel(x=np.r_[0:nx, nx - 1 : -1 : -1], y=np.r_[0:ny, ny - 1 : -1 : -1])

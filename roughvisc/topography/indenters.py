@@ -36,7 +36,7 @@ def sphere(radius: float, size: Any, shape: Any, exact: bool = False) -> xr.Data
     -------
     xarray.DataArray
         Height over (x, y), not above zero. [m] The apex is at ``size / 2``, which lies between the cells where
-        their number is even.
+        their number is even; with even numbers of cells a quarter of the contact is solved, in half the time or less.
 
     Raises
     ------
