@@ -118,7 +118,8 @@ def test_known_displacement_of_the_start__saves_one_convolution(boundary, known)
     )
     assert told.convolutions == plain.convolutions - 1
     assert told.iterations == plain.iterations > 0
-    assert told.pressure == pytest.approx(plain.pressure, rel=1e-9, abs=1e-12)
+    # a cell that a step brings to the border of the contact may be in or out by rounding: equal to the tolerance only
+    assert np.abs(told.pressure - plain.pressure).sum() < 10 * 1e-8 * plain.pressure.sum()
 
 
 def test_known_displacement_of_a_solution__is_computed_anew():
@@ -288,3 +289,55 @@ def test_given_approach__near_full_contact_is_finite_where_the_kernel_is_singula
         state = solve_contact(halfspace, gap, approach=approach, tolerance=1e-14, start=start, max_iterations=300)
         assert np.isfinite(state.pressure).all()
         assert np.isfinite([state.load, state.bound]).all()
+
+
+@pytest.fixture
+def convolved(monkeypatch):
+    """Kinds of the numbers that displacements were computed in, in order."""
+    kinds = []
+
+    def noted(kind, sound):
+        return lambda self, pressure: kinds.append(kind) or sound(self, pressure)
+
+    monkeypatch.setattr(HalfSpace, "displacement", noted("double", HalfSpace.displacement))
+    monkeypatch.setattr(HalfSpace, "rough_displacement", noted("single", HalfSpace.rough_displacement))
+    return kinds
+
+
+@pytest.mark.parametrize("known", [{"load": 3000.0}, {"approach": 5.0}], ids=["load", "approach"])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_single_precision__is_for_steps_far_from_the_solution(boundary, known, convolved, monkeypatch):
+    """What is returned is a solution in double precision, however tight the tolerance."""
+    halfspace, gap = HalfSpace((101, 96), (1.0, 1.0), boundary), rough_gap((101, 96))
+    solve_contact(halfspace, gap, **known, tolerance=1e-4)
+    assert convolved.count("single") >= 4
+    assert convolved[-1] == "double"
+    found = solve_contact(halfspace, gap, **known, tolerance=1e-14)
+    assert found.converged
+    monkeypatch.setattr(contact, "_SINGLE_FROM", np.inf)
+    convolved.clear()
+    exact = solve_contact(halfspace, gap, **known, tolerance=1e-14)
+    assert set(convolved) == {"double"}
+    assert np.abs(found.pressure - exact.pressure).sum() < 1e-11 * exact.pressure.sum()
+    expected = halfspace.displacement(found.pressure)
+    assert np.abs(found.displacement - expected).max() < 1e-13 * expected.max()
+    convolved.clear()
+    solve_contact(halfspace, gap, **known, tolerance=1e-4, start=exact.pressure)
+    assert set(convolved) == {"double"}, "near the solution it does not pay"
+
+
+def test_single_precision__meets_loads_and_lengths_of_any_size():
+    for scale, load in ((1e-9, 1e-20), (1e30, 1e-200), (1.0, 1e200)):
+        halfspace = HalfSpace((97, 98), (scale, scale))
+        gap = 1e-3 * scale * rough_gap(halfspace.shape)
+        state = solve_contact(halfspace, gap, load=load, tolerance=1e-6)
+        assert state.converged
+        assert np.sum(state.pressure) == pytest.approx(load, rel=1e-12)
+
+
+def test_unconverged_state__has_its_own_displacement():
+    halfspace, gap = HalfSpace((101, 96), (1.0, 1.0)), rough_gap((101, 96))
+    state = solve_contact(halfspace, gap, load=3000.0, tolerance=1e-12, max_iterations=3)
+    assert not state.converged
+    expected = halfspace.displacement(state.pressure)
+    assert np.abs(state.displacement - expected).max() < 1e-13 * expected.max()

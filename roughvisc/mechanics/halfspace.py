@@ -106,12 +106,35 @@ class HalfSpace:
         ndarray, shape (nx, ny)
             Displacement; with periodic boundaries its mean is zero. [m]
         """
+        return self._convolved(pressure, self._symbol)
+
+    def rough_displacement(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
+
+        Parameters
+        ----------
+        pressure : ndarray of float32, shape (nx, ny)
+            Of ordinary size: single precision underflows. [-]
+
+        Returns
+        -------
+        ndarray of float32, shape (nx, ny)
+            Displacement over :attr:`largest_influence`. [-]
+        """
+        return self._convolved(pressure, self._rough_symbol)
+
+    @cached_property
+    def _rough_symbol(self) -> NDArray[np.float32]:
+        return (self._symbol / self.largest_influence).astype(np.float32)
+
+    def _convolved(self, pressure: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+        """Convolution in the precision of both."""
         if self.boundary == "periodic":
-            return self._filtered(pressure, self._symbol)
+            return self._filtered(pressure, symbol)
         along, (nx, ny), my = self._transforms, self.shape, self._points[1]
         # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
         # columns go forward, are multiplied and come back while they stay in the cache.
-        spectrum, room = self._working_memory
+        spectrum, room = (_as_single(memory, pressure.dtype) for memory in self._working_memory)
         for rows in _blocks(nx, _ROWS):
             spectrum[rows] = along.of_rows(pressure[rows], n=my, axis=1, workers=self.workers)
         for block in _blocks(spectrum.shape[1], room.shape[1]):
@@ -119,10 +142,10 @@ class HalfSpace:
             columns[:nx] = spectrum[:, block]
             columns[nx:] = 0
             columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=self.workers)
-            along.multiply(columns, self._symbol[:, block])
+            along.multiply(columns, symbol[:, block])
             columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=self.workers)
             spectrum[:, block] = columns[:nx]
-        displacement = np.empty(self.shape)
+        displacement = np.empty(self.shape, pressure.dtype)
         for rows in _blocks(nx, _ROWS):
             displacement[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
         return displacement
@@ -165,6 +188,14 @@ class HalfSpace:
         field_q = self._transforms.of_field(field, workers=self.workers)
         self._transforms.multiply(field_q, symbol)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+
+
+def _as_single(memory: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+    """The first half of some memory as numbers of half the size, where these are wanted."""
+    if kind == np.float64:
+        return memory
+    halved = np.complex64 if memory.dtype == np.complex128 else np.float32
+    return memory.reshape(-1).view(halved)[: memory.size].reshape(memory.shape)
 
 
 def _blocks(length: int, size: int) -> Iterator[slice]:

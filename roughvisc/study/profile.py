@@ -22,7 +22,10 @@ from roughvisc.study.records import RowFile
 
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
 _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
-    "transforms": ((HalfSpace, "displacement"), (HalfSpace, "approximate_inverse"), (Reach, "spread")),
+    "transforms": (
+        *((HalfSpace, name) for name in ("displacement", "rough_displacement", "approximate_inverse")),
+        (Reach, "spread"),
+    ),
     "vector work of the solver": ((stepper, "solve_contact"),),
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
     "surface and kernels": ((Case, "height"), (simulate, "prepare"), (HalfSpace, "__init__"), (Reach, "__init__")),
