@@ -89,8 +89,7 @@ class Bench:
         solve = case.settings.solve
         self._convolution = Stopwatch().seconds(height, solve.boundary)
         ground = Ground(height, "absent", follow=follows(solve.boundary, solve.edge, "fast"), mirror=True)
-        part = solved_on(windows(ground), self._found.level)
-        self._part = work(part * height.size) / work(height.size)  # what a convolution costs over one of all cells
+        self._part = solved_on(windows(ground), self._found.level)  # of the cells
         self._calibration = 1.0
 
     @property
@@ -104,7 +103,7 @@ class Bench:
 
     def expected(self, setting: Setting) -> float:
         """Wall time that a setting is expected to take; runs that took a while correct it. [s]"""
-        cells = 1 / setting.coarsening**2
+        cells, size = 1 / setting.coarsening**2, math.prod(self.shape)
         steps = self._found.steps * math.sqrt(_MARCHED / setting.tolerance)
         if setting.time_step is not None:
             steps = self.case.program().duration / setting.time_step
@@ -112,7 +111,7 @@ class Bench:
         if setting.method == "seed":
             convolutions = steps**2 / 2 + steps * each * _SEED_SOLVE
         else:
-            convolutions = steps * each * cells**0.15 * self._part
+            convolutions = steps * each * cells**0.15 * work(self._part * size) / work(size)
         return _ONCE + _STEP * steps + convolutions * self._convolution * cells * self._calibration
 
     def run(self, setting: Setting) -> Run:
@@ -167,4 +166,5 @@ class Bench:
         engine = engine_for(case.material(), case.program().duration, solve.tolerance, kind=solve.memory)
         found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
         increments = 8.0 * cells * steps if solve.method == "seed" else 0.0
-        return memory(case, cells, found, engine) + increments
+        part = 1.0 if solve.method == "seed" else self._part
+        return memory(case, cells, found, engine, part) + increments

@@ -242,7 +242,7 @@ def _row(
         "contact_fraction": found.contact,
         "convolutions": found.convolutions,
         "wall_time": wall_time(case, cells, found, engine, convolution, part),
-        "memory": memory(case, cells, found, engine),
+        "memory": memory(case, cells, found, engine, part),
         "disk": disk(case, cells, found),
     }
 

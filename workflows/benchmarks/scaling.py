@@ -38,7 +38,7 @@ def run(name, surface, material, program, **settings):
 
 
 def iteration_by_scipy(surface, boundary):
-    """Seconds that the transforms of an iteration take: of a displacement in double precision and the preconditioner."""
+    """Seconds that an iteration spends in transforms: a displacement in double precision, and the preconditioner."""
     halfspace = HalfSpace(surface.shape, (1.0, 1.0), boundary)
     pressure = np.ones(surface.shape)
     single = pressure.astype(np.float32)
