@@ -309,7 +309,7 @@ def convolved(monkeypatch):
 def test_single_precision__is_for_steps_far_from_the_solution(boundary, known, convolved, monkeypatch):
     """What is returned is a solution in double precision, however tight the tolerance."""
     halfspace, gap = HalfSpace((101, 96), (1.0, 1.0), boundary), rough_gap((101, 96))
-    solve_contact(halfspace, gap, **known, tolerance=1e-4)
+    quick = solve_contact(halfspace, gap, **known, tolerance=1e-4)
     assert convolved.count("single") >= 4
     assert convolved[-1] == "double"
     found = solve_contact(halfspace, gap, **known, tolerance=1e-14)
@@ -318,6 +318,8 @@ def test_single_precision__is_for_steps_far_from_the_solution(boundary, known, c
     convolved.clear()
     exact = solve_contact(halfspace, gap, **known, tolerance=1e-14)
     assert set(convolved) == {"double"}
+    slow = solve_contact(halfspace, gap, **known, tolerance=1e-4)
+    assert abs(quick.iterations - slow.iterations) <= 1
     assert np.abs(found.pressure - exact.pressure).sum() < 1e-11 * exact.pressure.sum()
     expected = halfspace.displacement(found.pressure)
     assert np.abs(found.displacement - expected).max() < 1e-13 * expected.max()
@@ -341,3 +343,12 @@ def test_unconverged_state__has_its_own_displacement():
     assert not state.converged
     expected = halfspace.displacement(state.pressure)
     assert np.abs(state.displacement - expected).max() < 1e-13 * expected.max()
+
+
+def test_first_guess__of_a_quarter_knows_its_mirror_images():
+    x, y = (np.arange(512) - 255.5) / 512, (np.arange(544) - 271.5) / 512
+    gap = x[:, None] ** 2 + y**2
+    surface = contact._guessed(HalfSpace(gap.shape, (1.0, 1.0)), gap, 1.0)
+    quarter = contact._guessed(HalfSpace((256, 272), (1.0, 1.0), mirrored=True), gap[256:, 272:], 0.25)
+    assert np.sum(quarter) == pytest.approx(0.25 * np.sum(surface), rel=0.05)
+    assert np.abs(quarter - surface[256:, 272:]).sum() < 0.1 * quarter.sum()
