@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.study import simulate as simulate_module
 from roughvisc.study.mirror import is_mirrored, quarter, unfold
 from roughvisc.study.scene import Ground
@@ -74,24 +73,16 @@ def test_quarter__gives_what_the_whole_surface_gives(name, grounds, monkeypatch)
         assert np.array_equal(found.pressure, np.flip(found.pressure, axis))
 
 
-def test_quarter__is_all_that_is_solved(monkeypatch):
-    shapes = []
-    begin = HalfSpace.__init__
-
-    def noted(self, shape, *rest, **named):
-        shapes.append(shape)
-        begin(self, shape, *rest, **named)
-
-    monkeypatch.setattr(HalfSpace, "__init__", noted)
+def test_quarter__is_all_that_is_solved(solved_on):
     settings = {"times": 2, "tolerance": 1e-2, "progress": False, "boundary": "periodic"}
     rv.simulate(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
-    assert set(shapes) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
-    shapes.clear()
+    assert set(solved_on) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
+    solved_on.clear()
     rv.simulate(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
-    assert set(shapes) == {(22, 17)}
-    shapes.clear()
+    assert set(solved_on) == {(22, 17)}
+    solved_on.clear()
     rv.simulate(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
-    assert set(shapes) == {(24, 21)}, "the middle of 21 cells is a cell"
+    assert set(solved_on) == {(24, 21)}, "the middle of 21 cells is a cell"
 
 
 def test_border__of_a_quarter_is_that_of_the_surface():

@@ -12,7 +12,6 @@ from scipy import fft
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.mechanics import halfspace
-from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.study import scene
 from roughvisc.study.records import RowsInMemory
 from roughvisc.study.scene import kept_times
@@ -241,20 +240,6 @@ FOLLOWED = {
     ),
     "jump": (rv.maxwell(1e6, 1e6), rv.Program().load(2e-3, over=0).hold(0.5)),
 }
-
-
-@pytest.fixture
-def solved_on(monkeypatch):
-    """Shapes of the grids that were solved on, in order."""
-    shapes = []
-    begin = HalfSpace.__init__
-
-    def noted(self, shape, *rest, **named):
-        shapes.append(shape)
-        begin(self, shape, *rest, **named)
-
-    monkeypatch.setattr(HalfSpace, "__init__", noted)
-    return shapes
 
 
 @pytest.mark.parametrize("name", FOLLOWED)

@@ -313,7 +313,7 @@ class _Problem:
     def judge(self, cells: Cells, pressure: Array, displacement: Array) -> tuple[float, float, float, bool]:
         """Bound on ``f(p) - min f``, ``p.Kp``, the level of the contact, and whether the bound is small enough.
 
-        Leaves the gap less the approach in ``room``.
+        Leaves the gap with the displacement in ``room``.
         """
         total = np.add(self.gap, displacement, out=self.room)
         own, here = displacement.take(cells), total.take(cells)

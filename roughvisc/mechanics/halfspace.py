@@ -88,7 +88,7 @@ class HalfSpace:
 
     @cached_property
     def self_influence(self) -> float:
-        """Displacement of a cell under unit pressure on it alone. [m]"""
+        """Displacement of a cell under unit pressure on it alone, and on its mirror images. [m]"""
         unit = np.zeros(self.shape)
         unit[0, 0] = 1
         return float(self.displacement(unit)[0, 0])

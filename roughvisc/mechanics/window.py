@@ -155,8 +155,8 @@ class Reach:
         self._type = np.float32 if single else np.float64
         self._scale = max(spacing)  # the range of single precision is small
         self._transforms = transforms(window.mirrored)
-        symbol = self._mirrored_symbol(spacing) if window.mirrored else self._general_symbol(spacing)
-        self._points, self._symbol = symbol
+        symbol_of = self._mirrored_symbol if window.mirrored else self._general_symbol
+        self._points, self._symbol = symbol_of(spacing)
 
     def _general_symbol(self, spacing: tuple[float, float]) -> tuple[tuple[int, int], NDArray[Any]]:
         """Points of the transforms, and the kernel's."""

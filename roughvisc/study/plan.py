@@ -234,7 +234,8 @@ def _row(
     if found is None or problem:
         return row
     cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
-    part = solved_on(surface.windows[0 if window else -1 :], found.level) if window or mirrored else 1.0
+    reachable = surface.windows if window else surface.windows[-1:]
+    part = solved_on(reachable, found.level) if solve.method == "fast" else 1.0
     return row | {
         "scheme": _scheme(case, engine, found),
         "steps": found.steps,

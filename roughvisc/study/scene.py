@@ -60,19 +60,22 @@ class Ground:
     ) -> None:
         self._missing = missing
         self.growths = 0
-        self.mirrored = mirror and is_mirrored(_checked(height).values)
+        height = _checked(height)
+        self.mirrored = mirror and is_mirrored(height.values)
         self._lay(height)
         self._extent = float(_FIRST_EXTENT)
         if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
 
     def _lay(self, height: xr.DataArray) -> None:
-        self.height = _checked(height)
-        _check_missing(self.height, np.isfinite(self.height.values), self._missing)
+        self.height = height
+        present = np.isfinite(height.values)
+        _check_missing(height, present, self._missing)
+        cells = quarter(height.shape) if self.mirrored else ...
         #: What is solved for: the surface, or the quarter of it at the end of both axes.
-        self.domain = self.height[quarter(self.height.shape)] if self.mirrored else self.height
+        self.domain = height[cells]
         values = self.domain.values
-        self.present: NDArray[np.bool_] = np.isfinite(values)
+        self.present: NDArray[np.bool_] = present[cells]
         #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
         self.gap = np.nanmax(values) - values
         self.gap[~self.present] = 0.0
@@ -102,7 +105,7 @@ class Ground:
             larger = grown(self.height, GROWTH)
             if larger is None or larger.size > MOST_CELLS:
                 return None
-            self._lay(larger)
+            self._lay(_checked(larger))
         else:
             self.widen()
         self.growths += 1

@@ -1,7 +1,7 @@
 """What the benchmarks press: scenes with a closed form or a tight solution, and how errors are measured."""
 
 import time
-from contextlib import contextmanager
+from unittest import mock
 
 import numpy as np
 
@@ -14,24 +14,21 @@ from roughvisc.study import scene
 RADIUS = 1.0
 
 
-@contextmanager
 def without_symmetry():
-    """All of a surface is solved, also where it is its own mirror image."""
-    found, scene.is_mirrored = scene.is_mirrored, lambda height: False
-    try:
-        yield
-    finally:
-        scene.is_mirrored = found
+    """Context in which all of a surface is solved, also where it is its own mirror image."""
+    return mock.patch.object(scene, "is_mirrored", return_value=False)
 
 
-@contextmanager
 def without_window():
-    """The whole domain is solved, also where the contact is small."""
-    worth, scene._WORTH_FOLLOWING = scene._WORTH_FOLLOWING, 10**9
-    try:
-        yield
-    finally:
-        scene._WORTH_FOLLOWING = worth
+    """Context in which the whole domain is solved, also where the contact is small."""
+    return mock.patch.object(scene, "_WORTH_FOLLOWING", 10**9)
+
+
+def with_symmetry_and_without():
+    """Goes round twice, and gives what to add to a case's name."""
+    yield ""
+    with without_symmetry():
+        yield ", all of the ball solved"
 
 
 def seconds(run, repeats):
