@@ -74,6 +74,30 @@ def test_tolerance_matrix__is_kept_by_a_zener_material(tmp_path, monkeypatch):
     assert (tmp_path / "t.png").exists()
 
 
+def test_accuracy__of_random_cases_is_judged_and_resumed(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("accuracy")
+    ds, _ = module.main(3, first=10, out=tmp_path / "accuracy.nc", processes=0)
+    assert (ds.status == "ok").all()
+    assert (ds.rows.sel(quantity="pressure") >= 8).all()
+    worst = ds.worst_error_over_tolerance.sel(quantity="pressure")
+    assert (worst <= 1).all()
+    assert (worst > 1e-4).all(), "the reference is another run"
+    again, _ = module.main(3, first=10, out=tmp_path / "accuracy.nc", processes=0)
+    assert again.identical(ds), "cases in the record are taken from there"
+    assert "3 cases taken from" in capsys.readouterr().out
+    late = module.judge(1, 12, time_limit=0.01)
+    assert late["status"].startswith("run: TimeoutError"), "reported, not dropped"
+
+
+def test_accuracy_cost__of_a_checkout_is_that_of_itself(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("accuracy_cost")
+    ratios = module.against(FOLDER.parent, 1, first=12, ladder=(3e-2, 1e-2))
+    assert [ratio["convolutions"] for ratio in ratios] == [1.0]
+    assert module.ratio(np.array([[1e-2, 10], [1e-4, 100]]), np.array([[1e-2, 20], [1e-4, 200]])) == pytest.approx(2)
+
+
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}

@@ -1,0 +1,306 @@
+"""Does every row keep its word? Random cases, each against a run of the same case at a thirtieth of its tolerance.
+
+    python workflows/benchmarks/accuracy.py [COUNT] [SEED] [--first N] [--out OUT.nc] [--processes N]
+    python workflows/benchmarks/accuracy.py --against OTHER_CHECKOUT [COUNT] [SEED] [--first N]
+
+The cases are those of ``accuracy_cases.py``; COUNT is 1000 (12 with ``--against``) and SEED 1 unless given, and
+``1 1 --first N`` reruns case N alone. Each case is printed when done and appended to ``OUT.jsonl``, with the errors of
+all its rows; cases that are found there are not run again, so delete it after a change of the package. At the end
+OUT.nc holds a table of the cases, and a summary is printed. Errors of a row are relative: of the pressure its absolute
+difference summed, over the largest force so far; of approach, force and work over their largest absolute values so far,
+all of the reference and up to that row. Approach and force are judged where the program does not give them.
+With ``--against`` the cost is compared with that of another checkout: see ``accuracy_cost.py``.
+"""
+
+import argparse
+import contextlib
+import json
+import logging
+import signal
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from accuracy_cases import case
+
+import roughvisc as rv
+
+SHARPER = 30
+QUANTITIES = ("total", "pressure", "approach", "force", "work")
+#: Errors below this part of the tolerance do not count where stated errors are compared with true ones.
+FLOOR = 1e-3
+#: Processor time of a case, its reference included. [s]
+TIME_LIMIT = 60
+
+
+def main(count=1000, seed=1, first=0, out="accuracy.nc", processes=2, time_limit=TIME_LIMIT):
+    """Run the cases that are not in the record yet; the table and the records."""
+    record = Path(out).with_suffix(".jsonl")
+    lines = record.read_text().splitlines() if record.exists() else ()
+    wanted = range(first, first + count)
+    found = [line for line in map(json.loads, lines) if line["seed"] == seed and line["number"] in wanted]
+    if found:
+        print(f"{len(found)} cases taken from {record}", flush=True)
+    left = sorted(set(wanted) - {line["number"] for line in found})
+    with record.open("a") as file:
+        for result in _judged(left, seed, processes, time_limit):
+            file.write(json.dumps(result) + "\n")
+            file.flush()
+            print(described(result), flush=True)
+            found.append(result)
+    found.sort(key=lambda result: result["number"])
+    ds = table(found)
+    ds.to_netcdf(out, engine="netcdf4")
+    summarise(found, ds)
+    return ds, found
+
+
+def _judged(numbers, seed, processes, time_limit):
+    if not processes:
+        yield from (judge(seed, number, time_limit) for number in numbers)
+        return
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(judge, seed, number, time_limit) for number in numbers]):
+            yield future.result()
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# one case
+
+
+def judge(seed, number, time_limit=TIME_LIMIT):
+    """Plain record of a case: what it is, what it took, and the errors of its rows; or what went wrong."""
+    logging.getLogger("roughvisc").setLevel(logging.ERROR)  # of steep slopes
+    drawn = case(seed, number)
+    record = {"seed": seed, "number": number, **drawn.families, "tolerance": drawn.settings["tolerance"],
+              "soft": drawn.soft, "status": "ok", "rows": {}}  # fmt: skip
+    part = "run"
+    try:
+        with limited(time_limit):
+            ds = timed(drawn, drawn.settings["tolerance"], drawn.times)
+            record |= {name: ds.attrs[name] for name in ("steps", "cpu")} | {"convolutions": int(ds.convolutions.sum())}
+            part = "reference"
+            exact = timed(drawn, drawn.settings["tolerance"] / SHARPER, [*ds.time.values, *watched(drawn.program)])
+            record |= {"reference_cpu": exact.attrs["cpu"]}
+            part = "comparison"
+            record["rows"] = compared(ds, exact, drawn.program)
+    except Exception as error:
+        record["status"] = f"{part}: {type(error).__name__}: {error}"
+    return record
+
+
+@contextlib.contextmanager
+def limited(seconds):
+    """Raise TimeoutError after so much processor time, where the system can."""
+
+    def stop(*_):
+        raise TimeoutError(f"no end after {seconds:g} s of processor time")
+
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def timed(drawn, tolerance, times):
+    """Result of a case, with its accepted steps and processor time."""
+    steps = []
+    began = time.process_time()
+    settings = drawn.settings | {"tolerance": tolerance, "times": times, "fields": ("pressure",)}
+    ds = rv.simulate(
+        drawn.height, drawn.material, drawn.program, progress=lambda now, end: steps.append(now), **settings
+    )
+    ds.attrs |= {"steps": len(steps), "cpu": round(time.process_time() - began, 3)}
+    return ds
+
+
+def watched(program):
+    """Times at which the largest values so far are looked for as well: corners, and eighths of a period."""
+    found = list(program.corners)
+    for segment, start in zip(program.segments, program.corners, strict=False):
+        if segment.amplitude:
+            found += [start + t for t in np.arange(0, segment.duration, segment.period / 8)]
+    return found
+
+
+def compared(ds, exact, program):
+    """True and stated errors of the rows of a result, by quantity; NaN where there is none."""
+    so_far = {name: np.maximum.accumulate(np.abs(exact[name].values)) for name in ("force", "approach", "work")}
+    rows = np.searchsorted(exact.time.values, ds.time.values - 1e-12 * program.duration)
+    if not np.allclose(exact.time.values[rows], ds.time.values, rtol=0, atol=1e-11 * program.duration):
+        raise ValueError("the reference does not keep the times of the run")
+    exact = exact.isel(time=rows)
+    scale = {name: np.where(values > 0, values, np.nan)[rows] for name, values in so_far.items()}
+    scale["pressure"] = scale["force"]
+    cell = float(np.prod([float(ds[axis][1] - ds[axis][0]) for axis in ("x", "y")]))
+    true = {name: np.abs(ds[name] - exact[name]).values / scale[name] for name in ("approach", "force", "work")}
+    true["pressure"] = np.abs(ds.pressure - exact.pressure).sum(("x", "y")).values * cell / scale["force"]
+    for name, given in prescribed(program, ds.time.values).items():
+        true[name][given] = np.nan
+    true["total"] = np.fmax(true["pressure"], np.fmax(true["approach"], true["force"]))
+    stated = {"total": _row(ds, "error", "time_error"), "pressure": _row(ds, "pressure_error")}
+    stated |= {name: _row(ds, f"{name}_error") / scale[name] for name in ("approach", "force", "work")}
+    found = {name: {"true": _short(true[name]), "stated": _short(stated[name])} for name in QUANTITIES}
+    area, low, high = (_row(ds, name) / cell for name in ("contact_area", "contact_area_lower", "contact_area_upper"))
+    off = (area - exact.contact_area.values / cell).round(6)
+    inside = np.where(np.isfinite(low), (low <= area - off + 1e-6) & (area - off <= high + 1e-6), np.nan)
+    found["contact_area"] = {"cells_off": _short(off), "inside": _short(inside), "width": _short(high - low)}
+    return found
+
+
+def prescribed(program, times):
+    """Where the program gives the approach and the force; what a hold keeps of the other kind is found by the run."""
+    ends = np.array(program.corners[1:])
+    given = {"approach": [], "force": []}
+    for now in times:
+        index = int(np.searchsorted(ends, now - 1e-12 * program.duration))
+        while index + 1 < len(ends) and program.segments[index + 1].duration == 0 and ends[index + 1] <= now:
+            index += 1
+        origin = index
+        while (
+            origin
+            and program.segments[origin].end is None
+            and program.segments[origin - 1].control == (program.segments[index].control)
+        ):
+            origin -= 1
+        control = program.segments[index].control if program.segments[origin].end is not None or not origin else ""
+        given["approach"].append(control == "approach")
+        given["force"].append(control == "load")
+    return {name: np.array(where) for name, where in given.items()}
+
+
+def _row(ds, *names):
+    """The first of these variables that the result has along time; NaN if none."""
+    present = (ds[name].values for name in names if name in ds and ds[name].dims == ("time",))
+    return np.asarray(next(present, np.full(ds.sizes["time"], np.nan)), dtype=float)
+
+
+def _short(values):
+    return [float(f"{value:.3g}") for value in values]
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# all cases
+
+
+def table(found):
+    """Results by case: worst error over tolerance, parts of the rows within, stated over true, cost."""
+    names = ("worst_error_over_tolerance", "rows", "fraction_within", "fraction_stated", "stated_over_true")
+    columns = {name: np.full((len(found), len(QUANTITIES)), np.nan) for name in names}
+    for i, result in enumerate(found):
+        for j, name in enumerate(QUANTITIES if result["rows"] else ()):
+            over, ratio = over_tolerance(result, name), stated_over_true(result, name)
+            columns["rows"][i, j] = over.size
+            if over.size:
+                columns["worst_error_over_tolerance"][i, j] = over.max()
+                columns["fraction_within"][i, j] = np.mean(over <= 1)
+            if ratio.size:
+                columns["fraction_stated"][i, j] = np.mean(ratio >= 0.8)
+                columns["stated_over_true"][i, j] = np.median(ratio)
+    variables = {name: (("case", "quantity"), values) for name, values in columns.items()}
+    for name in ("steps", "convolutions", "cpu", "reference_cpu", "tolerance"):
+        variables[name] = ("case", np.array([result.get(name, np.nan) for result in found], float))
+    for name in ("material", "program", "surface", "kept", "status"):
+        variables[name] = ("case", np.array([result[name] for result in found], dtype=str))
+    variables["soft"] = ("case", np.array([result["soft"] for result in found], "int8"))
+    areas = [result["rows"].get("contact_area", {"cells_off": [np.nan], "inside": [np.nan]}) for result in found]
+    variables["area_cells_off"] = ("case", [float(np.max(np.abs(area["cells_off"]))) for area in areas])
+    variables["area_inside"] = ("case", [float(np.mean(area["inside"])) for area in areas])
+    return xr.Dataset(variables, {"case": [result["number"] for result in found], "quantity": list(QUANTITIES)})
+
+
+def over_tolerance(result, name):
+    """Errors of the rows that have one, over the tolerance."""
+    true = np.array(result["rows"].get(name, {"true": []})["true"], float)
+    return true[np.isfinite(true)] / result["tolerance"]
+
+
+def stated_over_true(result, name):
+    """Stated over true errors, of the rows that state one and whose true error is above the floor."""
+    row = result["rows"].get(name, {"true": [], "stated": []})
+    true, stated = np.array(row["true"], float), np.array(row["stated"], float)
+    counts = (true >= FLOOR * result["tolerance"]) & np.isfinite(stated)
+    return stated[counts] / true[counts]
+
+
+def described(result):
+    """A line for a case."""
+    families = ", ".join(result[name] for name in ("material", "program", "surface", "kept"))
+    line = f"{result['number']:5d} {families}, {result['tolerance']:g}{', soft' if result['soft'] else ''}"
+    if result["status"] != "ok":
+        return f"{line}: {result['status']}"
+    worst = {name: over_tolerance(result, name) for name in QUANTITIES[1:]}
+    errors = ", ".join(f"{name} {values.max():.2g}" for name, values in worst.items() if values.size)
+    return f"{line}: {errors}; {result['steps']} steps, {result['cpu']:.1f} + {result['reference_cpu']:.1f} s"
+
+
+def summarise(found, ds):
+    """Print what holds of all rows, first without soft cases, then of them, and the worst cases by number."""
+    wrong = [result for result in found if result["status"] != "ok"]
+    print(f"\n{len(found)} cases, {len(wrong)} without a comparison", *map(described, wrong), sep="\n")
+    print(f"processor time of a case [s]: median {float(ds.cpu.median()):.2f}, largest {float(ds.cpu.max()):.1f}; with "
+          f"its reference {float((ds.cpu + ds.reference_cpu).mean()):.2f} in the mean")  # fmt: skip
+    for soft, title in ((False, "materials that give way at once"), (True, "soft: C(0) below a tenth of C(end)")):
+        part = [result for result in found if result["rows"] and result["soft"] == soft]
+        print(
+            f"\n{title}: {len(part)} cases\n{'':19}rows  within  within 3  cases within    stated >= 0.8 true  median"
+        )
+        for label, names in (*((name, (name,)) for name in QUANTITIES), ("all but the total", QUANTITIES[1:])):
+            _line(label, names, part)
+        off = np.concatenate([np.abs(result["rows"]["contact_area"]["cells_off"]) for result in part] or [[]])
+        inside = np.concatenate([result["rows"]["contact_area"]["inside"] for result in part] or [[]])
+        inside = inside[np.isfinite(inside)]
+        if off.size:
+            held = f", {np.mean(inside):.2%} within the stated interval" if inside.size else ""
+            print(f"contact area: {np.mean(off > 0):.1%} of rows off, by {off.max():.0f} cells at most{held}")
+    print(
+        f"(true errors below {FLOOR:g} of the tolerance are left out of stated over true)\n\nworst, over the tolerance:"
+    )
+    over = ds.worst_error_over_tolerance.sel(quantity=list(QUANTITIES[1:])).stack(at=("case", "quantity")).dropna("at")
+    for soft, title in ((0, "not soft"), (1, "soft")):
+        some = over[(ds.soft.sel(case=over.case) == soft).values & (over > 1).values]
+        some = some[np.argsort(-some.values)][:25]
+        names = (
+            f"{number} {name} {value:.3g}" for (number, name), value in zip(some["at"].values, some.values, strict=True)
+        )
+        print(f"{title}:", "; ".join(names) or "none")
+
+
+def _line(label, names, part):
+    over = [np.concatenate([over_tolerance(result, name) for name in names]) for result in part]
+    over = [values for values in over if values.size]
+    ratio = np.concatenate([stated_over_true(result, name) for result in part for name in names] or [[]])
+    if over:
+        pooled = np.concatenate(over)
+        kept = np.mean([values.max() <= 1 for values in over])
+        stated = f"{np.mean(ratio >= 0.8):18.2%}{np.median(ratio):8.2f}" if ratio.size else f"{'not stated':>18}"
+        print(
+            f"{label:17}{pooled.size:6d}{np.mean(pooled <= 1):8.2%}{np.mean(pooled <= 3):10.2%}{kept:14.1%}    {stated}"
+        )
+
+
+if __name__ == "__main__":
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("count", nargs="?", type=int)
+    asked.add_argument("seed", nargs="?", type=int, default=1)
+    asked.add_argument("--first", type=int, default=0)
+    asked.add_argument("--out", default="accuracy.nc")
+    asked.add_argument("--processes", type=int, default=2)
+    asked.add_argument("--limit", type=float, default=TIME_LIMIT, help="processor time of a case [s]")
+    asked.add_argument("--against", metavar="OTHER_CHECKOUT")
+    given = asked.parse_args()
+    if given.against:
+        from accuracy_cost import against
+
+        against(given.against, given.count or 12, given.seed, given.first)
+    else:
+        main(given.count or 1000, given.seed, given.first, given.out, given.processes, given.limit)
