@@ -93,7 +93,7 @@ def test_accuracy__of_random_cases_is_judged_and_resumed(tmp_path, monkeypatch, 
 def test_accuracy_cost__of_a_checkout_is_that_of_itself(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     module = importlib.import_module("accuracy_cost")
-    ratios = module.against(FOLDER.parent, 1, first=12, ladder=(3e-2, 1e-2))
+    ratios = module.against(FOLDER.parent, 1, first=26, ladder=(3e-2, 1e-2))
     assert [ratio["convolutions"] for ratio in ratios] == [1.0]
     assert module.ratio(np.array([[1e-2, 10], [1e-4, 100]]), np.array([[1e-2, 20], [1e-4, 200]])) == pytest.approx(2)
 

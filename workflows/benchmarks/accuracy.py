@@ -215,7 +215,8 @@ def table(found):
     areas = [result["rows"].get("contact_area", {"cells_off": [np.nan], "inside": [np.nan]}) for result in found]
     variables["area_cells_off"] = ("case", [float(np.max(np.abs(area["cells_off"]))) for area in areas])
     variables["area_inside"] = ("case", [float(np.mean(area["inside"])) for area in areas])
-    return xr.Dataset(variables, {"case": [result["number"] for result in found], "quantity": list(QUANTITIES)})
+    numbers = [result["number"] for result in found]
+    return xr.Dataset(variables, {"case": numbers, "quantity": list(QUANTITIES)}, {"sharper": SHARPER, "floor": FLOOR})
 
 
 def over_tolerance(result, name):
@@ -262,17 +263,27 @@ def summarise(found, ds):
         if off.size:
             held = f", {np.mean(inside):.2%} within the stated interval" if inside.size else ""
             print(f"contact area: {np.mean(off > 0):.1%} of rows off, by {off.max():.0f} cells at most{held}")
-    print(
-        f"(true errors below {FLOOR:g} of the tolerance are left out of stated over true)\n\nworst, over the tolerance:"
-    )
-    over = ds.worst_error_over_tolerance.sel(quantity=list(QUANTITIES[1:])).stack(at=("case", "quantity")).dropna("at")
-    for soft, title in ((0, "not soft"), (1, "soft")):
-        some = over[(ds.soft.sel(case=over.case) == soft).values & (over > 1).values]
-        some = some[np.argsort(-some.values)][:25]
-        names = (
-            f"{number} {name} {value:.3g}" for (number, name), value in zip(some["at"].values, some.values, strict=True)
-        )
-        print(f"{title}:", "; ".join(names) or "none")
+    print(f"(true errors below {FLOOR:g} of the tolerance are left out of stated over true)")
+    for soft, title in ((False, "not soft"), (True, "soft")):
+        lines = _misses([result for result in found if result["rows"] and result["soft"] == soft])
+        print(f"\nworst over the tolerance, {title}: {len(lines)} pairs of case and quantity", *lines[:25], sep="\n")
+
+
+def _misses(part):
+    """Lines for what misses the tolerance, the worst first."""
+    pairs = [(result, name) for result in part for name in QUANTITIES[1:]]
+    worst = [over_tolerance(*pair).max(initial=0) for pair in pairs]
+    return [_miss(*pairs[i]) for i in np.argsort(worst)[::-1] if worst[i] > 1]
+
+
+def _miss(result, name):
+    """A line for a quantity of a case that misses the tolerance."""
+    true = np.array(result["rows"][name]["true"], float) / result["tolerance"]
+    stated = np.array(result["rows"]["total"]["stated"], float) / result["tolerance"]
+    worst = int(np.nanargmax(true))
+    rows = f"{np.count_nonzero(true > 1)} of {true.size} rows, the worst row {worst} (states {stated[worst]:.2g})"
+    families = ", ".join(result[kind] for kind in ("material", "program", "surface", "kept"))
+    return f"{result['number']:5d} {name:8} {true[worst]:8.3g} in {rows}; {families}, {result['tolerance']:g}"
 
 
 def _line(label, names, part):
