@@ -53,8 +53,8 @@ _COARSE_FROM, _STRIDE, _SPARSE = 256, 8, 0.25
 # the convolution in double precision that follows them (measured: 0.6 of the time of one in double).
 _SINGLE_FROM, _FAR = 96**2, 30.0
 # Under given approach and periodic boundaries the load is wrong by no more than this many times the tolerance.
-# Measured: everywhere below 99 % of contact the duality gap makes it less, so that no iteration is added.
-_LOAD_ERROR = 30.0
+# Measured: below 98 % of contact the duality gap makes it less, so that no iteration is added.
+_LOAD_ERROR = 10.0
 # ... and by this in any case: what rounding of the gap leaves.
 _ROUNDED = 1e-10
 # So near full contact, in parts of the approach, a load that leaves no gap at all is cut at once: measured at 64
@@ -81,9 +81,14 @@ class ContactState:
         Bound on the relative error of the pressure in the energy norm, ``sqrt(2 gap / p.Kp)``.
     converged : bool
         Whether the relative duality gap is below the tolerance; under given approach with periodic boundaries, also
-        whether the load is within 30 times the tolerance.
+        whether the load is within 10 times the tolerance.
     iterations, convolutions : int
         Cost; a convolution is a displacement or an application of the preconditioner.
+    error : float
+        Estimated relative error of the pressure, ``sum |p - p*| / sum p*`` with the exact ``p*`` on this grid; NaN
+        unless asked for, infinite where the approach does not determine the load. Measured on 4,173 solutions
+        (``workflows/benchmarks/solver_error.py``): at least 0.8 times the true error in 99.5 % of them, 1.3 times in
+        the median, 2.9 times at the 98th percentile; `bound` is 160 times it in the median.
     """
 
     pressure: Array
@@ -94,6 +99,7 @@ class ContactState:
     converged: bool
     iterations: int
     convolutions: int
+    error: float = math.nan
 
 
 def solve_contact(
@@ -108,6 +114,7 @@ def solve_contact(
     present: Mask | None = None,
     max_iterations: int = 1000,
     overwrite: bool = False,
+    estimate_error: bool = False,
 ) -> ContactState:
     """Contact state under given load or given approach.
 
@@ -123,7 +130,7 @@ def solve_contact(
         Rigid-body approach; this or the load is given. [m]
     tolerance : float
         On the relative duality gap, ``gap / p.Kp``; the square of the relative error in the energy norm. Near full
-        contact under given approach 30 times it is the largest relative error of the load.
+        contact under given approach 10 times it is the largest relative error of the load.
     start : ndarray, shape (nx, ny), optional
         First guess of the pressure; negative values count as zero. [-]
     start_displacement : ndarray, shape (nx, ny), optional
@@ -134,6 +141,9 @@ def solve_contact(
         The state reached by then is returned as not converged.
     overwrite : bool
         Whether `gap`, `start` and `start_displacement` may be used up, which spares copies of them.
+    estimate_error : bool
+        Whether to estimate the error of the pressure, at the cost of applying the preconditioner once, and twice under
+        given approach with periodic boundaries.
 
     Returns
     -------
@@ -150,7 +160,7 @@ def solve_contact(
     if load is not None and present is None and (start is None or not np.any(start > 0)):
         start, start_displacement = _guessed(halfspace, gap, load), None
     problem = _Problem(halfspace, gap, load, approach, tolerance, present)
-    return problem.solve(start, start_displacement, max_iterations)
+    return problem.solve(start, start_displacement, max_iterations, estimate_error)
 
 
 def _guessed(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
@@ -206,7 +216,9 @@ class _Problem:
         self.convolutions = 0
         self.room = np.empty_like(gap)  # for what is needed in a part of an iteration
 
-    def solve(self, start: Array | None, start_displacement: Array | None, max_iterations: int) -> ContactState:
+    def solve(
+        self, start: Array | None, start_displacement: Array | None, max_iterations: int, estimate_error: bool
+    ) -> ContactState:
         """Safeguarded, preconditioned conjugate gradients; see the module's notes.
 
         Vectors live on the face (the cells that may change pressure), as flat indices into the grid; only what the
@@ -293,7 +305,8 @@ class _Problem:
             else:
                 last_face, last_step = face if curvature > 0 else None, step
                 length *= min(max(full, 0.3), _GROWTH if cut else 3.0)
-        return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration)
+        error = self.error(pressure, displacement, level) if estimate_error else math.nan
+        return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration, error)
 
     def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
@@ -432,6 +445,25 @@ class _Problem:
                 weight = np.maximum(float(np.mean(opens.reshape(-1)[outside])) - opens.take(cells), 0)
         return min(level + float(np.sum(weight * excess)) / float(np.sum(weight)), full)
 
+    def error(self, pressure: Array, displacement: Array, level: float) -> float:
+        """Estimated relative L1 error of the pressure: what the next preconditioned step would change.
+
+        The preconditioner is nearly the inverse, which makes its step nearly the error, in the contact and at its
+        border. Under given approach with periodic boundaries it does not know what a uniform residual does to the load.
+        """
+        if self.hopeless:
+            return math.inf
+        total = np.add(self.gap, displacement, out=self.room)
+        load = float(np.sum(pressure))
+        face = self.face(pressure, total, level)
+        residual = total.take(face)
+        residual -= level if self.load is None else float(np.mean(residual))
+        uniform = 0.0
+        if not self.sees_load:
+            uniform = self.stiffness(np.flatnonzero(pressure)) * abs(float(np.sum(residual))) / total.size
+        step = float(np.sum(np.abs(self.precondition(residual, face)))) / self.scale
+        return (step + uniform) / load
+
     def gap_under_approach(self, pressure: Array, displacement: Array, here: Array, lowest: float) -> float:
         """The duality gap where the approach is given."""
         excess = float(np.sum(pressure * (here - self.target)))
@@ -525,6 +557,7 @@ class _Problem:
         energy: float,
         converged: bool,
         iterations: int,
+        error: float,
     ) -> ContactState:
         load = float(np.sum(pressure))
         approach = level
@@ -542,6 +575,7 @@ class _Problem:
             converged=converged,
             iterations=iterations,
             convolutions=self.convolutions,
+            error=error,
         )
 
 
