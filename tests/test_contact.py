@@ -1,5 +1,8 @@
 """The instantaneous contact problem: optimality, oracles, an independent program, degenerate cases."""
 
+import importlib
+import pathlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +10,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 from test_halfspace import direct
 
+import roughvisc as rv
 from roughvisc.mechanics import closed_forms, contact
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace import HalfSpace
@@ -289,6 +293,149 @@ def test_given_approach__near_full_contact_is_finite_where_the_kernel_is_singula
         state = solve_contact(halfspace, gap, approach=approach, tolerance=1e-14, start=start, max_iterations=300)
         assert np.isfinite(state.pressure).all()
         assert np.isfinite([state.load, state.bound]).all()
+
+
+def full_load(halfspace, gap):
+    """Least load that closes all of a periodic surface: that of its full-contact pressure, exact by Fourier series."""
+    nx, ny = gap.shape
+    qx = 2 * np.pi * np.fft.fftfreq(nx, halfspace.spacing[0])[:, None]
+    qy = 2 * np.pi * np.fft.fftfreq(ny, halfspace.spacing[1])[None, :]
+    wanted = np.fft.ifft2(np.fft.fft2(gap.mean() - gap) * np.hypot(qx, qy) / 2).real
+    return -wanted.min() * gap.size
+
+
+def nearly_full(kind):
+    """Half-space and gap, with odd and unequal sides."""
+    shape, spacing = (33, 40), (1.0, 0.7)
+    x, y = (np.arange(n) / n for n in shape)
+    wave = 2 - np.cos(2 * np.pi * x)[:, None] - np.cos(2 * np.pi * y)
+    return HalfSpace(shape, spacing, "periodic"), wave if kind == "wave" else rough_gap(shape, seed=4)
+
+
+@pytest.mark.parametrize("kind", ["wave", "rough"])
+@pytest.mark.parametrize("short", [0.3, 0.05, 1e-2, 1e-4, 1e-6])
+def test_given_approach__near_full_contact_is_certain_of_the_load(kind, short):
+    """The energy does not see a uniform pressure: twice the load once passed for converged."""
+    halfspace, gap = nearly_full(kind)
+    full = full_load(halfspace, gap)
+    exact = solve_contact(halfspace, gap, load=(1 - short) * full, tolerance=1e-14, max_iterations=5000)
+    touching = exact.pressure > 0
+    approach = np.mean((gap + halfspace.displacement(exact.pressure))[touching])
+    starts = [None, exact.pressure + 2 * full / gap.size, 0.5 * exact.pressure]
+    for tolerance in (3e-4, 3e-5, 3e-6):
+        for start in starts:
+            state = solve_contact(halfspace, gap, approach=approach, tolerance=tolerance, start=start)
+            assert state.converged
+            assert abs(state.load / exact.load - 1) < 10 * tolerance
+            assert state.iterations < 500
+
+
+@pytest.mark.parametrize("absent", [1, 40])
+def test_given_approach__is_certain_of_the_load_where_absent_cells_alone_are_open(absent):
+    halfspace, gap = nearly_full("wave")
+    present = np.ones(gap.shape, bool)
+    present.reshape(-1)[7 : 7 + absent] = False
+    for mean in (0.6, 1.5):
+        load = mean * full_load(halfspace, gap)
+        exact = solve_contact(halfspace, gap, load=load, present=present, tolerance=1e-14)
+        approach = np.mean((gap + halfspace.displacement(exact.pressure))[exact.pressure > 0])
+        for tolerance in (3e-4, 3e-6):
+            for start in (None, 3 * exact.pressure):
+                state = solve_contact(
+                    halfspace, gap, approach=approach, present=present, tolerance=tolerance, start=start
+                )
+                assert state.converged
+                assert abs(state.load / load - 1) < 10 * tolerance
+
+
+@pytest.mark.parametrize("deeper", [0.0, 1e-12, 1e-3])
+def test_given_approach__of_full_contact_does_not_determine_the_load(deeper):
+    """Every load above that of full contact has this approach: said at once, and not searched for."""
+    halfspace, gap = nearly_full("rough")
+    pressed = solve_contact(halfspace, gap, load=2 * full_load(halfspace, gap), tolerance=1e-12)
+    approach = gap.mean() * (1 + deeper)
+    for start in (None, pressed.pressure):
+        state = solve_contact(halfspace, gap, approach=approach, tolerance=1e-6, start=start)
+        assert not state.converged
+        assert state.iterations < 300
+    assert state.load == pytest.approx(pressed.load)
+
+
+@pytest.mark.parametrize("kind", ["wave", "rough"])
+def test_given_load__near_full_contact_knows_the_mean_gap(kind):
+    """The approach is taken from loosely solved pressures; what counts is how much is left to full contact."""
+    halfspace, gap = nearly_full(kind)
+    for short in (1e-2, 1e-3, 1e-4):
+        load = (1 - short) * full_load(halfspace, gap)
+        tight = solve_contact(halfspace, gap, load=load, tolerance=1e-14, max_iterations=5000)
+        total = gap + halfspace.displacement(tight.pressure)
+        expected = gap.mean() - np.mean(total[tight.pressure > 0])
+        loose = solve_contact(halfspace, gap, load=load, tolerance=3e-5)
+        assert gap.mean() - loose.approach == pytest.approx(expected, rel=0.05)
+    pressed = solve_contact(halfspace, gap, load=2 * full_load(halfspace, gap), tolerance=1e-4)
+    assert pressed.approach == pytest.approx(gap.mean(), rel=1e-14)
+
+
+@pytest.mark.parametrize("short", [0.1, 1e-2, 1e-4])
+def test_held_approach__after_a_load_near_full_contact_relaxes(short):
+    """Held from a jump on, every pressure relaxes as the material does: exact for any surface."""
+    surface = rv.wavy(0.02, 1.0, 1.0, (24, 24))
+    gap = surface.values.max() - surface.values
+    halfspace = HalfSpace(gap.shape, (1 / 24, 1 / 24), "periodic")
+    force = (1 - short) * full_load(halfspace, gap) * 4 / gap.size  # contact modulus 4 Pa on 1 m2
+    program = rv.Program().load(force, over=0).hold(2.0, control="approach")
+    material = rv.zener(1.0, 1.0, 1.0)
+    result = rv.simulate(surface, material, program, boundary="periodic", tolerance=1e-2, times=[0.5, 2.0])
+    assert (result.status == 0).all()
+    time = result.time.values
+    assert result.force.values == pytest.approx(force * (0.5 + 0.5 * np.exp(-2 * time)), rel=1e-2)
+
+
+def test_error__is_honestly_estimated(monkeypatch):
+    """Against solutions at a tolerance of 1e-14: spheres, cones, punches, waves, rough surfaces, quarters of them."""
+    monkeypatch.syspath_prepend(str(pathlib.Path(__file__).parents[1] / "workflows" / "benchmarks"))
+    found = importlib.import_module("solver_error").rows((34,), (1e-3, 3e-5))
+    known = [row for row in found if row["error"] > 1e-9]
+    ratios = np.array([row["estimate"] / row["error"] for row in known])
+    assert ratios.size > 350
+    assert np.mean(ratios >= 0.8) > 0.97
+    assert ratios.min() > 0.5, known[np.argmin(ratios)]["case"]
+    assert np.median(ratios) < 1.6
+    assert np.mean(ratios < 5) > 0.98
+
+
+@pytest.mark.parametrize("known", [{"load": 20.0}, {"approach": 2.0}], ids=["load", "approach"])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_error__costs_nothing_unless_asked_for(boundary, known):
+    halfspace, gap = HalfSpace((31, 28), (1.0, 1.0), boundary), rough_gap((31, 28))
+    plain = solve_contact(halfspace, gap, tolerance=1e-4, **known)
+    asked = solve_contact(halfspace, gap, tolerance=1e-4, estimate_error=True, **known)
+    assert np.isnan(plain.error)
+    assert 0 < asked.error < 1e-2
+    assert asked.pressure.tobytes() == plain.pressure.tobytes()
+    assert asked.convolutions - plain.convolutions == (2 if boundary == "periodic" and "approach" in known else 1)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_error__has_no_unit(boundary):
+    errors = []
+    for size in (1.0, 1e-9, 1e6):
+        halfspace, gap = HalfSpace((31, 28), (size, 0.7 * size), boundary), size * rough_gap((31, 28))
+        by_load = solve_contact(halfspace, gap, load=20.0, tolerance=1e-3, estimate_error=True)
+        approach = solve_contact(halfspace, gap, load=20.0, tolerance=1e-12).approach
+        by_approach = solve_contact(halfspace, gap, approach=approach, tolerance=1e-3, estimate_error=True)
+        errors.append([by_load.error, by_approach.error])
+    assert errors[1] == pytest.approx(errors[0], rel=1e-4)
+    assert errors[2] == pytest.approx(errors[0], rel=1e-4)
+
+
+def test_error__is_unbounded_where_the_approach_does_not_determine_the_load():
+    halfspace, gap = nearly_full("rough")
+    pressed = solve_contact(halfspace, gap, load=2 * full_load(halfspace, gap), tolerance=1e-12)
+    state = solve_contact(
+        halfspace, gap, approach=gap.mean(), start=pressed.pressure, tolerance=1e-6, estimate_error=True
+    )
+    assert state.error == np.inf
 
 
 @pytest.fixture
