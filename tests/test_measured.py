@@ -81,6 +81,44 @@ def test_from_relaxation_table__spends_few_terms(noise, most):
     assert equilibrium + np.exp(-t[:, None] / times) @ moduli == pytest.approx(exact, rel=max(2 * noise, 1e-3))
 
 
+def stated_between(material):
+    return float(re.search(r"error between rows up to about ([\d.e+-]+)", material.note)[1])
+
+
+#: relaxation with a wide spectrum, and with three terms that six rows cannot tell
+WIDE = {
+    "power": lambda t: 1e5 + 1e6 * t**-0.3,
+    "stretched": lambda t: 1e5 + 2e6 * np.exp(-((t / 0.1) ** 0.4)),
+    "logarithm": lambda t: 2e6 / (1 + 0.3 * np.log1p(t / 1e-4)),
+}
+
+
+@pytest.mark.parametrize("rows", [6, 12, 30])
+@pytest.mark.parametrize("name", [*WIDE, "three terms"])
+def test_from_relaxation_table__states_the_error_between_the_rows(name, rows):
+    """Few rows can be met exactly in many ways: the misfit says nothing, the rows predicted from the others do."""
+    curve = WIDE.get(name, relaxation)
+    t, between = np.geomspace(1e-4, 1e2, rows), np.geomspace(1e-4, 1e2, 500)
+    material = from_relaxation_table(t, curve(t))
+    equilibrium, moduli, times = material.relaxation_spectrum()
+    error = np.abs((equilibrium + np.exp(-between[:, None] / times) @ moduli) / curve(between) - 1).max()
+    assert error <= 2 * stated_between(material) + 1e-4
+    if name in WIDE:  # a smooth spectrum follows where the sparse one would be up to 33 % off
+        assert error <= {6: 0.05, 12: 4e-3, 30: 1e-3}[rows]
+
+
+def test_from_dynamic__states_the_error_between_the_rows():
+    errors = []
+    for rows in (5, 40):
+        omega = np.geomspace(1e-2, 1e4, rows)
+        material = from_dynamic(omega, *dynamic(omega), frequency_unit="rad/s", poisson=0.4)
+        errors.append((stated_between(material), distance(material)))
+    assert errors[0][0] > 0.05 > errors[1][0]
+    assert errors[1][1] <= 2 * errors[1][0]
+    two = from_dynamic((1.0, 2.0), (1.0, 2.0), (1.0, 1.0), frequency_unit="rad/s")
+    assert "between rows" not in two.note, "no row lies between others"
+
+
 def test_from_relaxation_table__of_an_elastic_material_is_elastic():
     material = from_relaxation_table([0.0, 1.0, 2.0], [2.0, 2.0, 2.0])
     assert material.times == ()

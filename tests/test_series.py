@@ -38,21 +38,32 @@ def test_power_law_series__keeps_the_tolerance(exponent, glassy, shortest, decad
     assert found.error <= tolerance
     assert error(material, found, shortest, longest) <= 1.05 * found.error + 1e-14
     assert found.prony.poisson == 0.3
-    assert found.prony.glassy > glassy
+    assert found.prony.glassy == glassy
     assert found.prony.fluidity > 0
-    assert min(found.prony.compliances) > 0
 
 
-#: decades of time, tolerance -> number of terms, for exponents 0.2, 0.5 and 0.8 (the measured figures of the method)
+@pytest.mark.parametrize("exponent", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_power_law_series__means_from_rest_are_right_as_well(exponent, tolerance):
+    """What creeps before the shortest time has the right integral: a first step, or a short ramp, asks for that."""
+    material = PowerLaw(0.0, 1.0, exponent)
+    found = power_law_series(material, 1e-3, 10.0, tolerance)
+    steps = np.geomspace(1e-3, 10.0, 50)
+    means = [body.mean_contact_compliance(0.0, steps) for body in (found.prony, material)]
+    assert means[0] == pytest.approx(means[1], rel=1.5 * tolerance, abs=0)
+
+
+#: decades of time, tolerance -> number of terms, for exponents 0.2, 0.5 and 0.8 (measured figures of the method,
+#: and one term for all that creeps before)
 TERMS = {
-    (3, 1e-2): (4, 5),
-    (3, 1e-4): (11, 12),
-    (3, 1e-6): (20, 24),
-    (3, 1e-8): (31, 39),
-    (6, 1e-2): (6, 8),
-    (6, 1e-4): (16, 18),
-    (6, 1e-6): (29, 33),
-    (6, 1e-8): (44, 52),
+    (3, 1e-2): (5, 6),
+    (3, 1e-4): (12, 13),
+    (3, 1e-6): (21, 25),
+    (3, 1e-8): (32, 40),
+    (6, 1e-2): (7, 9),
+    (6, 1e-4): (17, 19),
+    (6, 1e-6): (30, 34),
+    (6, 1e-8): (45, 53),
 }
 
 
@@ -101,15 +112,16 @@ CURVES = {
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize(
     ("decades", "tolerance", "most"),
-    [(3, 1e-2, 5), (3, 1e-4, 9), (6, 1e-2, 8), (6, 1e-4, 16), (6, 1e-5, 25), (3, 1e-5, 13)],
+    [(3, 1e-2, 5), (3, 1e-4, 9), (6, 1e-2, 8), (6, 1e-4, 16), (6, 1e-5, 25), (3, 1e-5, 15)],
 )
 def test_table_series__of_smooth_creep_has_few_terms(curve, decades, tolerance, most):
-    """Up to 1.2 terms a decade for 1e-2 and 2.5 for 1e-4, with a term or so for the ends."""
+    """Up to 1.2 terms a decade for 1e-2 and 2.5 for 1e-4, with a term or two for the ends."""
     shortest, longest = 1e-3, 10.0 ** (decades - 3)
     table = sampled(CURVES[curve], shortest, longest, 2000, poisson=0.1)
     found = table_series(table, shortest, longest, tolerance)
     assert found.error <= tolerance
-    assert error(table, found, shortest, longest) <= 1.05 * found.error
+    assert error(table, found, shortest, longest) <= 1.1 * found.error
+    assert found.prony.glassy == table.creep_compliance(0.0)
     assert len(found.prony.times) <= most
     assert found.prony.poisson == 0.1
 
@@ -158,6 +170,33 @@ def test_table_series__over_24_decades():
     found = table_series(table, 1e-12, 1e12, 1e-3)
     assert found.error <= 1e-3
     assert error(table, found, 1e-12, 1e12) <= 1.05e-3
+
+
+def test_table_series__is_measured_from_the_first_row_on():
+    """Before it nothing was measured, and the series takes its own course there, from what is there at once."""
+    t = np.geomspace(1e-3, 10.0, 200)
+    table = Tabulated((0.0, *t), (0.0, *t**0.4))
+    found = table_series(table, 1e-7, 10.0, 1e-3)
+    assert found.shortest == pytest.approx(1e-3)
+    assert found.error <= 1e-3
+    assert found.prony.glassy == 0
+    assert error(table, found, 1e-3, 10.0) <= 1.05e-3
+
+
+def test_series_of__a_noisy_table_is_made_passive_whatever_the_tolerance():
+    noisy = (0.5 + 1e-3**0.3) + np.maximum.accumulate(np.random.default_rng(4).uniform(0, 1, 40))
+    table = Tabulated(np.geomspace(1e-3, 1e3, 40), noisy)
+    found = [series_of(table, shortest, 1e3, tolerance) for shortest, tolerance in ((1e-3, 1e-3), (1e-5, 1e-5))]
+    assert found[0].prony == found[1].prony
+    assert found[0].pressed == found[0].prony
+    assert found[0].error == 0
+    assert found[0].repair.startswith("made passive: deviates from the rows by at most ")
+    smooth = sampled(CURVES["logarithm"], 1e-3, 1e3, 2000)
+    assert series_of(smooth, 1e-3, 1e3, 1e-4).repair == ""
+    both = series_of(materials.pair(table, PowerLaw(0.3, 1.0, 0.4)), 1e-3, 1e3, 1e-4)
+    assert both.repair == f"a: {found[0].repair}"
+    assert 0 < both.error <= 1e-4
+    assert error(both.pressed, both, 1e-3, 1e3) <= 1.05 * both.error
 
 
 def test_table_series__is_not_asked_beyond_the_table():

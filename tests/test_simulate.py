@@ -245,7 +245,7 @@ FOLLOWED = {
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
     material, program = FOLLOWED[name]
-    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS}
+    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "memory": "direct" if "direct" in name else "auto"}
     followed = simulate(two_hills(), material, program, **settings)
     assert len(set(solved_on)) >= 2, "the window grew"
     assert solved_on[0][0] < 60

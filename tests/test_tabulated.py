@@ -34,10 +34,33 @@ def test_mean__over_spans_of_any_kind_at_once():
     assert found[0] * 100 == pytest.approx(float(TABLE.contact_integral(1.0)) + found[4] * 99, rel=1e-14, abs=0)
 
 
-def test_first_row__holds_before_it_and_says_so():
-    table = Tabulated((2.0, 4.0), (5.0, 6.0))
-    assert table.creep_compliance([0.0, 1e-9, 2.0]) == pytest.approx([5.0, 5.0, 5.0])
-    assert table.notes == ("the compliance of the first row, at 2 s, holds before it too",)
+#: creep -> its compliance at time zero
+BEGINNINGS = {
+    "power": (lambda t: 2 + t**0.5, 2.0),
+    "almost all at once": (lambda t: 2 - np.exp(-t / 0.4), 1.0),
+    "stretched": (lambda t: 1 - 5 * np.expm1(-(t**0.4)), 1.0),
+}
+
+
+@pytest.mark.parametrize("name", BEGINNINGS)
+def test_before_the_first_row__creep_goes_on_as_it_does_after(name):
+    creep, at_once = BEGINNINGS[name]
+    t = np.geomspace(1e-3, 10.0, 60)
+    table = Tabulated(t, creep(t))
+    assert float(table.creep_compliance(0.0)) == pytest.approx(at_once, rel=0.04, abs=0)
+    early = np.geomspace(1e-5, 1e-3, 50)
+    assert table.creep_compliance(early) == pytest.approx(creep(early), rel=0.08, abs=0)
+    assert table.notes[0].startswith("nothing was measured before 0.001 s: the compliance at once is taken as ")
+
+
+def test_before_the_first_row__a_logarithm_goes_on_for_a_decade():
+    t = np.geomspace(2.0, 2e3, 20)
+    table = Tabulated(t, 5.0 + 0.1 * np.log(t))
+    first = 5 + 0.1 * np.log(2)
+    expected = first - 0.1 * np.array([1 + np.log(10), np.log(10), np.log(2), 0])
+    assert table.creep_compliance([0.0, 0.2, 1.0, 2.0]) == pytest.approx(expected, rel=1e-12, abs=0)
+    assert Tabulated((2.0, 4.0), (5.0, 5.0)).creep_compliance(0.0) == 5.0
+    assert Tabulated((2.0, 4.0), (5.0, 15.0)).creep_compliance(0.0) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,15 @@ from typing import Literal
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.history import History, history_bytes
-from roughvisc.mechanics.materials import Material, Prony
-from roughvisc.mechanics.memory import ActsOn, Memory, Modes, stiff_ratio
+from roughvisc.mechanics.history import History
+from roughvisc.mechanics.materials import Material, Pair, Prony, Tabulated
+from roughvisc.mechanics.memory import ActsOn, Modes, stiff_ratio
+from roughvisc.mechanics.passive import smallest_loss
 from roughvisc.mechanics.series import series_of
 
 #: Part of the tolerance that a series in place of a material may take.
 SERIES_SHARE = 0.1
-#: A series is certified from this part of the program's length to its whole.
+#: A series is certified from this part of the program's length on, if nothing else is asked for.
 SHORTEST_AGE = 1e-6
 #: Up to so many exponentials are remembered as pressures and as displacements where the grid may change: the passes
 #: over the grid that each of them takes cost less than the convolution that this saves (measured at 128 squared).
@@ -37,17 +38,23 @@ class Engine:
 
     Attributes
     ----------
-    memory : Memory
+    memory : Modes or History
         What the stepper marches with.
     series_error : float
-        Largest relative error of the compliance over the times used; zero where the memory is exact.
+        Largest relative error of the compliance at time zero and from the shortest age on; zero where the memory is
+        exact. Before that age it is less, relative to the compliance that has crept by then.
     note : str
         What is modelled, in words.
     """
 
-    memory: Memory
+    memory: Modes | History
     series_error: float
     note: str
+
+    @property
+    def material(self) -> Material:
+        """What is pressed: the material, or the series in its place."""
+        return self.memory.material
 
 
 def engine_for(
@@ -56,6 +63,7 @@ def engine_for(
     tolerance: float,
     acts_on: ActsOn = "displacement",
     kind: Kind = "auto",
+    shortest: float | None = None,
 ) -> Engine:
     """Memory for a material over a program.
 
@@ -71,12 +79,16 @@ def engine_for(
         The form that a recursive memory takes; one of pressures may be one of both.
     kind : {"auto", "direct"}
         ``direct``: the direct history, whatever the material; dearer, and independent of any series.
+    shortest : float, optional
+        Shortest age at which the compliance is asked for, beside zero; a millionth of the program's length if not
+        given. [s]
 
     Returns
     -------
     Engine
-        Recursive exponentials where the material is a series or has one within a tenth of the tolerance; else the
-        direct history, where that is accurate; else the best series, with its error.
+        Recursive exponentials: those of the material, if it is a series; else a series in its place, within a tenth of
+        the tolerance if there is one. A table that has none is made passive: what is pressed then is the positive
+        series nearest to it.
 
     Raises
     ------
@@ -91,22 +103,31 @@ def engine_for(
                 "memory='direct' takes the pressure as linear in each step, which rings on this material: "
                 "expected memory='auto', or an instantaneous compliance that is not small"
             )
-        return Engine(History(material), 0.0, "direct history of every pressure, as asked for")
+        return Engine(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")
     if isinstance(material, Prony):
         return Engine(_recursive(material, acts_on, duration), 0.0, _terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
         glassy = float(material.contact_compliance(0.0))
         return Engine(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
-    series = series_of(material, SHORTEST_AGE * duration, duration, SERIES_SHARE * tolerance)
-    certified = f"{_terms(series.prony)} in place of the compliance, within {series.error:.1e} of it"
-    if series.error > SERIES_SHARE * tolerance and _direct_is_accurate(material, duration):
-        return Engine(
-            History(material),
-            0.0,
-            f"direct history of every pressure (the best series, {series.error:.1e} off, missed the tolerance); about "
-            f"{history_bytes(1e4, 1e3) / 1e6:.0f} MB for 1000 steps with 10000 cells in contact",
+    shortest = SHORTEST_AGE * duration if shortest is None else shortest
+    material.contact_compliance(duration)  # refuses what ends before
+    series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
+    said = [_terms(series.prony)]
+    if series.pressed != series.prony:
+        said[0] += (
+            f" in place of the compliance, within {series.error:.1e} of it at once and from {series.shortest:.1g} s"
         )
-    return Engine(_recursive(series.prony, acts_on, duration), series.error, certified)
+    if series.repair:
+        said.append(series.repair)
+    return Engine(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said))
+
+
+def _active(material: Material) -> str:
+    """What to say of tables that are not passive."""
+    if isinstance(material, Pair):
+        return _active(material.a) + _active(material.b)
+    least = smallest_loss(material) if isinstance(material, Tabulated) else 0.0
+    return f"; the table is not passive: sin(delta), about its loss factor, falls to {least:.2g}" if least < 0 else ""
 
 
 def _recursive(series: Prony, acts_on: ActsOn, duration: float) -> Modes:

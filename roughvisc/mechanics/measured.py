@@ -29,6 +29,11 @@ _ALLOWED = 1.1
 _ACCURATE = 2e-4
 #: how far beyond the measured times terms are offered: a slower one is a plateau, a faster one is not seen
 _BEYOND = 3.0
+#: estimated error between rows beyond which a smooth spectrum is tried: its terms in a decade, and the weight of the
+#: steps from term to term beside the misfit of the rows
+_ROUGH, _SMOOTH_PER_DECADE, _STEPS = 0.01, 3, 0.01
+#: rows that are left out in turn, at most
+_LEFT_OUT = 40
 
 
 def from_creep_table(
@@ -86,7 +91,8 @@ def from_relaxation_table(
     Returns
     -------
     Prony
-        Its ``note`` states the number of terms, the misfit, and the times that were measured.
+        Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
+        times that were measured.
 
     Raises
     ------
@@ -98,6 +104,10 @@ def from_relaxation_table(
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
     ``theta``; then :func:`~roughvisc.mechanics.relaxation.from_relaxation`, which is exact. Outside the measured
     times the series says what its slowest and its fastest terms say.
+
+    The error between rows is estimated by leaving out each inner row in turn and predicting it from the others, which
+    lie twice as far apart there: mostly too large, hardly ever too small. If it exceeds 1 %, a smooth spectrum is
+    tried, with the steps from term to term small as well, and taken if it predicts the rows twice as well.
     """
     t, values = checked_rows(("time", "modulus"), times, moduli)
     for row in np.flatnonzero(values == 0)[:1]:
@@ -109,6 +119,7 @@ def from_relaxation_table(
         (known[0] / _BEYOND, known[-1] * _BEYOND),
         shear,
         shear,
+        t,
     )
     return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
 
@@ -143,7 +154,8 @@ def from_dynamic(
     Returns
     -------
     Prony
-        Its ``note`` states the number of terms, the misfit, and the frequencies that were measured.
+        Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
+        frequencies that were measured.
 
     Raises
     ------
@@ -180,6 +192,7 @@ def from_dynamic(
         (1 / (_BEYOND * omega.max()), _BEYOND / omega.min()),
         target,
         np.maximum(target, 1e-3 * np.tile(np.hypot(elastic, viscous), 2)),
+        np.tile(omega, 2),
     )
     return spectrum.material(omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", poisson)
 
@@ -194,11 +207,15 @@ def _tensile_to_shear(kind: Kind, poisson: float) -> float:
 
 @dataclass(frozen=True)
 class _Spectrum:
-    """Moduli [Pa], the equilibrium modulus first, at relaxation times [s], and the relative misfit of each datum."""
+    """Moduli [Pa], the equilibrium modulus first, at relaxation times [s], and the relative misfit of each datum.
+
+    ``between`` is the largest error of rows predicted from the others.
+    """
 
     moduli: Array
     theta: Array
     misfit: Array
+    between: float = math.nan
 
     @property
     def terms(self) -> int:
@@ -214,16 +231,46 @@ class _Spectrum:
             float(self.moduli[0]), self.moduli[1:][used].tolist(), self.theta[used].tolist(), poisson
         )
         misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
+        if not math.isnan(self.between):
+            misfit += f", error between rows up to about {self.between:.2g} (rows predicted from the others)"
         return dataclasses.replace(series, note=f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}")
 
 
-def _sparsest(columns: Callable[[Array], Array], within: tuple[float, float], target: Array, scale: Array) -> _Spectrum:
-    """The spectrum of fewest terms among those whose misfit is about the smallest."""
-    found = []
-    for per_decade in _PER_DECADE:
-        theta = lattice(*within, per_decade)
-        matrix = columns(theta)
-        moduli = nonnegative(matrix, target, scale)
-        found.append(_Spectrum(moduli, theta, (matrix @ moduli - target) / scale))
+def _sparsest(
+    columns: Callable[[Array], Array], within: tuple[float, float], target: Array, scale: Array, at: Array
+) -> _Spectrum:
+    """The spectrum of fewest terms among those whose misfit is about the smallest, or a smooth one if rows are few.
+
+    ``at`` tells where a datum was measured: data with the same value are one row.
+    """
+
+    def fitted(theta: Array, steps: float, kept: Array) -> Array:
+        matrix = columns(theta)[kept] / scale[kept, None]
+        between = np.diff(np.eye(theta.size), axis=0) * (steps / np.max(target))
+        matrix = np.vstack([matrix, np.column_stack([np.zeros(theta.size - 1), between])])
+        wanted = np.append(target[kept] / scale[kept], np.zeros(theta.size - 1))
+        return nonnegative(matrix, wanted, np.ones(wanted.size))
+
+    def spectrum(theta: Array, steps: float = 0.0) -> _Spectrum:
+        moduli = fitted(theta, steps, np.ones(at.size, bool))
+        return _Spectrum(moduli, theta, (columns(theta) @ moduli - target) / scale)
+
+    def predicted(one: _Spectrum, steps: float = 0.0) -> _Spectrum:
+        """With the largest error of rows predicted from the others, those at the ends excepted."""
+        inner = np.unique(at)[1:-1]
+        if inner.size == 0:
+            return one
+        matrix, worst = columns(one.theta), 0.0
+        for row in inner[:: math.ceil(inner.size / _LEFT_OUT)]:
+            out = at == row
+            error = (matrix[out] @ fitted(one.theta, steps, ~out) - target[out]) / scale[out]
+            worst = max(worst, float(np.abs(error).max()))
+        return dataclasses.replace(one, between=worst)
+
+    found = [spectrum(lattice(*within, per_decade)) for per_decade in _PER_DECADE]
     enough = max(_ALLOWED * min(one.rms for one in found), _ACCURATE)
-    return min((one for one in found if one.rms <= enough), key=lambda one: one.terms)
+    sparse = predicted(min((one for one in found if one.rms <= enough), key=lambda one: one.terms))
+    if not sparse.between > _ROUGH:
+        return sparse
+    smooth = predicted(spectrum(lattice(*within, _SMOOTH_PER_DECADE), _STEPS), _STEPS)
+    return smooth if smooth.rms <= max(2 * enough, _ROUGH / 10) and smooth.between < sparse.between / 2 else sparse

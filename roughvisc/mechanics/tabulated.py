@@ -20,7 +20,10 @@ class Tabulated:
     """Measured shear creep compliance, without a fit.
 
     Between rows the compliance is linear in the logarithm of time; from a first row at time zero it is linear in
-    time. Below a first row at a later time the first value holds. Beyond the last row there is nothing.
+    time. Before a first row at a later time it goes on as the first decade of rows does, as a power of time or as its
+    logarithm, for another decade, and is linear in time then: a compliance that held until the first row and rose from
+    there would be no passive material's. Not less than a tenth of the first row is there at once. Beyond the last row
+    there is nothing.
 
     Parameters
     ----------
@@ -64,9 +67,12 @@ class Tabulated:
         if not compliances.any():
             raise InputError("all compliances are zero: a rigid material cannot be pressed")
         repaired, notes = _ascending(times, compliances, self.noise)
-        if times[0] > 0:
-            notes.append(f"the compliance of the first row, at {times[0]:g} s, holds before it too")
         object.__setattr__(self, "repaired", tuple(repaired.tolist()))
+        if times[0] > 0:
+            notes.append(
+                f"nothing was measured before {times[0]:g} s: the compliance at once is taken as "
+                f"{_before(times, repaired)[0]:.3g} 1/Pa, from the course of the first decade"
+            )
         object.__setattr__(self, "notes", tuple(notes))
 
     @property
@@ -96,32 +102,60 @@ class Tabulated:
         s, h = np.broadcast_arrays(np.asarray(s, dtype=float), np.asarray(h, dtype=float))
         start, end = self._within(s), self._within(s + h)
         first, last = self._piece(start), self._piece(end)
-        total, length = np.zeros(start.shape), np.zeros(start.shape)
-        for number in range(int(np.max(last - first, initial=0)) + 1):
-            piece = np.minimum(first + number, last)
-            a = np.where(number == 0, start, self._edges[piece])
-            b = np.where(piece == last, end, self._edges[piece + 1])
-            share = np.where(first + number <= last, b - a, 0.0)
-            total += share * self._mean(a, b, piece)
-            length += share
+        # the first piece from the start on, or all that is asked for; the last up to the end
+        one = first == last
+        length = np.where(one, end, self._edges[first + 1]) - start
+        total = length * self._mean(start, start + length, first)
+        tail = np.where(one, 0.0, end - self._edges[last])
+        total += tail * self._mean(self._edges[last], self._edges[last] + tail, last)
+        length += tail
+        # whole pieces between them, in runs of 1, 2, 4, ... pieces
+        place, count = first + 1, np.maximum(last - first - 1, 0)
+        for level, run in enumerate(self._runs):
+            if not count.any():
+                break
+            odd = count % 2 == 1
+            here = np.where(odd, place, 0)
+            total += np.where(odd, run[here], 0.0)
+            length += np.where(
+                odd, self._edges[np.minimum(here + 2**level, self._edges.size - 1)] - self._edges[here], 0.0
+            )
+            place, count = place + odd * 2**level, count // 2
         mean = np.where(length > 0, total / np.where(length > 0, length, 1.0), self._value(start, first))
         return np.asarray(0.5 * (1 - self.poisson) * mean)
+
+    @property
+    def pieces(self) -> tuple[Array, Array]:
+        """Where pieces begin and end, [s]; slopes, the first over time [1/(Pa s)], the others over its logarithm."""
+        return self._edges, self._slopes
 
     @cached_property
     def _edges(self) -> Array:
         """Where pieces begin and end, from zero. [s]"""
-        return np.array(self.times if self.times[0] == 0 else (0.0, *self.times))
+        return np.array(self.times if self.times[0] == 0 else (0.0, self.times[0] / 10, *self.times))
 
     @cached_property
     def _levels(self) -> Array:
         """Compliance at the edges. [1/Pa]"""
-        return np.array(self.repaired if self.times[0] == 0 else (self.repaired[0], *self.repaired))
+        if self.times[0] == 0:
+            return np.array(self.repaired)
+        return np.append(_before(np.array(self.times), np.array(self.repaired)), self.repaired)
 
     @cached_property
     def _slopes(self) -> Array:
         """Rise in each piece: over time in the first, [1/(Pa s)], over the logarithm in the others. [1/Pa]"""
         edges, rise = self._edges, np.diff(self._levels)
         return rise / np.append(edges[1], np.log1p(np.diff(edges[1:]) / edges[1:-1]))
+
+    @cached_property
+    def _runs(self) -> list[Array]:
+        """Integrals over each piece, over two from each on, over four, ... [s/Pa]"""
+        pieces = np.arange(self._edges.size - 1)
+        runs = [np.diff(self._edges) * self._mean(self._edges[:-1], self._edges[1:], pieces)]
+        while 2 ** len(runs) <= pieces.size:
+            step = 2 ** (len(runs) - 1)
+            runs.append(runs[-1][:-step] + runs[-1][step:])
+        return runs
 
     def _within(self, t: ArrayLike) -> Array:
         """The times, if the table has them; rounding beyond its end is cut off. [s]"""
@@ -149,6 +183,23 @@ class Tabulated:
         in_time = (b - a) / 2
         in_logarithm = _mean_logarithm((b - a) / np.where(piece > 0, a, 1.0))
         return self._value(a, piece) + self._slopes[piece] * np.where(piece > 0, in_logarithm, in_time)
+
+
+def _before(times: Array, compliances: Array) -> tuple[float, float]:
+    """Compliance at time zero, and at a tenth of the first time, of a table that begins later. [1/Pa]
+
+    The course in the first decade tells it: as a power law, ``J(0) + a t^alpha`` through its two ends and its middle,
+    or as logarithmic creep that began a decade earlier, whichever falls less. An exponent above one counts as one.
+    """
+    first, span = float(compliances[0]), min(10.0, times[-1] / times[0])
+    at = np.log(times[0]) + np.log(span) * np.array([0.5, 1.0])
+    middle, end = (float(value) for value in np.interp(at, np.log(times), compliances))
+    ratio = min((end - middle) / (middle - first), np.sqrt(span)) if middle > first else np.sqrt(span)
+    power = (middle - first) / (ratio - 1) if ratio > 1 else np.inf
+    logarithmic = (end - first) / np.log(span) * (1 + np.log(10))
+    left = 10 ** -(np.log(ratio) / np.log(np.sqrt(span))) if power < logarithmic else 1 / (1 + np.log(10))
+    fallen = min(power, logarithmic, 0.9 * first)
+    return first - fallen, first - fallen * float(1 - left)
 
 
 def _ascending(times: Array, compliances: Array, noise: float) -> tuple[Array, list[str]]:

@@ -16,7 +16,7 @@ from roughvisc.study.case import Case
 from roughvisc.study.estimate import March, Stopwatch, march_of, memory, solved_on, windows, work
 from roughvisc.study.ladder import Setting, changed, shape_of
 from roughvisc.study.run import compute, unconverged
-from roughvisc.study.scene import Ground, follows
+from roughvisc.study.scene import Ground, follows, kept_times, shortest_age
 from roughvisc.study.store import open_result, write_result
 
 Report = Callable[[str, float, float], None]
@@ -163,7 +163,10 @@ class Bench:
         """As a plan counts it, with the steps that were taken. [byte]"""
         solve, cells = case.settings.solve, dataset.sizes["x"] * dataset.sizes["y"]
         contact, rows = float(dataset["contact_fraction"].max()), dataset.sizes["time"]
-        engine = engine_for(case.material(), case.program().duration, solve.tolerance, kind=solve.memory)
+        program, keep = case.program(), case.settings.keep
+        kept = kept_times(program, None if keep.times == "all" else keep.times)
+        shortest = shortest_age(program, kept, solve.tolerance)
+        engine = engine_for(case.material(), program.duration, solve.tolerance, kind=solve.memory, shortest=shortest)
         found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
         increments = 8.0 * cells * steps if solve.method == "seed" else 0.0
         part = 1.0 if solve.method == "seed" else self._part

@@ -21,7 +21,7 @@ from roughvisc.study.estimate import March, Stopwatch, disk, march_of, memory, s
 from roughvisc.study.notes import left_out
 from roughvisc.study.results import parameters_of
 from roughvisc.study.run import result_folder
-from roughvisc.study.scene import Ground, follows
+from roughvisc.study.scene import Ground, follows, kept_times, shortest_age
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
@@ -194,12 +194,15 @@ class _Engines:
         self._found: dict[str, Engine] = {}
 
     def of(self, case: Case, grows: bool) -> Engine:
-        settings, duration = case.settings, case.program().duration
+        settings, program = case.settings, case.program()
+        duration = program.duration
+        kept = kept_times(program, None if settings.keep.times == "all" else settings.keep.times)
         acts_on = "pressure" if grows else "displacement"
-        name = f"{settings.material!r} {duration!r} {settings.solve.tolerance!r} {settings.solve.memory} {acts_on}"
+        solve = settings.solve
+        shortest = shortest_age(program, kept, solve.tolerance)
+        name = f"{settings.material!r} {duration!r} {shortest!r} {solve.tolerance!r} {solve.memory} {acts_on}"
         if name not in self._found:
-            solve = settings.solve
-            self._found[name] = engine_for(case.material(), duration, solve.tolerance, acts_on, solve.memory)
+            self._found[name] = engine_for(case.material(), duration, solve.tolerance, acts_on, solve.memory, shortest)
         return self._found[name]
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.engine import Engine, Kind, engine_for
+from roughvisc.mechanics.control import SMALLEST_STEP
+from roughvisc.mechanics.engine import SERIES_SHARE, Engine, Kind, engine_for
 from roughvisc.mechanics.halfspace import Boundary, HalfSpace
 from roughvisc.mechanics.loading import Program
 from roughvisc.mechanics.materials import Material
@@ -180,13 +181,15 @@ def prepare(
     while ground.window.outside <= foreseen:
         ground.widen()
     grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
-    engine = engine_for(material, program.duration, tolerance, "pressure" if grows else "displacement", memory)
+    kept = kept_times(program, times)
+    acts_on: Literal["pressure", "displacement"] = "pressure" if grows else "displacement"
+    engine = engine_for(material, program.duration, tolerance, acts_on, memory, shortest_age(program, kept, tolerance))
     scene = Scene(
         halfspace=ground.halfspace(boundary),
-        material=material,
+        material=engine.material,
         memory=engine.memory,
         program=program,
-        times=kept_times(program, times),
+        times=kept,
         tolerance=float(tolerance),
         time_step=None if time_step == "auto" else float(time_step),
         accept_edge=edge == "accept",
@@ -262,6 +265,41 @@ def _check_approach(program: Program, boundary: str, gap: NDArray[np.float64]) -
                 f"program.{i}: approach goes to {largest:.6g} m, and with periodic boundaries contact is full at "
                 f"{full:.6g} m: expected less"
             )
+
+
+def shortest_age(program: Program, kept: Sequence[float] | None, tolerance: float) -> float:
+    """Shortest age, beside zero, at which the compliance matters to what is kept. [s]
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    kept : sequence of float or None
+        Kept times, None for every accepted step. [s]
+    tolerance : float
+        Relative error that is allowed.
+
+    Returns
+    -------
+    float
+        Zero for a program of jumps alone.
+
+    Notes
+    -----
+    What is kept soonest after a corner of the program resolves the shortest interval. Pressure that came in the last
+    part ``f`` of an interval ``h`` is all that meets ages below ``f h``. What a compliance that ascends from the right
+    value at age zero can be wrong by there is the creep till then: for the whole interval less than ``f`` of
+    ``C(h)``. With a tenth of the tolerance for ``f`` that is as much as the error beyond may be. Steps below a
+    millionth of a segment are not taken, so that ``f`` need not be less.
+    """
+    spans = [min(segment.duration, segment.period) for segment in program.segments if segment.duration > 0]
+    if not spans:
+        return 0.0
+    if kept is None:
+        return SMALLEST_STEP * min(spans)
+    times = np.array(sorted(kept))
+    after = [times[times > corner][:1] - corner for corner in program.corners]
+    return float(min([*spans, *np.concatenate(after)])) * max(SERIES_SHARE * tolerance, SMALLEST_STEP)
 
 
 def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[float, ...] | None:
