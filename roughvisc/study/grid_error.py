@@ -11,18 +11,9 @@ import xarray as xr
 
 from roughvisc.errors import RoughviscError
 from roughvisc.study.coarser import coarser, pressure_distance
+from roughvisc.study.richardson import ORDERS
 
 log = logging.getLogger("roughvisc")
-
-#: Power of the cell's side with which the error of a quantity vanishes, at most: of the pressure its L1 norm. Measured;
-#: the mean gap follows the displacements, the counted area the cells at its edge.
-ORDERS = {
-    "pressure": 1.5,
-    "approach": 2.0,
-    "contact_area": 1.0,
-    "contact_area_corrected": 1.0,
-    "mean_gap": 2.0,
-}
 
 
 def with_grid_error(
