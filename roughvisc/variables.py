@@ -54,7 +54,12 @@ VARIABLES: dict[str, Variable] = {
     "x": Variable(("x",), "m", "position of the cell centre along x"),
     "y": Variable(("y",), "m", "position of the cell centre along y"),
     # the surface
-    "height": Variable(_GRID, "m", "height of the rigid profile, peaks up", "as conditioned; missing where absent"),
+    "height": Variable(
+        _GRID,
+        "m",
+        "height of the rigid profile, peaks up",
+        "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
+    ),
     "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
     "pressure": Variable(_FRAME, "Pa", "contact pressure", "zero outside the contact and where the profile is absent"),

@@ -105,7 +105,8 @@ class Rows:
         for name in self._fields:
             frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)
-        variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float))
+        highest = {"highest": self._ground.highest}
+        variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
         if "filled" in height.coords:
             variables["filled"] = (("x", "y"), height["filled"].values)
         dataset = xr.Dataset(

@@ -22,7 +22,7 @@ from roughvisc.mechanics.window import Window, whole_domain, window_around
 from roughvisc.study.mirror import is_mirrored, quarter
 from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
-from roughvisc.topography.indenters import grown
+from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2
@@ -76,8 +76,12 @@ class Ground:
         self.domain = height[cells]
         values = self.domain.values
         self.present: NDArray[np.bool_] = present[cells]
+        #: Height of the highest point, which on an indenter may lie between the cells. [m]
+        self.highest = highest(height)
         #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
-        self.gap = np.nanmax(values) - values
+        self.gap = self.highest - values
+        #: The least of it, which is not zero where the highest point lies between the cells. [m]
+        self.least_gap = float(np.nanmin(self.gap))
         self.gap[~self.present] = 0.0
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
