@@ -97,7 +97,8 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "m2",
         "real contact area, corrected for the grid",
-        "counted area less 0.088 times the staircase perimeter times the cell side",
+        "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
+        "cells in contact and present cells out of contact: where the material ends the count is exact",
     ),
     "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area"),
     "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells"),
