@@ -81,8 +81,9 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "m",
         "rigid-body approach from first touch",
-        "free space: against the undeformed plane; periodic: mean undeformed gap minus mean gap; "
-        "while the contact is open: the value at which it would just close",
+        "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
+        "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
+        "absent; while the contact is open: the value at which it would just close",
     ),
     "work": Variable(
         _SERIES,

@@ -179,7 +179,8 @@ def prepare(
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
-    _check_approach(program, boundary, ground.gap[ground.present])
+    if boundary == "periodic" and ground.present.all():
+        _check_approach(program, ground.mean_gap)
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
         ground.widen()
@@ -255,10 +256,11 @@ def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: st
         )
 
 
-def _check_approach(program: Program, boundary: str, gap: NDArray[np.float64]) -> None:
-    if boundary != "periodic":
-        return
-    full = float(np.mean(gap))
+def _check_approach(program: Program, full: float) -> None:
+    """Refuse an approach beyond the one of full contact, which has none: pressure may rise without limit there.
+
+    Where cells are absent the half-space bulges into them, and every approach has its force.
+    """
     for i, segment in enumerate(program.segments):
         largest = (segment.end or 0.0) + abs(segment.amplitude)
         if segment.control == "approach" and segment.end is not None and largest >= full:
