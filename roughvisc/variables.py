@@ -127,12 +127,16 @@ VARIABLES: dict[str, Variable] = {
     "grid_error": Variable(
         _SERIES,
         "1",
-        "estimated relative error of pressure (L1) and approach due to the grid",
-        "from the same history on cells twice as long, by Richardson extrapolation; the pressure over the largest "
-        "force; of a scan it holds what roughness its coarser copy has lost",
+        "bound in practice on the relative error of pressure (L1) and approach due to the grid",
+        "from the same history on cells twice and four times as long (grid convergence index), and from the force on "
+        "cells at the contact's edge; the pressure over the largest force; of a scan it holds what roughness its "
+        "coarser copies have lost",
     ),
     "grid_error_area": Variable(
-        _SERIES, "1", "estimated relative error of the corrected contact area due to the grid", "as grid_error"
+        _SERIES,
+        "1",
+        "bound in practice on the relative error of the corrected contact area due to the grid",
+        "as grid_error, and from the number of faces at the contact's edge",
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),

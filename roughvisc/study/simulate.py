@@ -80,8 +80,8 @@ def simulate(
     memory : {"auto", "direct"}
         ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
     grid_error : bool
-        Whether to compute the history once more on cells twice as long, and to estimate from it the error that the
-        grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+        Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
+        the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
