@@ -54,7 +54,12 @@ VARIABLES: dict[str, Variable] = {
     "x": Variable(("x",), "m", "position of the cell centre along x"),
     "y": Variable(("y",), "m", "position of the cell centre along y"),
     # the surface
-    "height": Variable(_GRID, "m", "height of the rigid profile, peaks up", "as conditioned; missing where absent"),
+    "height": Variable(
+        _GRID,
+        "m",
+        "height of the rigid profile, peaks up",
+        "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
+    ),
     "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
     "pressure": Variable(_FRAME, "Pa", "contact pressure", "zero outside the contact and where the profile is absent"),
@@ -76,8 +81,9 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "m",
         "rigid-body approach from first touch",
-        "free space: against the undeformed plane; periodic: mean undeformed gap minus mean gap; "
-        "while the contact is open: the value at which it would just close",
+        "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
+        "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
+        "absent; while the contact is open: the value at which it would just close",
     ),
     "work": Variable(
         _SERIES,
@@ -92,7 +98,8 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "m2",
         "real contact area, corrected for the grid",
-        "counted area less 0.088 times the staircase perimeter times the cell side",
+        "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
+        "cells in contact and present cells out of contact: where the material ends the count is exact",
     ),
     "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area"),
     "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells"),
@@ -120,12 +127,16 @@ VARIABLES: dict[str, Variable] = {
     "grid_error": Variable(
         _SERIES,
         "1",
-        "estimated relative error of pressure (L1) and approach due to the grid",
-        "from the same history on cells twice as long, by Richardson extrapolation; the pressure over the largest "
-        "force; of a scan it holds what roughness its coarser copy has lost",
+        "bound in practice on the relative error of pressure (L1) and approach due to the grid",
+        "from the same history on cells twice and four times as long (grid convergence index), and from the force on "
+        "cells at the contact's edge; the pressure over the largest force; of a scan it holds what roughness its "
+        "coarser copies have lost",
     ),
     "grid_error_area": Variable(
-        _SERIES, "1", "estimated relative error of the corrected contact area due to the grid", "as grid_error"
+        _SERIES,
+        "1",
+        "bound in practice on the relative error of the corrected contact area due to the grid",
+        "as grid_error, and from the number of faces at the contact's edge",
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),

@@ -368,6 +368,13 @@ def test_section__surfaces_touch_where_pressure_is(axis):
     assert level == pytest.approx(1e6 * float(ds["height"].max() - ds["approach"][-1]))
 
 
+def test_section__draws_the_undeformed_surface_below_an_apex_between_the_cells():
+    ds = made.hertz_creep()
+    ds["height"].attrs["highest"] = float(ds["height"].max()) + 2e-8
+    level = lines(plot.section(ds).axes[1])["undeformed"].get_ydata()[0]
+    assert level == pytest.approx(1e6 * float(ds["height"].max() + 2e-8 - ds["approach"][-1]))
+
+
 def test_section__states_its_exaggeration():
     figure = plot.section(made.hertz_creep())
     bottom = figure.axes[1]

@@ -98,6 +98,18 @@ def test_accuracy_cost__of_a_checkout_is_that_of_itself(monkeypatch):
     assert module.ratio(np.array([[1e-2, 10], [1e-4, 100]]), np.array([[1e-2, 20], [1e-4, 200]])) == pytest.approx(2)
 
 
+def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("grid_accuracy")
+    for row in module.main(small=True):
+        assert row["cases"] >= 3
+        assert row["bounded"] == 1
+        assert row["bounded_area"] >= 2 / 3
+        assert 0.8 < row["middle"] < 10
+    for row in module.main(small=True, constants=True):
+        assert -0.08 < row["least"] <= row["largest"] < 0.03
+
+
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}

@@ -32,7 +32,8 @@ class Scene:
     halfspace : HalfSpace
         Grid and boundary.
     gap : ndarray, shape (nx, ny)
-        Undeformed gap at first touch, zero at the highest peak; any finite number where absent. [m]
+        Undeformed gap at first touch, zero at the highest peak, which may lie between the cells; any finite number
+        where absent. [m]
     material, memory : Material, Memory
         The material and the form in which its past is kept.
     program : Program

@@ -85,7 +85,8 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 def _rest(scene: Scene) -> State:
     nothing = np.zeros(scene.halfspace.shape)
-    now = Instant(0.0, nothing, 0.0, scene.lowest(scene.gap), nothing)
+    given = any(segment.control == "approach" for segment in scene.program.segments[:1])
+    now = Instant(0.0, nothing, 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
     return State(now, nothing, scene.memory.start(scene.halfspace.shape))
 
 

@@ -31,8 +31,8 @@ _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
 _MARCH, _CALIBRATION = 3.0, 2.0
 #: Largest grid that a solve is timed on; larger ones are taken to cost as N log N. [cells]
 _TIMED = 1024**2
-#: What the grid's error costs: the march once more on a quarter of the cells, which is dearer by the cell.
-_AGAIN = 1.4
+#: What the grid's error costs: the march again on a quarter of the cells and a sixteenth, which is dearer by the cell.
+_AGAIN = 1.5
 #: What the interpreter and the libraries take, measured. [bytes]
 _PROCESS = 230e6
 #: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.

@@ -110,4 +110,4 @@ class Finest:
             self._coarser[4 * setting.coarsening] = self.errors(third)
         fine = self.run.dataset
         ratio = math.sqrt(fine.sizes["x"] * fine.sizes["y"] / (second.sizes["x"] * second.sizes["y"]))
-        return in_time, {name: grid_uncertainty(name, near[name], far[name], ratio) for name in QUANTITIES}
+        return in_time, {name: float(grid_uncertainty(name, near[name], far[name], ratio)) for name in QUANTITIES}

@@ -85,7 +85,7 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
     boundary : {"free", "periodic"}
         In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
     approach : float
-        The largest at kept times. [m]
+        The largest at kept times, from the highest cell. [m]
     """
     slope = loaded_slope(height, np.inf if boundary == "periodic" else approach)
     if not slope > LARGEST_SLOPE:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any
@@ -105,7 +106,8 @@ class Rows:
         for name in self._fields:
             frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)
-        variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float))
+        highest = {"highest": self._ground.highest}
+        variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
         if "filled" in height.coords:
             variables["filled"] = (("x", "y"), height["filled"].values)
         dataset = xr.Dataset(
@@ -209,11 +211,23 @@ def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
 
 
 def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
-    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]"""
-    faces_x = np.count_nonzero(contact[1:] != contact[:-1])
-    faces_y = np.count_nonzero(contact[:, 1:] != contact[:, :-1])
-    if scene.halfspace.boundary == "periodic" and not scene.halfspace.mirrored:
-        faces_x += np.count_nonzero(contact[0] != contact[-1])
-        faces_y += np.count_nonzero(contact[:, 0] != contact[:, -1])
+    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
+
+    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
+    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
+    """
+    free = ~contact if scene.present is None else scene.present & ~contact
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    return PERIMETER_CORRECTION * scene.halfspace.cell_area * (faces_x + faces_y)
+    faces = sum(_faces(np.moveaxis(contact, axis, 0), np.moveaxis(free, axis, 0), scene) for axis in (0, 1))
+    return PERIMETER_CORRECTION * scene.halfspace.cell_area * faces
+
+
+def _faces(contact: NDArray[np.bool_], free: NDArray[np.bool_], scene: Scene) -> int:
+    """Number of faces across the first axis between cells in contact and present cells out of contact."""
+    faces = np.count_nonzero(contact[1:] & free[:-1]) + np.count_nonzero(contact[:-1] & free[1:])
+    mirrored = scene.halfspace.mirrored  # beyond a mirror a cell's neighbour is its image
+    if scene.halfspace.boundary == "periodic" and not mirrored:
+        faces += np.count_nonzero(contact[0] & free[-1]) + np.count_nonzero(contact[-1] & free[0])
+    elif scene.outside < math.inf:  # the surface goes on beyond the window, and nothing touches there
+        faces += np.count_nonzero(contact[-1]) + (0 if mirrored else np.count_nonzero(contact[0]))
+    return int(faces)

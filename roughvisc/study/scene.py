@@ -23,7 +23,7 @@ from roughvisc.mechanics.window import Window, whole_domain, window_around
 from roughvisc.study.mirror import is_mirrored, quarter
 from roughvisc.study.representable import check_loads, check_times
 from roughvisc.topography.grid import axis_step
-from roughvisc.topography.indenters import grown
+from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2
@@ -77,8 +77,12 @@ class Ground:
         self.domain = height[cells]
         values = self.domain.values
         self.present: NDArray[np.bool_] = present[cells]
+        #: Height of the highest point, which on an indenter may lie between the cells. [m]
+        self.highest = highest(height)
         #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
-        self.gap = np.nanmax(values) - values
+        self.gap = self.highest - values
+        #: The least of it, which is not zero where the highest point lies between the cells. [m]
+        self.least_gap = float(np.nanmin(self.gap))
         self.gap[~self.present] = 0.0
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
@@ -176,7 +180,8 @@ def prepare(
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
-    _check_approach(program, boundary, ground.gap[ground.present])
+    if boundary == "periodic" and ground.present.all():
+        _check_approach(program, ground.mean_gap)
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
         ground.widen()
@@ -254,10 +259,11 @@ def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: st
         )
 
 
-def _check_approach(program: Program, boundary: str, gap: NDArray[np.float64]) -> None:
-    if boundary != "periodic":
-        return
-    full = float(np.mean(gap))
+def _check_approach(program: Program, full: float) -> None:
+    """Refuse an approach beyond the one of full contact, which has none: pressure may rise without limit there.
+
+    Where cells are absent the half-space bulges into them, and every approach has its force.
+    """
     for i, segment in enumerate(program.segments):
         largest = (segment.end or 0.0) + abs(segment.amplitude)
         if segment.control == "approach" and segment.end is not None and largest >= full:

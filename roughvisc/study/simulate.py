@@ -53,7 +53,8 @@ def simulate(
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y)
-        Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``. [m]
+        Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``; an indenter's
+        counts from its apex, wherever that lies between the cells. [m]
     material : Material
         Of the half-space.
     program : Program
@@ -79,8 +80,8 @@ def simulate(
     memory : {"auto", "direct"}
         ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
     grid_error : bool
-        Whether to compute the history once more on cells twice as long, and to estimate from it the error that the
-        grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+        Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
+        the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -219,12 +220,13 @@ def _press(
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     dataset = rows.dataset(scene, method)
+    deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
     described = {
         "memory": engine.note,
         "series_error": engine.series_error,
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
-        "slope_note": slope_note(ground.domain[ground.window.cells], boundary, float(dataset["approach"].max())),
+        "slope_note": slope_note(ground.domain[ground.window.cells], boundary, deepest),
         "left_out": left_out(engine, boundary, method, fields, times is None, followed, ground.mirrored),
     }
     if described["slope_note"]:

@@ -57,7 +57,8 @@ def validate(
     Parameters
     ----------
     cells : int
-        Cells along the grids' sides. [-]
+        Cells along the grids' sides; spheres and cones under an elastic load have one more too, so that their apex
+        lies once in a cell and once between cells. [-]
     cases : sequence of str, optional
         Names of :data:`roughvisc.study.closed_cases.CASES`; None: all.
     progress : callable, optional
@@ -76,8 +77,8 @@ def validate(
     Examples
     --------
     >>> import roughvisc as rv
-    >>> [found.passed for found in rv.validate(33, cases=["Hertz"])]
-    [True, True, True, True]
+    >>> all(found.passed for found in rv.validate(33, cases=["Hertz"]))
+    True
     """
     if not (isinstance(cells, int) and cells >= _FEWEST):
         raise InputError(f"cells is {cells!r}: expected a whole number from {_FEWEST}")

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -112,19 +114,13 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
         None if `h` is no sphere, cone or flat punch. xarray keeps attributes through arithmetic, so the recipe is
         believed only if it reproduces the heights given.
     """
-    try:
-        recipe = json.loads(h.attrs["recipe"])
-        evaluate, parameters = _INDENTERS[recipe["name"]], recipe["parameters"]
-        cell, centre = cell_of(recipe["size"], recipe["shape"]), [side / 2 for side in recipe["size"]]
-        axes = [h[axis].values for axis in ("x", "y")]
-        first = [round(at[0] / d - 0.5) for at, d in zip(axes, cell, strict=True)]
-        expected = evaluate(axes[0][:, None] - centre[0], axes[1] - centre[1], **parameters)
-    except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
+    known = _known(h)
+    if known is None:
         return None
+    evaluate, cell, centre = known
     h = h.transpose("x", "y")
-    near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
-    if not np.allclose(h.values, expected, rtol=0, atol=near, equal_nan=True):
-        return None
+    axes = [h[axis].values for axis in ("x", "y")]
+    first = [round(at[0] / d - 0.5) for at, d in zip(axes, cell, strict=True)]
     margin = [max(1, math.ceil(n * (factor - 1) / 2 - 1e-6)) for n in h.shape]
     wider = []
     for at, d, i, m in zip(axes, cell, first, margin, strict=True):
@@ -133,7 +129,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
             return None
         there[m:-m] = at
         wider.append(there)
-    heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1], **parameters)
+    heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
     heights[margin[0] : -margin[0], margin[1] : -margin[1]] = h.values
     larger = with_coordinates(heights, *wider, h.attrs)
     return noted(
@@ -147,6 +143,47 @@ def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
         return None
     recipe = json.loads(h.attrs["recipe"])
     return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
+
+
+def highest(h: xr.DataArray) -> float:
+    """Height at which a surface is touched first: an indenter's apex, wherever it lies between the cells. [m]
+
+    That is where its recipe still reproduces the heights and the apex lies within the cells' outline; anything else is
+    touched first at its highest cell.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y); finite somewhere. [m]
+
+    Examples
+    --------
+    >>> tip = cone(0.5, 4.0, 4)
+    >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
+    (0.0, True, True)
+    """
+    known = _known(h)
+    if known is not None:
+        _, cell, centre = known
+        ends = [(h[axis].values[0] - d / 2, h[axis].values[-1] + d / 2) for axis, d in zip("xy", cell, strict=True)]
+        if all(low <= at <= high for (low, high), at in zip(ends, centre, strict=True)):
+            return 0.0
+    return float(np.nanmax(h.values))
+
+
+def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], list[float]] | None:
+    """Height as a function of x and y from the apex, cell sides and the apex's place; None if the recipe fails. [m]"""
+    try:
+        recipe = json.loads(h.attrs["recipe"])
+        evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
+        cell, centre = cell_of(recipe["size"], recipe["shape"]), [side / 2 for side in recipe["size"]]
+        expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
+    except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
+        return None
+    near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
+    if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
+        return None
+    return evaluate, cell, centre
 
 
 def _sphere(x: np.ndarray, y: np.ndarray, radius: float, exact: bool) -> np.ndarray:

@@ -121,7 +121,8 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     height = dataset["height"].isel({across: index}).values
     surface = deformed_surface(dataset, frame).isel({across: index}).values
     x = (limits[1:] + limits[:-1]) / 2
-    level = float(dataset["height"].max()) - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
+    highest = float(dataset["height"].attrs.get("highest", dataset["height"].max()))
+    level = highest - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
     known = np.concatenate([height, surface])
     known = known[np.isfinite(known)]
     if np.isfinite(level) and not (known.size and np.ptp(known)):

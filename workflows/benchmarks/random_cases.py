@@ -100,7 +100,7 @@ def violations(ds):
         found.append("gap is not finite")
     if (pressure < 0).any() or (pressure[:, ~present] != 0).any():
         found.append("tension, or pressure where nothing is")
-    opening = float(np.nanmax(ds.height)) - ds.height.values + ds.displacement.values
+    opening = ds.height.highest - ds.height.values + ds.displacement.values
     opening -= ds.approach.values[:, None, None]
     scale = np.abs(ds.displacement.values[:, present]).max() + np.ptp(ds.height.values[present])
     if np.ptp(ds.height.values[present]) == 0 and ds.boundary == "periodic":

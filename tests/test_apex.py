@@ -1,0 +1,112 @@
+"""The undeformed gap counts from the apex of an indenter, wherever that lies between the cells."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc import closed_forms
+from roughvisc.topography.indenters import highest
+
+UNIT = rv.elastic(0.25)  # contact modulus 1
+INDENTERS = {
+    "sphere": (lambda size, shape: rv.sphere(1.0, size, shape), closed_forms.Paraboloid(1.0)),
+    "cone": (lambda size, shape: rv.cone(1.0, size, shape), closed_forms.Cone(1.0)),
+}
+#: Contact radii in cells, and cells of a grid that follows the contact with a window, of one solved as a whole, and of
+#: one that has to grow.
+GRIDS = {"whole": (5.3, 24), "window": (5.3, 120), "grown": (12.3, 12)}
+
+
+def pressed(height, program, **settings):
+    settings = {"tolerance": 1e-5, "progress": False, "fields": ("pressure", "gap", "displacement"), **settings}
+    return rv.simulate(height, UNIT, program, **settings)
+
+
+def hertz_or_sneddon(name, radius=1.0):
+    """Load and approach at a contact radius."""
+    if name == "sphere":
+        return 4 / 3 * radius**3, radius**2
+    return np.pi / 2 * radius**2, np.pi / 2 * radius
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (0, 1), (1, 1)], ids=["even", "one odd", "odd"])
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("name", INDENTERS)
+def test_even_and_odd_grids__are_equally_right(name, grid, shift):
+    radius, cells = GRIDS[grid]
+    shape = cells + shift[0], cells + shift[1]
+    height = INDENTERS[name][0](tuple(n / radius for n in shape), shape)  # cells of side 1 / radius
+    load, approach = hertz_or_sneddon(name)
+    by_load = pressed(height, rv.Program().load(load, over=0))
+    by_approach = pressed(height, rv.Program().approach(approach, over=0))
+    assert abs(float(by_load.approach[0]) / approach - 1) < 0.09 / radius**2
+    assert abs(float(by_approach.force[0]) / load - 1) < 2 * 0.09 / radius**2
+    for ds in (by_load, by_approach):
+        assert ds.height.attrs["highest"] == 0
+        opening = -ds.height + ds.displacement[0] - ds.approach[0]
+        assert np.abs(ds.gap[0] - opening).max() < 1e-3 * approach
+        assert float(ds.mean_gap[0]) == pytest.approx(float(opening.mean()), rel=1e-3)
+
+
+@pytest.mark.parametrize("parity", [0, 1])
+@pytest.mark.parametrize("name", INDENTERS)
+def test_approach__is_of_second_order_on_even_and_odd_grids(name, parity):
+    """From the highest cell it would be of first order under a cone, and -0.29 (h/a)^2 under a ball."""
+    load, approach = hertz_or_sneddon(name)
+    radii = np.array([4.0, 8.0, 16.0, 32.0])
+    errors = []
+    for radius in radii:
+        cells = 2 * round(1.25 * radius) + parity
+        ds = pressed(INDENTERS[name][0](cells / radius, cells), rv.Program().load(load, over=0), fields=())
+        errors.append(abs(float(ds.approach[0]) / approach - 1))
+    assert (errors < 0.08 / radii**2).all()
+    assert -np.polyfit(np.log(radii), np.log(errors), 1)[0] > 1.3
+
+
+def test_open__the_approach_is_that_of_the_highest_cells():
+    """An even grid touches where its cells do, later than its apex."""
+    height, side = rv.cone(0.5, 1.0, 10), 0.1
+    program = rv.Program().load(0.0, over=1.0)
+    assert pressed(height, program).approach.values == pytest.approx(0.5 * side / np.sqrt(2), rel=1e-12)
+    ds = pressed(height, rv.Program().approach(0.1, over=1.0), times=21)
+    apart = ds.approach.values <= 0.5 * side / np.sqrt(2)
+    assert np.array_equal(ds.force.values == 0, apart)
+
+
+def test_surfaces_without_a_recipe__count_from_their_highest_cell():
+    even = rv.sphere(1.0, 1.0, 10)
+    with xr.set_options(keep_attrs=True):
+        scaled, raised = 0.5 * even, even + 1e-3
+    for height in (scaled, raised, rv.resample(even, (5, 5)), rv.from_array(even.values, 0.1), rv.combine(even, even)):
+        assert highest(height) == float(height.max())
+        ds = pressed(height, rv.Program().load(1e-4, over=0))
+        gap = float(height.max()) - ds.height + ds.displacement[0] - ds.approach[0]
+        assert np.abs(ds.gap[0] - gap).max() < 1e-3 * float(ds.approach[0])
+
+
+def test_part_of_an_indenter__counts_from_the_apex_only_where_it_holds_it():
+    even = rv.cone(1.0, 1.0, 10)
+    assert highest(even[2:7, 3:9]) == 0
+    assert highest(even[6:]) == float(even[6:].max())
+    assert highest(rv.sphere(1.0, 1.0, (10, 1))) == 0
+
+
+def test_periodic__approach_is_the_mean_undeformed_gap_less_the_mean_gap():
+    even = rv.sphere(1.0, 1.0, 10)
+    full = float(-even.mean())
+    for approach in (0.2 * full, 0.9 * full):
+        ds = pressed(even, rv.Program().approach(approach, over=0), boundary="periodic")
+        assert full - float(ds.mean_gap[0]) == pytest.approx(approach, rel=1e-4)
+    with pytest.raises(rv.InputError, match="contact is full"):
+        pressed(even, rv.Program().approach(1.001 * full, over=0), boundary="periodic")
+
+
+def test_quarter__and_whole_surface_count_from_one_apex():
+    """A grid even along one axis only is solved as a whole, one even along both by a quarter."""
+    load, approach = hertz_or_sneddon("cone")
+    found = [
+        float(pressed(rv.cone(1.0, (n / 6, m / 6), (n, m)), rv.Program().load(load, over=0)).approach[0])
+        for n, m in ((18, 18), (18, 19), (19, 19))
+    ]
+    assert found == pytest.approx([approach] * 3, rel=0.04 / 36 + 1e-4)
