@@ -25,13 +25,14 @@ STATUS_MEANINGS = (
 
 @dataclass(frozen=True)
 class Variable:
-    """One entry of the vocabulary: what a variable is, and how it is written."""
+    """One entry of the vocabulary: what a variable is, how it is written, and which others state its error."""
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     comment: str = ""
     dtype: str = "float64"
+    ancillary: tuple[str, ...] = ()
 
     def attributes(self) -> dict[str, Any]:
         """CF attributes of this variable."""
@@ -62,7 +63,13 @@ VARIABLES: dict[str, Variable] = {
     ),
     "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
-    "pressure": Variable(_FRAME, "Pa", "contact pressure", "zero outside the contact and where the profile is absent"),
+    "pressure": Variable(
+        _FRAME,
+        "Pa",
+        "contact pressure",
+        "zero outside the contact and where the profile is absent",
+        ancillary=("pressure_error",),
+    ),
     "gap": Variable(
         _FRAME,
         "m",
@@ -76,7 +83,13 @@ VARIABLES: dict[str, Variable] = {
         "positive into the half-space; with periodic boundaries its mean is zero",
     ),
     # histories
-    "force": Variable(_SERIES, "N", "normal force", "prescribed under load control, found under approach control"),
+    "force": Variable(
+        _SERIES,
+        "N",
+        "normal force",
+        "prescribed under load control, found under approach control",
+        ancillary=("force_error",),
+    ),
     "approach": Variable(
         _SERIES,
         "m",
@@ -84,16 +97,36 @@ VARIABLES: dict[str, Variable] = {
         "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
         "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
         "absent; while the contact is open: the value at which it would just close",
+        ancillary=("approach_error",),
     ),
     "work": Variable(
         _SERIES,
         "J",
         "work of the force on the approach since the start",
-        "over every accepted step, kept or not, as that of the pressure on the displacement; the work done so far, not "
-        "what is dissipated; without memory the stored energy, exactly; a jump counts as its mean pressure on its jump "
-        "of displacement; with periodic boundaries without the uniform displacement",
+        "over every accepted step, kept or not, as that of the pressure on the displacement: stored_energy plus "
+        "dissipated_energy; a jump is quasi-static; with periodic boundaries without the uniform displacement",
+        ancillary=("work_error",),
     ),
-    "contact_area": Variable(_SERIES, "m2", "real contact area", "cells that carry pressure, counted"),
+    "stored_energy": Variable(
+        _SERIES,
+        "J",
+        "energy stored in the springs of the material",
+        "exact for pressure linear in each step; missing where the memory is the direct history",
+    ),
+    "dissipated_energy": Variable(
+        _SERIES,
+        "J",
+        "energy dissipated in the material since the start",
+        "exact for pressure linear in each step; missing where the memory is the direct history",
+        ancillary=("dissipated_energy_error",),
+    ),
+    "contact_area": Variable(
+        _SERIES,
+        "m2",
+        "real contact area",
+        "cells that carry pressure, counted",
+        ancillary=("contact_area_lower", "contact_area_upper"),
+    ),
     "contact_area_corrected": Variable(
         _SERIES,
         "m2",
@@ -102,7 +135,7 @@ VARIABLES: dict[str, Variable] = {
         "cells in contact and present cells out of contact: where the material ends the count is exact",
     ),
     "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area"),
-    "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells"),
+    "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",)),
     # accuracy and cost
     "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32"),
     "convolutions": Variable(
@@ -112,17 +145,46 @@ VARIABLES: dict[str, Variable] = {
         "displacements and preconditioner applications, each one forward and one inverse transform",
         dtype="int32",
     ),
+    "stated_error": Variable(
+        _SERIES,
+        "1",
+        "stated relative error: the largest of pressure (L1), force and approach",
+        "sum of what time steps, contact solver and series leave, over the largest force and the largest approach so "
+        "far; comparable to the tolerance; the grid's part is stated apart",
+    ),
+    "time_error": Variable(
+        _SERIES,
+        "1",
+        "part of the error that is due to time steps",
+        "from the difference to a companion march in steps twice as long; over what is largest so far",
+    ),
     "residual": Variable(
+        _SERIES,
+        "1",
+        "part of the error that is due to the contact solver",
+        "estimated error of the pressure (L1), over its sum",
+    ),
+    "residual_bound": Variable(
         _SERIES,
         "1",
         "bound on the relative error of the pressure, in the energy norm, left by the contact solver",
         "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
     ),
-    "time_error": Variable(
+    "pressure_error": Variable(
+        _SERIES, "1", "stated error of the pressure", "its absolute values summed (L1), over the largest force so far"
+    ),
+    "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),
+    "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero where the approach is prescribed"),
+    "work_error": Variable(_SERIES, "J", "stated error of the work"),
+    "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy"),
+    "contact_area_lower": Variable(
+        _SERIES, "m2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
+    ),
+    "contact_area_upper": Variable(
         _SERIES,
-        "1",
-        "estimated relative error of pressure (L1) and approach due to time steps",
-        "not available (missing) for fixed time steps without an estimate",
+        "m2",
+        "area that is not certainly out of contact",
+        "counted, at the stated error; without the grid's part",
     ),
     "grid_error": Variable(
         _SERIES,
@@ -216,7 +278,10 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
             other[name] = variable.astype(declared.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
     for name, variable in annotated.variables.items():
-        variable.attrs.update(VARIABLES[str(name)].attributes())
+        declared = VARIABLES[str(name)]
+        variable.attrs.update(declared.attributes())
+        if stated := " ".join(other for other in declared.ancillary if other in annotated):
+            variable.attrs["ancillary_variables"] = stated
     if "status" in annotated:
         annotated.variables["status"].attrs.update(
             flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),

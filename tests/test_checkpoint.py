@@ -202,7 +202,7 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
         state = State(now, strange, memory, before=None, rejected_error=math.inf, blind=True, convolutions=2**40)
-        reached = Reached(state, math.nan, False, 3, 2, 1e-17)
+        reached = Reached(state, False, 3, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
         back = load_checkpoint(tmp_path / "c", "key")
         assert repr(replace(back, state=None)) == repr(replace(reached, state=None))
@@ -493,6 +493,8 @@ def test_lock__is_touched_while_it_is_held(tmp_path, monkeypatch):
 def test_lock_taken_over__the_one_that_was_asleep_writes_no_more(whole, tmp_path):
     case, expected, steps = whole(MODES)
     unfinished = stopped(case, tmp_path, steps // 2)
+    rows = load_checkpoint(unfinished / "checkpoint.0", case.key).rows
+    assert 0 < rows <= steps // 2
     lock = tmp_path / f".{case.key}.lock"
 
     def taken_over(now, end):
@@ -501,7 +503,7 @@ def test_lock_taken_over__the_one_that_was_asleep_writes_no_more(whole, tmp_path
     with pytest.raises(InUseError, match="was taken over by another run"):
         run_case(case, tmp_path, progress=taken_over)
     assert lock.exists()
-    assert load_checkpoint(unfinished / "checkpoint.0", case.key).rows == steps // 2
+    assert load_checkpoint(unfinished / "checkpoint.0", case.key).rows == rows
     os.utime(lock, (0, 0))
     assert values(run_case(case, tmp_path)) == expected
 

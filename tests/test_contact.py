@@ -400,8 +400,8 @@ def test_error__is_honestly_estimated(monkeypatch):
     assert ratios.size > 350
     assert np.mean(ratios >= 0.8) > 0.97
     assert ratios.min() > 0.5, known[np.argmin(ratios)]["case"]
-    assert np.median(ratios) < 1.6
-    assert np.mean(ratios < 5) > 0.98
+    assert np.median(ratios) < 3
+    assert np.mean(ratios < 8) > 0.98
 
 
 @pytest.mark.parametrize("known", [{"load": 20.0}, {"approach": 2.0}], ids=["load", "approach"])
@@ -413,7 +413,11 @@ def test_error__costs_nothing_unless_asked_for(boundary, known):
     assert np.isnan(plain.error)
     assert 0 < asked.error < 1e-2
     assert asked.pressure.tobytes() == plain.pressure.tobytes()
-    assert asked.convolutions - plain.convolutions == (2 if boundary == "periodic" and "approach" in known else 1)
+    singular = boundary == "periodic" and "approach" in known
+    assert asked.convolutions - plain.convolutions == (2 if singular else 0)
+    again = solve_contact(halfspace, gap, tolerance=1e-4, start=asked.pressure, estimate_error=True, **known)
+    assert again.iterations == 0
+    assert 0 < again.error < 1e-2
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])

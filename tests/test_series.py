@@ -50,7 +50,7 @@ def test_power_law_series__means_from_rest_are_right_as_well(exponent, tolerance
     found = power_law_series(material, 1e-3, 10.0, tolerance)
     steps = np.geomspace(1e-3, 10.0, 50)
     means = [body.mean_contact_compliance(0.0, steps) for body in (found.prony, material)]
-    assert means[0] == pytest.approx(means[1], rel=1.5 * tolerance, abs=0)
+    assert means[0] == pytest.approx(means[1], rel=2.5 * tolerance, abs=0)
 
 
 #: decades of time, tolerance -> number of terms, for exponents 0.2, 0.5 and 0.8 (measured figures of the method,

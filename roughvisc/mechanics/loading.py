@@ -7,7 +7,7 @@ found during the run and handed to :meth:`Segment.value`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -65,6 +65,27 @@ class Segment:
         if elapsed >= self.duration * (1 - 1e-12):  # times are sums of durations, rounded
             return self.end
         return start + (self.end - start) * (elapsed / self.duration)
+
+    def turns(self, after: float, before: float) -> Iterator[float]:
+        """Instants strictly between two others at which a cycle turns back, from the start of the segment. [s]"""
+        if not self.amplitude:
+            return
+        quarter = self.period / 4
+        number = 2 * max(math.floor((after / quarter - 1) / 2), 0) + 1
+        while number * quarter < before:
+            if number * quarter > after:
+                yield number * quarter
+            number += 2
+
+    def highest(self, start: float) -> float:
+        """The largest value prescribed anywhere in the segment, which began at ``start``. [N or m]"""
+        if self.amplitude:
+            return (start if self.end is None else self.end) + abs(self.amplitude)
+        return max(start, start if self.end is None else self.end)
+
+    def is_nothing(self, start: float) -> bool:
+        """Whether zero is prescribed throughout."""
+        return not self.amplitude and start == 0 and not self.end
 
 
 @dataclass(frozen=True)
@@ -151,6 +172,13 @@ class Program:
             How many.
         """
         return cls((Segment(control, 0.0, mean), Segment(control, period * cycles, mean, amplitude, period)))
+
+    def gives(self, number: int) -> bool:
+        """Whether the program states what a segment prescribes; a hold may keep what was found."""
+        control = self.segments[number].control
+        while self.segments[number].end is None and number > 0:
+            number -= 1
+        return self.segments[number].control == control
 
     @property
     def duration(self) -> float:

@@ -115,9 +115,9 @@ class Modes:
 
     def predict(self, state: ModesState, step: float, rule: Rule) -> tuple[float, Array]:
         """``alpha`` [1/Pa] and the carried field of a step ahead. [s]"""
-        own, earlier, before, after = self._coefficients(state, step, rule)
+        own, earlier, before, after = self.coefficients(state, step, rule)
         weights = self._weights
-        alpha = self._factor * self.material.glassy + float(np.sum(weights * after))
+        alpha = self.factor * self.material.glassy + float(np.sum(weights * after))
         carried = float(np.sum(weights * before)) * state.field
         for weight, mode in zip(weights * own, state.modes, strict=True):
             carried += weight * mode
@@ -130,7 +130,7 @@ class Modes:
         """State after a step at whose end the field was ``field``."""
         if step == 0:
             return ModesState(state.modes, field, None, 0.0)
-        own, earlier, before, after = self._coefficients(state, step, rule)
+        own, earlier, before, after = self.coefficients(state, step, rule)
         modes = np.empty_like(state.modes)
         for i, mode in enumerate(modes):
             np.multiply(state.modes[i], own[i], out=mode)
@@ -166,17 +166,31 @@ class Modes:
         return ModesState(moved(state.modes), moved(state.field), earlier, state.step)
 
     @property
-    def _factor(self) -> float:
+    def factor(self) -> float:
+        """Contact compliance over shear compliance. [-]"""
         return 0.5 * (1 - self.material.poisson)
+
+    def products(self, modes: Array, dual: tuple[Array, Array], cells: NDArray[np.intp]) -> Array:
+        """Inner product ``p K z_i`` of a pressure with each exponential, summed over the cells. [Pa2 m]
+
+        ``dual`` is the pressure and its displacement at unit compliance, ``cells`` where the pressure is not zero.
+        """
+        fields = modes[: len(self.material.times)]
+        if self.acts_on == "pressure":  # the kernel is symmetric; where nothing was ever in contact z is zero
+            return np.einsum("mxy,xy->m", fields, dual[1])
+        displaced = fields[:, 1] if self.acts_on == "both" else fields
+        flat = displaced.reshape(len(displaced), dual[0].size)
+        # einsum, not a matrix product: the same bits whatever the number of threads
+        return np.einsum("mc,c->m", flat.take(cells, axis=1), dual[0].reshape(-1).take(cells))
 
     @property
     def _weights(self) -> Array:
         """Contact compliance of each mode, [1/Pa]; a fluidity, [1/(Pa s)], comes last."""
         fluidity = [self.material.fluidity] if self.material.fluidity else []
-        return self._factor * np.array([*self.material.compliances, *fluidity])
+        return self.factor * np.array([*self.material.compliances, *fluidity])
 
-    def _coefficients(self, state: ModesState, step: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
-        """``z_n = own z_(n-1) + earlier z_(n-2) + before field_(n-1) + after field_n`` for each mode."""
+    def coefficients(self, state: ModesState, step: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+        """``z_n = own z_(n-1) + earlier z_(n-2) + before field_(n-1) + after field_n``, a fluidity last."""
         if rule == "bdf2" and state.earlier is None:
             raise ValueError("the two-step rule needs two states: start with 'linear' or 'euler'")
         x = step / np.array(self.material.times) if self.material.times else np.zeros(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,10 +65,9 @@ class Prony:
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""
         t = np.asarray(t, dtype=float)
-        total = self.glassy + (self.fluidity * t if self.fluidity else np.zeros_like(t))  # a solid has a limit at inf
-        for compliance, time in zip(self.compliances, self.times, strict=True):
-            total = total - compliance * np.expm1(-t / time)
-        return np.asarray(total)
+        retarded = np.sum(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
+        flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
+        return np.asarray(self.glassy + flowed + retarded)
 
     def contact_compliance(self, t: ArrayLike) -> Array:
         """Contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
@@ -84,11 +84,16 @@ class Prony:
     def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
         """Mean of ``C`` over ``[s, s + h]``, [1/Pa]; ``C(s)`` for ``h = 0``. [s]"""
         s, h = np.asarray(s, dtype=float), np.asarray(h, dtype=float)
-        total = self.glassy + self.fluidity * (s + h / 2)
-        for compliance, time in zip(self.compliances, self.times, strict=True):
-            # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms, x = h/tau
-            total = total + compliance * (np.exp(-s / time) * one_less_mean_decay(h / time) - np.expm1(-s / time))
-        return np.asarray(0.5 * (1 - self.poisson) * total)
+        compliances, times = self._terms
+        age, x = s[..., None] / times, h[..., None] / times
+        # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
+        retarded = np.sum(compliances * (np.exp(-age) * one_less_mean_decay(x) - np.expm1(-age)), axis=-1)
+        return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array]:
+        """Retarded compliances [1/Pa] and times [s]."""
+        return np.array(self.compliances), np.array(self.times)
 
     def relaxation_spectrum(self) -> tuple[float, Array, Array]:
         r"""Shear relaxation modulus as ``G(t) = G_e + sum G_k exp(-t / theta_k)``.
@@ -121,13 +126,14 @@ class Prony:
         return equilibrium, moduli, np.array([1 / rate for rate, _ in roots])
 
 
+# (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding
+_POWERS = np.arange(1, 14)
+_SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
+
+
 def one_less_mean_decay(x: ArrayLike) -> Array:
     """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
     x = np.asarray(x, dtype=float)
-    small = np.minimum(x, 0.3)
-    series = np.zeros_like(small)
-    for k in range(18, 0, -1):  # sum_{k>=1} (-1)^(k+1) x^k / (k+1)!
-        series = small / (k + 1) * (1 - series)
+    series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
     large = np.maximum(x, 0.3)
-    with np.errstate(over="ignore"):
-        return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)
+    return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.energy import Energy
 from roughvisc.mechanics.halfspace import HalfSpace
-from roughvisc.mechanics.loading import Program
+from roughvisc.mechanics.loading import Control, Program
 from roughvisc.mechanics.materials import Material
-from roughvisc.mechanics.memory import Memory, Rule
+from roughvisc.mechanics.memory import Memory, Rule, mean_compliance
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -74,16 +76,46 @@ class Scene:
 
     def compliance(self, t: float) -> float:
         """Contact compliance. [1/Pa]"""
-        return float(self.material.contact_compliance(min(t, self.program.duration)))
+        return self._known[0](min(t, self.program.duration))
+
+    def mean_compliance(self, step: float) -> float:
+        """Mean contact compliance over the first so many seconds of creep. [1/Pa]"""
+        return self._known[1](min(step, self.program.duration))
+
+    def stiff_ratio(self, step: float) -> float:
+        """As :func:`~roughvisc.mechanics.memory.stiff_ratio`, no longer than the program."""
+        mean = self.mean_compliance(step)
+        return self.compliance(step) / mean - 1 if mean > 0 else math.inf
+
+    @cached_property
+    def _known(self) -> tuple[Callable[[float], float], Callable[[float], float]]:
+        """Both functions of the material, which are asked for the same few times over and over."""
+        once = lru_cache(maxsize=32)
+        return once(lambda t: float(self.material.contact_compliance(t))), once(partial(mean_compliance, self.material))
+
+    @cached_property
+    def glassy(self) -> float:
+        """Instantaneous contact compliance. [1/Pa]"""
+        return self.compliance(0.0)
+
+    @cached_property
+    def final(self) -> float:
+        """Contact compliance after all of the program. [1/Pa]"""
+        return self.compliance(self.program.duration)
 
     @property
     def can_jump(self) -> bool:
         """Whether the material has an instantaneous compliance."""
-        return self.compliance(0.0) > 0
+        return self.glassy > 0
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the past matters: without creep nothing that is computed depends on the steps."""
+        return self.final > self.glassy
 
     def is_soft(self, length: float) -> bool:
         """Whether hardly any of a step's compliance is there at once."""
-        return self.compliance(0.0) < _SOFT * self.compliance(length)
+        return self.glassy < _SOFT * self.compliance(length)
 
     def keeps(self, time: float) -> bool:
         """Whether a time is kept. [s]"""
@@ -113,6 +145,54 @@ class Instant:
     unit_displacement: Array | None = None
 
 
+_EXCESS = ("stored_excess", "dissipated_excess")
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What the time steps leave unknown at an instant, by the companion that takes steps twice as long.
+
+    Attributes
+    ----------
+    pressure : float
+        Of the pressure, its absolute values summed. [N]
+    approach, force : float
+        [m], [N]
+    work, dissipated : float
+        [J]
+    inside, outside : float
+        Area in contact that may be none, and area out of contact that may be in it. [m2]
+    stored_excess, dissipated_excess : float
+        What steps of finite length add to these energies, to leading order. [J]
+    """
+
+    pressure: float = 0.0
+    approach: float = 0.0
+    force: float = 0.0
+    work: float = 0.0
+    dissipated: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+    stored_excess: float = 0.0
+    dissipated_excess: float = 0.0
+
+    def or_worse(self, other: Uncertainty) -> Uncertainty:
+        """The larger of both, part by part; what is added to the energies in the mean of both."""
+        worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
+        excess = {name: 0.5 * (getattr(self, name) + getattr(other, name)) for name in _EXCESS}
+        return Uncertainty(**worse | excess)
+
+    def relative(self, state: State) -> float:
+        """The largest of pressure, force and approach over what these have come to so far. [-]"""
+        force, approach = state.largest_force, state.largest_approach
+        by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
+        return max(by_force, self.approach / approach if approach > 0 else 0.0)
+
+
+#: Of a march that has no companion.
+UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
+
+
 @dataclass(frozen=True)
 class State:
     """All that a march needs to go on: a plain value.
@@ -137,6 +217,16 @@ class State:
         Time at which the surfaces last came into contact. [s]
     work : float
         Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
+    energy : Energy or None
+        What of it is stored and what is dissipated; None where the memory is no series of exponentials.
+    companion : State or None
+        The same march with steps twice as long, as far as it has come; None while it is no other than this one.
+    behind : int
+        Accepted steps since the companion was last at the present instant.
+    uncertainty : Uncertainty
+        As of then.
+    sharpness : float
+        Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
     blind : bool
@@ -159,6 +249,11 @@ class State:
     largest_approach: float = 0.0
     contact_since: float = 0.0
     work: float = 0.0
+    energy: Energy | None = None
+    companion: State | None = None
+    behind: int = 0
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    sharpness: float = 1.0
     unresolved: bool = False
     blind: bool = False
     rejected_error: float = math.inf
@@ -217,10 +312,16 @@ class Step:
         Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
     level : float
         Rigid-body approach that belongs to the displacement: ``gap = undeformed gap + displacement - level``. [m]
+    control : {"load", "approach"}
+        What was prescribed.
+    given : bool
+        Whether the program stated its value; else it was found before, and kept.
     bound : float
         Bound on the relative error of the pressure left by the contact solver, in the energy norm.
-    time_error : float
-        Estimated relative error in time of this step; NaN where no estimate was made.
+    residual : float
+        Estimate of it in the mean (L1).
+    uncertainty : Uncertainty
+        What the time steps leave unknown of it.
     converged : bool
         Whether the contact solver reached its tolerance.
     scene : Scene
@@ -233,11 +334,34 @@ class Step:
     displacement: Array
     effective: Array | None
     level: float
+    control: Control
+    given: bool
     bound: float
-    time_error: float
+    residual: float
+    uncertainty: Uncertainty
     converged: bool
     scene: Scene
     state: State
+
+    @property
+    def time_error(self) -> float:
+        """Relative error of pressure (L1), force and approach that the time steps leave. [-]"""
+        return self.uncertainty.relative(self.state)
+
+    @property
+    def stored(self) -> float:
+        """Energy stored in the springs of the material; NaN where the memory is no series. [J]"""
+        return self.state.energy.stored - self.uncertainty.stored_excess if self.state.energy else math.nan
+
+    @property
+    def dissipated(self) -> float:
+        """Energy dissipated in its dashpots so far; NaN where the memory is no series. [J]"""
+        return self.state.energy.dissipated - self.uncertainty.dissipated_excess if self.state.energy else math.nan
+
+    @property
+    def work(self) -> float:
+        """Work of the pressure on the displacement since the start. [J]"""
+        return self.stored + self.dissipated if self.state.energy else self.state.work
 
 
 @dataclass(frozen=True)
@@ -249,7 +373,9 @@ class Trial:
     effective: Array | None
     length: float
     rule: Rule
+    control: Control = "load"
     bound: float = 0.0
+    residual: float = 0.0
     converged: bool = True
     iterations: int = 0
     convolutions: int = 0

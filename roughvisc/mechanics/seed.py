@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.materials import Prony
-from roughvisc.mechanics.scene import Instant, Scene, State, Step
+from roughvisc.mechanics.scene import UNKNOWN, Instant, Scene, State, Step
 from roughvisc.mechanics.stepper import at_edge, edge_error, next_event, work_between
 
 Array = NDArray[np.float64]
@@ -154,7 +154,7 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     largest_step = scene.time_step or scene.program.duration / 100
     state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), np.zeros_like(scene.gap), None)
     if scene.program.segments and scene.program.segments[0].duration > 0:
-        yield Step(state.now, np.zeros_like(scene.gap), None, 0.0, 0.0, math.nan, True, scene, state)
+        yield Step(state.now, np.zeros_like(scene.gap), None, 0.0, "load", True, 0.0, 0.0, UNKNOWN, True, scene, state)
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
         state = replace(state, segment=index, began=state.now.time, start=state.now.force)
@@ -207,4 +207,17 @@ def _advance(
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),
     )
-    return state, Step(now, displacement, None, solution.level, math.nan, math.nan, solution.stagnated, scene, state)
+    return state, Step(
+        shown=now,
+        displacement=displacement,
+        effective=None,
+        level=solution.level,
+        control="load",
+        given=True,
+        bound=math.nan,
+        residual=math.nan,
+        uncertainty=UNKNOWN,
+        converged=solution.stagnated,
+        scene=scene,
+        state=state,
+    )

@@ -7,7 +7,6 @@ whole under another name first, so that one whole checkpoint outlives whatever h
 from __future__ import annotations
 
 import logging
-import math
 import shutil
 import time
 from collections.abc import Callable
@@ -18,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.energy import Energy
 from roughvisc.mechanics.history import Block, HistoryState
 from roughvisc.mechanics.memory import ModesState
-from roughvisc.mechanics.scene import Instant, State, Step
+from roughvisc.mechanics.scene import Instant, State, Step, Uncertainty
 from roughvisc.mechanics.transforms import transform_engine
 from roughvisc.study.identity import NUMERICS_REVISION
 from roughvisc.study.records import Damaged, RowFile, read_record, write_record
@@ -30,7 +30,7 @@ log = logging.getLogger("roughvisc")
 
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
-_TYPES = {kind.__name__: kind for kind in (State, Instant, ModesState, HistoryState, Block)}
+_TYPES = {kind.__name__: kind for kind in (State, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Reached:
     ----------
     state : State or None
         The stepper's; None at the start.
-    worst_error, converged : float, bool
-        Of the steps since the last kept row.
+    converged : bool
+        Whether all steps since the last kept row are.
     rows, growths : int
         Rows kept, and how many times the grid has grown.
     wall_time : float
@@ -50,7 +50,6 @@ class Reached:
     """
 
     state: State | None = None
-    worst_error: float = math.nan
     converged: bool = True
     rows: int = 0
     growths: int = 0
@@ -63,15 +62,12 @@ class Reached:
 
     def after(self, step: Step, growths: int, wall_time: float) -> Reached:
         """How far it has come with another step, what is bad of it folded in."""
-        worst = float(np.fmax(self.worst_error, step.time_error))
         converged = self.converged and step.converged
-        return replace(
-            self, state=step.state, worst_error=worst, converged=converged, growths=growths, wall_time=wall_time
-        )
+        return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
 
     def kept(self) -> Reached:
         """How far it has come when the step is kept as a row."""
-        return replace(self, worst_error=math.nan, converged=True, rows=self.rows + 1)
+        return replace(self, converged=True, rows=self.rows + 1)
 
 
 def save_checkpoint(path: Path, reached: Reached, key: str) -> None:

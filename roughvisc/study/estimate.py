@@ -15,7 +15,7 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.engine import Engine
 from roughvisc.mechanics.halfspace import HalfSpace
 from roughvisc.mechanics.history import History, history_bytes
-from roughvisc.mechanics.memory import Modes, stiff_ratio
+from roughvisc.mechanics.memory import Modes
 from roughvisc.mechanics.scene import Scene
 from roughvisc.mechanics.seed import march_seed
 from roughvisc.mechanics.stepper import march
@@ -150,7 +150,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
 
 
 def _is_damped(scene: Scene, length: float) -> bool:
-    return "bdf2" in scene.memory.rules and stiff_ratio(scene.material, length) > 0.5
+    return "bdf2" in scene.memory.rules and scene.stiff_ratio(length) > 0.5
 
 
 class Stopwatch:

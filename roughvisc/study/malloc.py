@@ -37,4 +37,4 @@ def expect_arrays(size: int) -> None:
     The GNU library takes the largest array that was ever freed for a measure of what to keep: one that is never
     touched costs nothing. Without this a quarter of a step at 512 squared may go into clearing memory anew.
     """
-    np.empty(min(8 * size, _HIGHEST), np.uint8)
+    np.empty(min(16 * size, _HIGHEST), np.uint8)

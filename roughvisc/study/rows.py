@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -22,6 +23,9 @@ from roughvisc.variables import STATUS_MEANINGS, annotate
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
 PERIMETER_CORRECTION = 0.088
 
+#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance: measured on rows whose
+#: other errors are small (workflows/benchmarks/accuracy.py).
+_INHERITED = 0.02
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -44,12 +48,17 @@ class Rows:
         Where the rows are kept; what is in it counts as rows of an earlier part of the march.
     tolerance : float
         Of the march: where it leaves room for single precision, what lies beyond a window is computed so.
+    series_error : float
+        Relative error of the series that stands for the material.
     """
 
-    def __init__(self, ground: Ground, fields: Sequence[str], store: RowStore, tolerance: float) -> None:
+    def __init__(
+        self, ground: Ground, fields: Sequence[str], store: RowStore, tolerance: float, series_error: float = 0.0
+    ) -> None:
         self._ground = ground
         self._fields = tuple(fields)
         self._store = store
+        self._series_error = series_error
         single = tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, single=single))
         self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
@@ -57,8 +66,8 @@ class Rows:
     def __len__(self) -> int:
         return len(self._store.plain)
 
-    def add(self, step: Step, worst_error: float, converged: bool, wall_time: float) -> None:
-        """Take up an accepted step, with the worst of those since the last row."""
+    def add(self, step: Step, converged: bool, wall_time: float) -> None:
+        """Take up an accepted step; ``converged``: all of those since the last row."""
         shown, window = step.shown, self._ground.window
         contact = shown.pressure > 0
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
@@ -79,11 +88,9 @@ class Rows:
             "time": shown.time,
             "force": shown.force,
             "approach": shown.approach,
-            "work": step.state.work,
+            **stated(step, self._series_error, touching),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
-            "residual": step.bound,
-            "time_error": worst_error,
             "status": self._status(step, converged, contact),
             "wall_time": wall_time,
             "contact_area": touching,
@@ -199,6 +206,77 @@ class Rows:
         else:
             meaning = "converged"
         return STATUS_MEANINGS.index(meaning)
+
+
+def keeps_its_word(step: Step) -> bool:
+    """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
+
+    Where hardly any compliance is there at once, pressure jumps in each cell that enters: nothing is promised of it,
+    and the short steps that lead over such a jump are no rows.
+    """
+    unknown, scene, state = step.uncertainty, step.scene, step.state
+    if scene.time_step is not None:
+        return True
+    if scene.is_soft(scene.program.duration):
+        unknown = replace(unknown, pressure=0.0, force=0.0)
+        since = state.now.time - state.began
+        if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
+            return False
+    return not unknown.relative(state) > scene.tolerance
+
+
+def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
+    """Work and energies of a step, and what is stated of its accuracy.
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    series_error : float
+        Relative error of the series that stands for the material.
+    area : float
+        Counted contact area. [m2]
+
+    Notes
+    -----
+    The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
+    under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
+    the approach.
+    """
+    state, unknown, shown = step.state, step.uncertainty, step.shown
+    largest_force, largest_approach = state.largest_force, state.largest_approach
+    solved = step.residual + series_error
+    if step.scene.remembers:
+        solved += _INHERITED * step.scene.tolerance
+    force = approach = 0.0
+    if step.control == "approach" or not step.given:
+        force = unknown.force + solved * shown.force
+    if step.control == "load" or not step.given:
+        approach = unknown.approach + (0.5 * step.bound**2 + series_error) * abs(shown.approach)
+    pressure = solved
+    if largest_force > 0:
+        pressure = (unknown.pressure + solved * shown.force) / largest_force
+    relative = max(
+        pressure,
+        force / largest_force if largest_force > 0 else 0.0,
+        approach / largest_approach if largest_approach > 0 else 0.0,
+    )
+    return {
+        "work": step.work,
+        "stored_energy": step.stored,
+        "dissipated_energy": step.dissipated,
+        "stated_error": relative,
+        "time_error": step.time_error,
+        "residual": step.residual,
+        "residual_bound": step.bound,
+        "pressure_error": pressure,
+        "force_error": force,
+        "approach_error": approach,
+        "work_error": unknown.work + solved * abs(step.work),
+        "dissipated_energy_error": unknown.dissipated + solved * abs(step.dissipated),
+        "contact_area_lower": max(area - unknown.inside, 0.0),
+        "contact_area_upper": area + unknown.outside,
+    }
 
 
 def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:

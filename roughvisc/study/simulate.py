@@ -21,7 +21,7 @@ from roughvisc.study.grid_error import with_grid_error
 from roughvisc.study.malloc import expect_arrays
 from roughvisc.study.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.records import RowsInMemory
-from roughvisc.study.rows import Rows
+from roughvisc.study.rows import Rows, keeps_its_word
 from roughvisc.study.scene import Ground, follows, prepare
 from roughvisc.variables import FIELDS, annotate
 
@@ -200,16 +200,18 @@ def _press(
         larger = ground.enlarge(scene)
         assert larger is not None, "it grew before"
         scene = larger[0]
-    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows, tolerance)
+    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows, tolerance, engine.series_error)
     spent = reached.wall_time - began
-    kept = None if scene.times is None else set(scene.times)
+    kept = set(program.corners if scene.times is None else scene.times)
+    every = scene.times is None
     report, close = _reporter(progress)
     try:
         for step in march(scene, reached.state) if method == "fast" else march_seed(scene):
             scene = step.scene
             reached = reached.after(step, ground.growths, spent + time.perf_counter())
-            if kept is None or step.shown.time in kept:
-                rows.add(step, reached.worst_error, reached.converged, reached.wall_time)
+            # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
+            if step.shown.time in kept or (every and keeps_its_word(step)):
+                rows.add(step, reached.converged, reached.wall_time)
                 reached = reached.kept()
             report(step.shown.time, scene.program.duration)
             if keeper is not None and method == "fast":

@@ -147,7 +147,7 @@ def compared(ds, exact, program):
     for name, given in prescribed(program, ds.time.values).items():
         true[name][given] = np.nan
     true["total"] = np.fmax(true["pressure"], np.fmax(true["approach"], true["force"]))
-    stated = {"total": _row(ds, "error", "time_error"), "pressure": _row(ds, "pressure_error")}
+    stated = {"total": _row(ds, "stated_error", "time_error"), "pressure": _row(ds, "pressure_error")}
     stated |= {name: _row(ds, f"{name}_error") / scale[name] for name in ("approach", "force", "work")}
     found = {name: {"true": _short(true[name]), "stated": _short(stated[name])} for name in QUANTITIES}
     area, low, high = (_row(ds, name) / cell for name in ("contact_area", "contact_area_lower", "contact_area_upper"))
