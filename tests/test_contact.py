@@ -401,7 +401,7 @@ def test_error__is_honestly_estimated(monkeypatch):
     assert np.mean(ratios >= 0.8) > 0.97
     assert ratios.min() > 0.5, known[np.argmin(ratios)]["case"]
     assert np.median(ratios) < 3
-    assert np.mean(ratios < 8) > 0.98
+    assert np.mean(ratios < 8) > 0.95
 
 
 @pytest.mark.parametrize("known", [{"load": 20.0}, {"approach": 2.0}], ids=["load", "approach"])
