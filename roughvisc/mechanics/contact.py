@@ -60,6 +60,8 @@ _ROUNDED = 1e-10
 # So near full contact, in parts of the approach, a load that leaves no gap at all is cut at once: measured at 64
 # squared, 7 iterations instead of 346.
 _NEARLY_FULL = 1e-3
+# Error of a first guess that is good enough, over its relative duality gap: 1 in the median, 7 in one of fifty.
+_UNIMPROVED = 3.0
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -142,8 +144,8 @@ def solve_contact(
     overwrite : bool
         Whether `gap`, `start` and `start_displacement` may be used up, which spares copies of them.
     estimate_error : bool
-        Whether to estimate the error of the pressure. It costs nothing where the first guess was improved; else
-        applying the preconditioner once, and twice under given approach with periodic boundaries.
+        Whether to estimate the error of the pressure. It costs nothing, but under given approach with periodic
+        boundaries two applications of the preconditioner.
 
     Returns
     -------
@@ -309,12 +311,14 @@ class _Problem:
                 last_face, last_step = face if curvature > 0 else None, step
                 length *= min(max(full, 0.3), _GROWTH if cut else 3.0)
         error = math.nan
-        if estimate_error and known is not None and self.sees_load and not self.hopeless:
+        if estimate_error and (self.hopeless or not self.sees_load):
+            error = self.error(pressure, displacement, level)
+        elif estimate_error and known is not None:
             # what the last preconditioned step asked for, less as the bound has fallen since
             change_asked, gap_then = known
             error = change_asked / self.scale / float(np.sum(pressure)) * math.sqrt(max(duality_gap, 0.0) / gap_then)
         elif estimate_error:
-            error = self.error(pressure, displacement, level)
+            error = _UNIMPROVED * max(duality_gap, 0.0) / energy if energy > 0 else 0.0
         return self.state(pressure, displacement, level, duality_gap, energy, converged, iteration, error)
 
     def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
@@ -455,21 +459,18 @@ class _Problem:
         return min(level + float(np.sum(weight * excess)) / float(np.sum(weight)), full)
 
     def error(self, pressure: Array, displacement: Array, level: float) -> float:
-        """Estimated relative L1 error of the pressure: what the next preconditioned step would change.
+        """Estimated relative L1 error of the pressure under a given approach with periodic boundaries.
 
-        The preconditioner is nearly the inverse, which makes its step nearly the error, in the contact and at its
-        border. Under given approach with periodic boundaries it does not know what a uniform residual does to the load.
+        It is what the next preconditioned step would change: the preconditioner is nearly the inverse, in the contact
+        and at its border. What a uniform residual does to the load it does not know, and that is added.
         """
         if self.hopeless:
             return math.inf
         total = np.add(self.gap, displacement, out=self.room)
         load = float(np.sum(pressure))
         face = self.face(pressure, total, level)
-        residual = total.take(face)
-        residual -= level if self.load is None else float(np.mean(residual))
-        uniform = 0.0
-        if not self.sees_load:
-            uniform = self.stiffness(np.flatnonzero(pressure)) * abs(float(np.sum(residual))) / total.size
+        residual = total.take(face) - level
+        uniform = self.stiffness(np.flatnonzero(pressure)) * abs(float(np.sum(residual))) / total.size
         step = float(np.sum(np.abs(self.precondition(residual, face)))) / self.scale
         return (step + uniform) / load
 
