@@ -17,6 +17,7 @@ from roughvisc.mechanics.scene import Instant, Scene, State, Step, Uncertainty
 
 Array = NDArray[np.float64]
 
+_NO_FIELD = np.zeros((0, 0))
 #: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
 #: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
 STATED = 1.0
@@ -29,6 +30,13 @@ _ENTERED = 0.3
 # second, if it has grown by more than the factor since; their share of it stays between the last two.
 _MOST_USED, _LEAST_USED = 0.7, 0.3
 _GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
+
+
+def bare(state: State) -> State:
+    """A companion's state without what it is never asked for, so that it holds few fields."""
+    before = None if state.before is None else replace(state.before, pressure=_NO_FIELD, unit_displacement=None)
+    displacement = state.displacement if state.energy is None else _NO_FIELD
+    return replace(state, before=before, displacement=displacement)
 
 
 def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.mechanics import energy
 from roughvisc.mechanics.apart import closing_time
-from roughvisc.mechanics.companion import beside, difference, scaled, sharpened
+from roughvisc.mechanics.companion import bare, beside, difference, scaled, sharpened
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.control import (
     error_limit,
@@ -342,6 +342,8 @@ def _on_larger(scene: Scene, state: State, offset: tuple[int, int]) -> State:
     memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
 
     def moved(instant: Instant) -> Instant:
+        if not instant.pressure.size:  # of a companion
+            return instant
         return replace(instant, pressure=padded(instant.pressure, shape, offset), unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
@@ -400,7 +402,7 @@ def _jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
                 scene, companion, segment.control, start, 0.0, "linear", guess=beside(trial.instant)
             )
             state = _spent(state, companion_trial)
-            companion = _committed(scene, companion, companion_trial)
+            companion = bare(_committed(scene, companion, companion_trial))
         if not any(_outgrown(scene, one.instant) for one in (trial, companion_trial) if one is not None):
             break
         scene, state = _enlarged(scene, state, state.now.time)
@@ -483,8 +485,9 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
         if waiting is not None:
             yield replace(waiting, uncertainty=waiting.uncertainty.or_worse(step.uncertainty))
             waiting = None
-        if alone and (scene.remembers or (base.before is None and scene.time_step is None)):
-            base, waiting = state, step
+        fresh = state.before is None and scene.time_step is None
+        if alone and (fresh or (scene.remembers and scene.keeps(step.shown.time))):
+            base, waiting = state if fresh else step.state, step
         else:
             base = step.state
             yield step
@@ -559,7 +562,7 @@ def _judged(
         accepted = _restarted(scene, accepted, trial.length)
     companion_trial = None
     if scene.remembers and alone:
-        companion = replace(state, suggestion=0.0) if state.companion is None else state.companion
+        companion = bare(state) if state.companion is None else state.companion
         accepted = replace(accepted, companion=companion, behind=1)
     elif state.companion is not None:
         found = _caught_up(scene, accepted, segment, state.before if state.behind else None)
@@ -608,7 +611,7 @@ def _caught_up(
     followed = _committed(scene, companion, trial)
     if companion.unresolved:
         followed = _restarted(scene, followed, 0.0)
-    return replace(_spent(state, trial), companion=followed, behind=0), trial
+    return replace(_spent(state, trial), companion=bare(followed), behind=0), trial
 
 
 def _compared(

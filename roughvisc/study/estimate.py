@@ -234,15 +234,18 @@ def memory(case: Case, cells: int, found: March, engine: Engine, part: float = 1
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     field = 8.0 * cells
     surface, solver = 3.0, 14.0  # measured at 512 squared: together 13 to 18, as 5 to 45 % of the cells are in contact
+    companion = 0.0  # measured there: 8 fields with one exponential
     transforms = 4.3 if case.settings.solve.boundary == "free" else 1.4  # symbols, spectra
     past = 0.0
     if isinstance(engine.memory, Modes):
         modes = len(engine.memory.material.times) + bool(engine.memory.material.fluidity)
         past = (3 if "bdf2" in engine.memory.rules else 2) * modes * part * field
+        companion = 7.0 + modes if modes else 0.0
     elif isinstance(engine.memory, History):
-        past = history_bytes(found.contact * cells, found.steps)
+        past = 1.5 * history_bytes(found.contact * cells, found.steps)
+        companion = 7.0
     kept = min(found.rows, _FRAMES_TOGETHER) * field
-    return _PROCESS + (surface + (transforms + solver) * part) * field + past + kept
+    return _PROCESS + (surface + (transforms + solver + companion) * part) * field + past + kept
 
 
 def disk(case: Case, cells: int, found: March) -> float:
