@@ -84,11 +84,7 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
 
 def shortest_step(scene: Scene, state: State, segment: Segment) -> float:
     """No step is shorter: by the segment, or by the first time kept in it. [s]"""
-    length = segment.duration
-    if scene.times is not None:
-        length = min(
-            (t - state.began for t in scene.times if state.now.time < t <= state.began + length), default=length
-        )
+    length = min(segment.duration, scene.next_kept(state.now.time) - state.began)
     return SMALLEST_STEP * length
 
 

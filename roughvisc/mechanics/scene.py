@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
@@ -119,7 +120,17 @@ class Scene:
 
     def keeps(self, time: float) -> bool:
         """Whether a time is kept. [s]"""
-        return self.times is None or time in self.times
+        return self.times is None or time in self._kept
+
+    def next_kept(self, time: float) -> float:
+        """The first time to step onto after another, infinite if there is none. [s]"""
+        times = self.times or ()
+        at = bisect_right(times, time)
+        return times[at] if at < len(times) else math.inf
+
+    @cached_property
+    def _kept(self) -> frozenset[float]:
+        return frozenset(self.times or ())
 
 
 @dataclass(frozen=True)

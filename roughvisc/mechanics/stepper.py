@@ -433,9 +433,7 @@ def _postponed(scene: Scene, state: State, segment: Segment, value: float) -> St
 
 def next_event(scene: Scene, state: State, end: float) -> float:
     """Next kept time or the end of the segment, whichever comes first. [s]"""
-    if scene.times is None:
-        return end
-    return min((t for t in scene.times if state.now.time < t < end), default=end)
+    return min(scene.next_kept(state.now.time), end)
 
 
 def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
