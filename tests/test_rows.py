@@ -1,0 +1,48 @@
+"""What a row states of itself, in the result that a user gets."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+
+BALL = rv.sphere(1.0, 1.6, 17)
+MATERIALS = {
+    "elastic": rv.elastic(1.0),
+    "zener": rv.zener(1.0, 1.0, 0.3),
+    "maxwell": rv.maxwell(1.0, 1.0),
+    "kelvin_voigt": rv.kelvin_voigt(1.0, 0.3),
+    "power_law": rv.PowerLaw(1.0, 1.0, 0.3),
+}
+PROGRAMS = {
+    "loads": rv.Program().load(0.02, over=0.3).hold(0.3).load(0.0, over=0.2).hold(0.2).load(0.01, over=0.2),
+    "approaches": rv.Program().approach(0.05, over=0.3).hold(0.3).approach(-0.01, over=0.2).approach(0.03, over=0.3),
+    "jump": rv.Program().load(0.02, over=0).hold(0.5).load(0.01, over=0),
+    "taps": rv.Program.cycle(0.0, 0.03, 0.5, 2, control="approach"),
+}
+
+
+def result(material, program, **settings):
+    settings = {"tolerance": 3e-2, "fields": (), "progress": False} | settings
+    return rv.simulate(BALL, MATERIALS[material], PROGRAMS[program], **settings)
+
+
+@pytest.mark.parametrize("times", [None, 7])
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("material", MATERIALS)
+def test_every_row__states_an_error(material, program, times):
+    ds = result(material, program, times=times)
+    assert ds.sizes["time"] > 1
+    for name in ("stated_error", "time_error", "residual", "pressure_error", "force_error", "approach_error"):
+        assert np.isfinite(ds[name]).all(), name
+        assert (ds[name] >= 0).all(), name
+    assert (ds.contact_area_lower <= ds.contact_area).all()
+    assert (ds.contact_area <= ds.contact_area_upper).all()
+
+
+def test_ancillary_variables__exist():
+    for settings in ({}, {"fields": ("pressure", "gap", "displacement")}, {"method": "seed", "times": 3}):
+        ds = result("zener", "jump", **settings)
+        named = {name: variable.attrs.get("ancillary_variables", "").split() for name, variable in ds.variables.items()}
+        assert {other for others in named.values() for other in others} <= set(ds.variables)
+        assert "force_error" in named["force"] or "force_error" not in ds
+    assert named["height"] == []
