@@ -24,18 +24,47 @@ def _histories(fields, force, approach, residual=3e-6):
     return fields.assign(
         force=("time", force),
         approach=("time", approach),
-        work=("time", _work(force, approach)),
+        **_energies(_work(force, approach)),
         contact_area=counted,
         contact_area_corrected=0.97 * counted,
         contact_fraction=counted / (cell * present.sum()),
         mean_gap=fields["gap"].mean(("x", "y")),
         iterations=("time", 8 + frames % 5),
         convolutions=("time", 11 + frames % 5),
-        residual=("time", residual * (1.5 + np.sin(1.7 * frames))),
-        time_error=("time", 4e-4 * (1.2 + np.cos(0.9 * frames))),
+        **_accuracy(force, approach, counted.values, residual),
         status=("time", status),
         wall_time=("time", 0.02 * (1 + frames)),
     )
+
+
+def _accuracy(force, approach, area, residual):
+    """Errors as they are stated: the parts of time steps and contact solver, and what they add up to."""
+    frames = np.arange(len(force))
+    solver = residual * (1.5 + np.sin(1.7 * frames))
+    steps = 4e-4 * (1.2 + np.cos(0.9 * frames))
+    stated = steps + solver + 2e-5
+    work = np.abs(_work(force, approach))
+    values = {
+        "stated_error": stated,
+        "time_error": steps,
+        "residual": solver,
+        "residual_bound": 160 * solver,
+        "pressure_error": stated,
+        "force_error": np.zeros(len(force)),
+        "approach_error": 0.3 * steps * np.maximum.accumulate(np.abs(approach)),
+        "work_error": 0.5 * stated * work,
+        "dissipated_energy_error": 0.5 * stated * work,
+        "contact_area_lower": 0.99 * area,
+        "contact_area_upper": 1.01 * area,
+    }
+    return {name: ("time", one) for name, one in values.items()}
+
+
+def _energies(work):
+    """Two thirds of the work stored at most, the rest dissipated."""
+    stored = 0.6 * work / (1 + np.arange(len(work)) / (2 * len(work)))
+    values = {"work": work, "stored_energy": stored, "dissipated_energy": work - stored}
+    return {name: ("time", one) for name, one in values.items()}
 
 
 def _work(force, approach):
@@ -118,7 +147,7 @@ def hertz_cycle(frames=60, shape=(31, 24), cycles=2):
         contact_area=("time", 2e-7 * lag ** (2 / 3)),
         contact_fraction=("time", 2e-7 / 3e-6 * lag ** (2 / 3)),
         contact_area_corrected=("time", 1.95e-7 * lag ** (2 / 3)),
-        work=("time", _work(0.5 * wave, 2e-5 * lag ** (2 / 3))),
+        **_energies(_work(0.5 * wave, 2e-5 * lag ** (2 / 3))),
     )
     return _attributes(made, "Sphere in cycles", "free")
 
@@ -135,6 +164,7 @@ def open_contact():
     made["gap"][:] = made["height"].max() - made["height"] + 1e-6
     for name in ("force", "contact_area", "contact_area_corrected", "contact_fraction", "residual"):
         made[name][:] = 0.0
-    made["time_error"][:] = np.nan
+    for name in ("stated_error", "time_error"):
+        made[name][:] = np.nan
     made["status"][:] = 2
     return made

@@ -43,7 +43,15 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path):
     figures = {p.name.rpartition("-")[2] for p in result.parent.glob(f"{result.stem}-*.png")}
     assert {"history.png", "maps.png", "section.png"} <= figures
     assert f"Result: results/ball/{result.name}\n" in out
-    for words in ("24 x 21 cells, free", "3, up to t = 200 ms", "5 mN", "worst residual", "convolutions", "wall time"):
+    for words in (
+        "24 x 21 cells, free",
+        "3, up to t = 200 ms",
+        "5 mN",
+        "worst stated error",
+        "tolerance 0.001",
+        "convolutions",
+        "wall time",
+    ):
         assert words in out
 
 

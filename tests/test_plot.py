@@ -196,13 +196,17 @@ def test_history__data_and_units():
     ]
     np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
     np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
+    for name in ("stored", "dissipated"):
+        np.testing.assert_allclose(lines(work)[name].get_ydata(), 1e6 * ds[f"{name}_energy"])
     for name in ("convolutions", "iterations"):
         np.testing.assert_allclose(lines(cost)[name].get_ydata(), ds[name])
     assert accuracy.get_xlabel() == "Time [s]"
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
     np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
-    np.testing.assert_allclose(lines(accuracy)["solver (energy bound)"].get_ydata(), ds["residual"])
+    assert list(lines(accuracy)) == ["stated", "time steps", "contact solver (estimate)", "tolerance"]
+    np.testing.assert_allclose(lines(accuracy)["stated"].get_ydata(), ds["stated_error"])
+    np.testing.assert_allclose(lines(accuracy)["contact solver (estimate)"].get_ydata(), ds["residual"])
     np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
     np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
 

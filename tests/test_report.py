@@ -89,7 +89,15 @@ def test_page__says_what_was_run_and_how_accurate_it_is(page):
     assert rows(text) == ["0", "1", "2"]
     loads = re.findall(r"<tr data-view.*?<td>\d</td><td>(.*?)</td>", text)
     assert loads == ["1 mN", "2 mN", "10 mN"], "cases in the order of what was varied"
-    for words in ("zener, shear modulus 3 MPa", "hold 200 ms", "Residual", "Time error", "converged", "surface sha256"):
+    for words in (
+        "zener, shear modulus 3 MPa",
+        "hold 200 ms",
+        "Stated error",
+        "Time steps",
+        "Contact solver",
+        "converged",
+        "surface sha256",
+    ):
         assert words in text
     assert "contact reached the border" in text
     assert "Too far, program.0.load = 9 N" in text

@@ -195,6 +195,8 @@ class Uncertainty:
 
     def relative(self, state: State) -> float:
         """The largest of pressure, force and approach over what these have come to so far. [-]"""
+        if math.isnan(self.pressure):  # unknown, of surfaces at rest too
+            return math.nan
         force, approach = state.largest_force, state.largest_approach
         by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
         return max(by_force, self.approach / approach if approach > 0 else 0.0)

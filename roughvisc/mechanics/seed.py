@@ -154,7 +154,8 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     largest_step = scene.time_step or scene.program.duration / 100
     state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), np.zeros_like(scene.gap), None)
     if scene.program.segments and scene.program.segments[0].duration > 0:
-        yield Step(state.now, np.zeros_like(scene.gap), None, 0.0, "load", True, 0.0, 0.0, UNKNOWN, True, scene, state)
+        nothing, unknown = np.zeros_like(scene.gap), math.nan
+        yield Step(state.now, nothing, None, 0.0, "load", True, unknown, unknown, UNKNOWN, True, scene, state)
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
         state = replace(state, segment=index, began=state.now.time, start=state.now.force)
@@ -203,6 +204,8 @@ def _advance(
         state,
         now=now,
         displacement=displacement,
+        largest_force=max(state.largest_force, load),
+        largest_approach=max(state.largest_approach, abs(solution.level)),
         work=state.work + work_between(scene, state, now.pressure, displacement),
         iterations=state.iterations + solution.iterations,
         convolutions=state.convolutions + solution.convolutions + len(increments),

@@ -13,8 +13,8 @@ from roughvisc.variables import FIELDS
 
 #: What a result says of a material without instantaneous compliance.
 NO_JUMP = (
-    "The material has no instantaneous compliance: each cell that comes into contact makes the pressure jump. The "
-    "tolerance is kept on the approach; the pressure (L1) may miss it at times just after cells came into contact."
+    "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
+    "comes into contact. Approach and work keep the tolerance; of pressure and force each row states its own error."
 )
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
 #: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
@@ -61,16 +61,18 @@ def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
         notes.append(NO_JUMP)
     elif at_once < _AT_ONCE * final:
         notes.append(
-            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: the pressure nearly jumps in each "
-            "cell that comes into contact. The tolerance is kept on the approach; the pressure (L1) may miss it at "
-            "times just after cells came into contact."
+            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: pressure, and force under a given "
+            "approach, nearly jump in each cell that comes into contact. Approach and work keep the tolerance; of "
+            "pressure and force each row states its own error."
         )
     errors = dataset["stated_error"].values
     missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
-    if missed.size and scene.time_step is None:
+    if missed.size:
+        fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
+        says = "states" if missed.size == 1 else "state"
         notes.append(
-            f"The estimated error of the time steps, {errors[missed].max():.2g} at most, exceeds the tolerance before "
-            f"{missed.size} of {errors.size} kept times: the shortest steps taken did not resolve what happened."
+            f"{missed.size} of {errors.size} rows {says} an error above the tolerance, {errors[missed].max():.2g} at "
+            f"worst (stated_error).{fixed}"
         )
     return " ".join(notes)
 

@@ -7,7 +7,7 @@ import json
 import logging
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from importlib import metadata
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
 from roughvisc.mechanics.transforms import transform_engine
@@ -153,8 +154,8 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
         "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "
-        "Attribute 'case' states the whole computation (JSON, SI units); 'residual' and 'time_error' how accurate it "
-        "is; 'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
+        "Attribute 'case' states the whole computation (JSON, SI units); 'stated_error' how accurate it is; "
+        "'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
         "case": case.to_json(),
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,
@@ -284,13 +285,16 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     return path
 
 
-def unconverged(dataset: xr.Dataset) -> str:
+def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
     """What to tell about steps that did not converge; empty if all did."""
-    bad = np.flatnonzero(dataset["status"].values == STATUS_MEANINGS.index("not_converged"))
+    status = np.asarray(histories["status"])
+    bad = np.flatnonzero(status == STATUS_MEANINGS.index("not_converged"))
     if not bad.size:
         return ""
-    times, residual = dataset["time"].values[bad], float(np.max(dataset["residual"].values[bad]))
+    left = np.asarray(histories["residual"], dtype=float)[bad]
+    known = left[np.isfinite(left)]  # the seed paper's algorithm estimates nothing
+    by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
     return (
-        f"{bad.size} of {dataset.sizes['time']} kept times did not converge, first at t = {times[0]:.6g} s "
-        f"(residual up to {residual:.2g}): try a looser tolerance or shorter steps"
+        f"{bad.size} of {status.size} kept times did not converge, first at "
+        f"t = {float(histories['time'][bad[0]]):.6g} s{by}: try a looser tolerance or shorter steps"
     )

@@ -62,13 +62,14 @@ def simulate(
     boundary : {"free", "periodic"}
         ``free`` for an indenter, ``periodic`` for a nominally flat scan.
     tolerance : float
-        Bounds, at every kept time, the error in time of the pressure (L1, over the largest force so far) and of
-        the approach (over its largest value); the error of the grid comes on top.
+        Asked of ``stated_error`` at every kept time: the error that time steps, contact solver and series leave of
+        pressure (L1), force and approach, over the largest force and approach so far. Rows that miss it state by how
+        much, and ``accuracy_note`` counts them; the error of the grid comes on top.
     time_step : "auto" or float
         Steps chosen by the tolerance, or of a given length. [s]
     times : int or sequence of float, optional
-        Times to keep, stepped onto exactly: a count, evenly from 0+ to the end; a list; or None, every accepted
-        step. [s]
+        Times to keep, stepped onto exactly: a count, evenly from 0+ to the end; a list; or None, all corners of the
+        program and every accepted step whose time steps keep the tolerance. [s]
     fields : sequence of str
         Fields to keep, of ``pressure``, ``gap``, ``displacement``.
     method : {"fast", "seed"}

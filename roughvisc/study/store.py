@@ -27,8 +27,22 @@ from roughvisc.variables import annotate
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Variables where a value may be missing and NaN says so; any other has none, and no fill value.
-MAY_BE_MISSING = frozenset({"height", "gap", "time_error", "grid_error", "grid_error_area"})
+#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
+#: algorithm states no accuracy, the direct history no energies.
+MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) | {
+    "stated_error",
+    "time_error",
+    "residual",
+    "residual_bound",
+    "pressure_error",
+    "approach_error",
+    "stored_energy",
+    "dissipated_energy",
+    "work_error",
+    "dissipated_energy_error",
+    "contact_area_lower",
+    "contact_area_upper",
+}
 #: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
 #: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
 #: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.

@@ -17,8 +17,7 @@ from scipy import fft
 from roughvisc.errors import InUseError, RoughviscError
 from roughvisc.study.case import Case
 from roughvisc.study.index import Entry, read_entry
-from roughvisc.study.run import run_case
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.study.run import run_case, unconverged
 
 log = logging.getLogger("roughvisc")
 
@@ -105,15 +104,8 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
 
 def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
     """How a case ended whose file is there."""
-    bad = np.flatnonzero(entry.histories["status"] == STATUS_MEANINGS.index("not_converged"))
-    if not bad.size:
-        return Outcome(entry.key, "done", entry=entry, reused=reused)
-    at, residual = entry.histories["time"][bad[0]], np.max(entry.histories["residual"][bad])
-    message = (
-        f"{bad.size} of {entry.rows} kept times did not converge, first at t = {at:.6g} s "
-        f"(residual up to {residual:.2g}): try a looser tolerance or shorter steps"
-    )
-    return Outcome(entry.key, "unconverged", message, entry=entry, reused=reused)
+    message = unconverged(entry.histories)
+    return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
 
 
 def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:

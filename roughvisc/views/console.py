@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from roughvisc.study.task import Outcome
     from roughvisc.study.validate import Comparison
 
+#: What is stated of accuracy, and its parts, each at its worst.
+_ERRORS = {
+    "stated_error": "worst stated error",
+    "time_error": "time steps, worst",
+    "residual": "contact solver, estimated",
+}
 _PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
 
@@ -82,8 +88,7 @@ def result_table(dataset: xr.Dataset) -> Group:
             f"{readable(float(last['contact_area']), 'm2')} counted"
             f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
         ),
-        ("Accuracy: worst residual", _number(dataset["residual"])),
-        ("Accuracy: worst time error", _number(dataset["time_error"])),
+        *_accuracy([dataset], dataset.attrs.get("tolerance")),
         *(
             (f"Accuracy: worst {label}", _number(dataset[name]))
             for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
@@ -116,9 +121,7 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
     for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
-    for name, label in (("residual", "Accuracy: worst residual"), ("time_error", "Accuracy: worst time error")):
-        if entries:
-            rows.append((label, _number(np.concatenate([entry.histories[name] for entry in entries]))))
+    rows += _accuracy([entry.histories for entry in entries])
     if spent:
         rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
     return _two_columns(rows, title)
@@ -319,6 +322,17 @@ def _channel_row(channel: Any) -> tuple[str, str]:
     shape = " x ".join(map(str, channel.shape))
     described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
     return f"Channel {channel.index}", described
+
+
+def _accuracy(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
+    """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
+    rows = []
+    for name, label in _ERRORS.items():
+        values = [np.ravel(one[name]) for one in found if name in one]
+        if values:
+            asked = f", tolerance {tolerance:g}" if tolerance and name == "stated_error" else ""
+            rows.append((f"Accuracy: {label}", _number(np.concatenate(values)) + asked))
+    return rows
 
 
 def _number(values: Any) -> str:

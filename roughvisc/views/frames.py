@@ -24,6 +24,10 @@ _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64)
 #: Colours of a map, besides those of absent cells and of cells in or out of contact.
 _LEVELS = 62
 _ABSENT, _MARKED = 0, 1
+#: What is stated of accuracy, then its parts.
+_ERRORS = {"stated_error": "stated", "time_error": "time steps", "residual": "solver (estimate)"}
+#: Errors below this part of the largest are not shown.
+_FAINTEST = 1e-5
 _CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
 _SECTION = (1000.0, 240.0)
 
@@ -240,7 +244,7 @@ def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
             charts.append(_chart(dataset, unit.label(label), {label: unit(values)}, chosen))
     errors = {
         label: dataset[name].values.astype(float)
-        for name, label in (("residual", "solver bound"), ("time_error", "time steps"))
+        for name, label in _ERRORS.items()
         if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
     }
     if errors:
@@ -253,6 +257,10 @@ def _chart(dataset, label: str, lines: dict[str, np.ndarray], chosen: list[int],
     across, time_ticks = _across(axis, dataset["time"].values)
     logarithmic = tolerance is not None or label == "Relative error"
     stacked = np.concatenate(list(lines.values()))
+    if logarithmic:
+        faintest = _FAINTEST * np.nanmax(stacked)
+        lines = {name: np.where(values >= faintest, values, np.nan) for name, values in lines.items()}
+        stacked = np.concatenate(list(lines.values()))
     stacked = stacked[np.isfinite(stacked) & ((stacked > 0) | (not logarithmic))]
     if tolerance is not None:
         stacked = np.append(stacked, float(tolerance))
@@ -333,9 +341,9 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
     ]
     if "contact_fraction" in dataset:
         rows.append(("Of nominal", f"{100 * float(one['contact_fraction']):.3g} %"))
-    for name, label in (("residual", "Residual"), ("time_error", "Time error")):
+    for name, label in _ERRORS.items():
         if name in dataset:
-            rows.append((label, f"{float(one[name]):.2g}" if np.isfinite(one[name]) else "not known"))
+            rows.append((f"Error, {label}", f"{float(one[name]):.2g}" if np.isfinite(one[name]) else "not known"))
     if "status" in dataset:
         rows.append(("Status", STATUS_MEANINGS[int(one["status"])].replace("_", " ")))
     return {"time": unit_for([time], "s").text(time, 4), "numbers": rows}

@@ -35,7 +35,26 @@ _PANELS = (
     ("mean_gap", "Mean gap", PURPLE),
     ("work", "Work", ORANGE),
 )
+#: What else belongs in a panel, with its label, colour and dashes.
+_BESIDE = {
+    "contact_area": (("contact_area_corrected", "corrected for the grid", "k", (0, (4, 2))),),
+    "work": (
+        ("stored_energy", "stored", SKY, (0, (4, 2))),
+        ("dissipated_energy", "dissipated", VERMILION, (0, (1, 1.5))),
+    ),
+}
+#: The line that they stand beside.
+_ITSELF = {"contact_area": "counted", "work": "in all"}
+#: What is stated of accuracy first, then its parts, and what comes on top.
+_ERRORS = (
+    ("stated_error", "stated", "k", 1.6),
+    ("time_error", "time steps", ORANGE, 1.0),
+    ("residual", "contact solver (estimate)", PURPLE, 1.0),
+    ("grid_error", "grid", SKY, 1.0),
+)
 _COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
+#: Errors below this part of the largest are not shown.
+_FAINTEST = 1e-5
 #: Panels up to which they stand in one column.
 _ONE_COLUMN = 3
 _NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
@@ -67,15 +86,15 @@ def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, label: str, colour: 
     times, values = axis.unit(dataset["time"]), dataset[name].values
     unit = unit_for(values, VARIABLES[name].units)
     marker = marker_of(len(times))
-    ax.plot(times, unit(values), color=colour, marker=marker, label="counted" if name == "contact_area" else "_")
+    beside = [one for one in _BESIDE.get(name, ()) if one[0] in dataset and dataset[one[0]].notnull().any()]
+    ax.plot(times, unit(values), color=colour, marker=marker, label=_ITSELF[name] if beside else "_")
     failed = failed_frames(dataset)
     if failed.any():
         note = "not converged" if name == "force" else "_"
         ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5, label=note)
-    if name == "contact_area" and "contact_area_corrected" in dataset:
-        corrected = unit(dataset["contact_area_corrected"])
-        ax.plot(times, corrected, color="k", ls=(0, (4, 2)), lw=0.9, label="corrected for the grid")
-    leave_room(ax, unit(values))
+    for other, said, shade, dashes in beside:
+        ax.plot(times, unit(dataset[other]), color=shade, ls=dashes, lw=0.9, label=said)
+    leave_room(ax, *(unit(dataset[one]) for one in (name, *(one[0] for one in beside))))
     ax.set_ylabel(unit.label(label))
 
 
@@ -97,24 +116,22 @@ def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
     axis = TimeAxis.of(dataset["time"])
     times = axis.unit(dataset["time"])
     floor, ceiling = math.inf, 0.0
-    shown = (
-        ("residual", "solver (energy bound)", PURPLE),
-        ("time_error", "time steps", ORANGE),
-        ("grid_error", "grid", SKY),
-    )
-    for name, label, colour in shown:
+    for name, label, colour, width in _ERRORS:
         if name not in dataset:
             continue
         values = dataset[name].values.astype(float)
         known = np.isfinite(values) & (values > 0)
         if known.any():
-            ax.plot(times[known], values[known], color=colour, marker=marker_of(len(times)), ms=2.5, lw=1, label=label)
+            ax.plot(
+                times[known], values[known], color=colour, marker=marker_of(len(times)), ms=2.5, lw=width, label=label
+            )
             floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
     tolerance = dataset.attrs.get("tolerance")
     if tolerance:
         ax.axhline(tolerance, color="0.3", lw=0.8, ls=(0, (1, 1.5)), label="tolerance")
         floor, ceiling = min(floor, tolerance), max(ceiling, tolerance)
     if ceiling > 0:
+        floor = max(floor, _FAINTEST * ceiling)
         ax.set_yscale("log")
         ax.set_ylim(floor / 3, ceiling * 3)
         decades = math.log10(ceiling / floor) + 1
@@ -147,7 +164,8 @@ def history(dataset: xr.Dataset) -> Figure:
     """Force, approach, contact area, mean gap and work over time; cost and accuracy of every kept time below.
 
     What the result does not hold is left out. The time axis is linear or logarithmic as the kept times suit. Steps
-    that did not converge are crossed out. Work is that of the force so far, which is dissipated where a loop closes.
+    that did not converge are crossed out. Work is that of the force so far, in all and by where it went: stored in the
+    springs of the material, or dissipated. Accuracy is the stated error, its parts, and the tolerance as a line.
 
     Parameters
     ----------
@@ -184,8 +202,10 @@ def history(dataset: xr.Dataset) -> Figure:
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(ax.get_xlabel() if lowest else "")
         ax.grid(axis="both", color="0.9", lw=0.5)
-        if ax.get_legend_handles_labels()[1]:
-            ax.legend(loc="lower left", bbox_to_anchor=(0.1, 1.0), ncols=4, borderaxespad=0.15, handlelength=1.6)
+        if count := len(ax.get_legend_handles_labels()[1]):
+            across = 5 if len(axes) > _ONE_COLUMN + 1 or count < 4 else 3
+            told = {"ncols": across, "borderaxespad": 0.15, "handlelength": 1.6, "columnspacing": 1.4}
+            ax.legend(loc="lower left", bbox_to_anchor=(0.08, 1.0), **told)
     letter_panels(axes)
     figure.align_ylabels(axes)
     return figure
