@@ -99,17 +99,6 @@ def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     assert np.mean(true <= TOLERANCE) >= 0.98
 
 
-def test_contact_area__is_within_what_is_stated(matrix):
-    inside = []
-    for found, exact in matrix.values():
-        for time, step in found.items():
-            row = stated(step, 0.0, counted(step))
-            assert row["contact_area_lower"] <= counted(step) <= row["contact_area_upper"]
-            area = counted(exact[time])
-            inside.append(row["contact_area_lower"] - 1e-12 <= area <= row["contact_area_upper"] + 1e-12)
-    assert np.mean(inside) >= 0.98
-
-
 def test_force_error__is_nothing_where_the_load_is_given(matrix):
     for (_, what, _), (found, _) in matrix.items():
         rows = [stated(step, 0.0, counted(step)) for step in found.values() if step.shown.force > 0]
