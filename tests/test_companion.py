@@ -119,7 +119,7 @@ def test_force_error__is_not_nothing_where_a_hold_keeps_what_was_found():
 @pytest.mark.parametrize("what", PROGRAMS)
 def test_every_step_that_is_a_row__keeps_the_tolerance(what, surface):
     scene = SURFACES[surface](MATERIALS["zener"], PROGRAMS[what], tolerance=TOLERANCE)
-    found = {step.shown.time: step for step in march(scene) if keeps_its_word(step)}
+    found = {step.shown.time: step for step in march(scene) if keeps_its_word(step, 0.0)}
     exact = kept(replace(scene, times=tuple(found), tolerance=TOLERANCE / SHARPER))
     later = {time: step for time, step in found.items() if step.shown.force > 0}
     assert len(later) > 5

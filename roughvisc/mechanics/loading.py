@@ -176,9 +176,10 @@ class Program:
     def gives(self, number: int) -> bool:
         """Whether the program states what a segment prescribes; a hold may keep what was found."""
         control = self.segments[number].control
-        while self.segments[number].end is None and number > 0:
-            number -= 1
-        return self.segments[number].control == control
+        for segment in reversed(self.segments[: number + 1]):
+            if segment.control != control or segment.end is not None:
+                return segment.control == control
+        return True
 
     @property
     def duration(self) -> float:

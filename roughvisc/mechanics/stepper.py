@@ -472,7 +472,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             continue
         alone = state.behind == 0 and trial.instant.time < end and not state.unresolved
         if not outgrown:
-            step = _judged(scene, state, segment, trial, error, alone, waiting)
+            step = _judged(scene, state, segment, trial, error, alone)
         if step is None:  # the grid is too small for this step, or for the companion's
             if waiting is not None:
                 yield waiting
@@ -544,9 +544,7 @@ def _shortened(
     )
 
 
-def _judged(
-    scene: Scene, state: State, segment: Segment, trial: Trial, error: float, alone: bool, waiting: Step | None
-) -> Step | None:
+def _judged(scene: Scene, state: State, segment: Segment, trial: Trial, error: float, alone: bool) -> Step | None:
     """The accepted step, with what the companion says of it unless it waits for another; None if that outgrew."""
     time = trial.instant.time
     accepted = _committed(scene, state, trial)
@@ -570,7 +568,7 @@ def _judged(
     if time == scene.program.corners[state.segment + 1]:
         accepted = _entered(scene, accepted)
     step = _step(scene, accepted, trial)
-    asked = scene.keeps(time) or (waiting is not None and scene.keeps(waiting.shown.time))
+    asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
     if companion_trial is None:
         return step
     assert state.companion is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -208,21 +207,22 @@ class Rows:
         return STATUS_MEANINGS.index(meaning)
 
 
-def keeps_its_word(step: Step) -> bool:
+def keeps_its_word(step: Step, series_error: float) -> bool:
     """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
 
     Where hardly any compliance is there at once, pressure jumps in each cell that enters: nothing is promised of it,
     and the short steps that lead over such a jump are no rows.
     """
-    unknown, scene, state = step.uncertainty, step.scene, step.state
+    scene, state = step.scene, step.state
     if scene.time_step is not None:
         return True
-    if scene.is_soft(scene.program.duration):
-        unknown = replace(unknown, pressure=0.0, force=0.0)
-        since = state.now.time - state.began
-        if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
-            return False
-    return not unknown.relative(state) > scene.tolerance
+    found = stated(step, series_error, 0.0)
+    if not scene.is_soft(scene.program.duration):
+        return not found["stated_error"] > scene.tolerance
+    since = state.now.time - state.began
+    if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
+        return False
+    return not found["approach_error"] > scene.tolerance * state.largest_approach
 
 
 def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
@@ -246,7 +246,7 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
     state, unknown, shown = step.state, step.uncertainty, step.shown
     largest_force, largest_approach = state.largest_force, state.largest_approach
     solved = step.residual + series_error
-    if step.scene.remembers:
+    if step.scene.remembers and largest_force > 0:
         solved += _INHERITED * step.scene.tolerance
     force = approach = 0.0
     if step.control == "approach" or not step.given:

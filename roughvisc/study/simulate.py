@@ -211,7 +211,7 @@ def _press(
             scene = step.scene
             reached = reached.after(step, ground.growths, spent + time.perf_counter())
             # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-            if step.shown.time in kept or (every and keeps_its_word(step)):
+            if step.shown.time in kept or (every and keeps_its_word(step, engine.series_error)):
                 rows.add(step, reached.converged, reached.wall_time)
                 reached = reached.kept()
             report(step.shown.time, scene.program.duration)
