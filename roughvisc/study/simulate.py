@@ -69,7 +69,7 @@ def simulate(
         Steps chosen by the tolerance, or of a given length. [s]
     times : int or sequence of float, optional
         Times to keep, stepped onto exactly: a count, evenly from 0+ to the end; a list; or None, all corners of the
-        program and every accepted step whose time steps keep the tolerance. [s]
+        program and every accepted step that keeps the tolerance. [s]
     fields : sequence of str
         Fields to keep, of ``pressure``, ``gap``, ``displacement``.
     method : {"fast", "seed"}
