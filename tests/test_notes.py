@@ -30,7 +30,7 @@ def test_note__is_left_out_where_every_row_keeps_the_tolerance():
 def test_note__names_what_jumps(material, says):
     note = press(material).attrs["accuracy_note"]
     assert says in note
-    assert "Approach and work keep the tolerance" in note
+    assert "The approach keeps the tolerance" in note
 
 
 def test_note__counts_the_rows_that_state_more_than_the_tolerance():

@@ -14,7 +14,7 @@ from roughvisc.variables import FIELDS
 #: What a result says of a material without instantaneous compliance.
 NO_JUMP = (
     "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
-    "comes into contact. Approach and work keep the tolerance; of pressure and force each row states its own error."
+    "comes into contact. The approach keeps the tolerance; of pressure, force and work each row states its own error."
 )
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
 #: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
@@ -62,8 +62,8 @@ def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
     elif at_once < _AT_ONCE * final:
         notes.append(
             f"Only {100 * at_once / final:.2g} % of the compliance is there at once: pressure, and force under a given "
-            "approach, nearly jump in each cell that comes into contact. Approach and work keep the tolerance; of "
-            "pressure and force each row states its own error."
+            "approach, nearly jump in each cell that comes into contact. The approach keeps the tolerance; of "
+            "pressure, force and work each row states its own error."
         )
     errors = dataset["stated_error"].values
     missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
