@@ -26,8 +26,8 @@ _STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
 # Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
 # where a cell has entered within the companion's step.
 _ENTERED = 0.3
-# Steps are shortened where what is stated exceeds the first part of the tolerance, lengthened where it is below the
-# second, if it has grown by more than the factor since; their share of it stays between the last two.
+# Steps are shortened where what is stated exceeds the first part of the tolerance and has grown by more than a factor
+# since it was last told, and lengthened again where it is below the second part. Their share stays between two limits.
 _MOST_USED, _LEAST_USED = 0.7, 0.3
 _GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
 
@@ -64,11 +64,6 @@ def beside(now: Instant, companion: Instant | None = None, together: Instant | N
     displacement = now.unit_displacement + companion.unit_displacement
     displacement -= together.unit_displacement
     return np.maximum(pressure, 0, out=pressure), displacement
-
-
-def scaled(guess: tuple[Array, Array], factor: float) -> tuple[Array, Array]:
-    """Both fields in memory of their own, scaled."""
-    return guess[0] * factor, guess[1] * factor
 
 
 def difference(

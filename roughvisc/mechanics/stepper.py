@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.mechanics import energy
 from roughvisc.mechanics.apart import closing_time
-from roughvisc.mechanics.companion import bare, beside, difference, scaled, sharpened
+from roughvisc.mechanics.companion import bare, beside, difference, sharpened
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.control import (
     error_limit,
@@ -143,7 +143,9 @@ def _attempt(
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
-    start, start_displacement = state.first_guess(length, alpha) if guess is None else scaled(guess, alpha)
+    start, start_displacement = (
+        state.first_guess(length, alpha) if guess is None else (guess[0] * alpha, guess[1] * alpha)
+    )
     contact = solve_contact(
         scene.halfspace,
         gap,
@@ -267,20 +269,19 @@ def _spent(state: State, trial: Trial) -> State:
     )
 
 
-def _step(scene: Scene, state: State, trial: Trial, uncertainty: Uncertainty | None = None) -> Step:
-    """What is yielded of an accepted trial; as uncertain as the state is, unless stated."""
+def _step(scene: Scene, state: State, trial: Trial) -> Step:
+    """What is yielded of an accepted trial; as uncertain as the state is."""
     shown, converged = trial, trial.converged
     pressure, level = state.now.pressure, state.now.approach
     if not trial.apart and trial.length > 0 and scene.keeps(state.now.time) and scene.is_soft(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
-        bare = replace(state, before=None)
-        shown = _attempt(scene, bare, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
+        alone = replace(state, before=None)
+        shown = _attempt(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
         state = _spent(state, shown)
         converged = converged and shown.converged
         pressure, level = shown.instant.pressure, shown.instant.approach
     now = replace(state.now, pressure=pressure)
-    stated = state.uncertainty if uncertainty is None else uncertainty
     return Step(
         shown=now,
         displacement=shown.displacement,
@@ -290,7 +291,7 @@ def _step(scene: Scene, state: State, trial: Trial, uncertainty: Uncertainty | N
         given=scene.program.gives(_number(scene, state)),
         bound=shown.bound,
         residual=shown.residual,
-        uncertainty=stated,
+        uncertainty=state.uncertainty,
         converged=converged,
         scene=scene,
         state=state,
