@@ -6,6 +6,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms, energy
@@ -227,6 +228,19 @@ def test_ramp_of_load__works_as_force_on_approach():
     times = tuple(np.linspace(0, 2, 201).tolist())
     _, force, approach, stored, dissipated = rows(sphere(MATERIALS["zener"], program, times=times, tolerance=1e-4))
     assert stored[-1] + dissipated[-1] == pytest.approx(np.trapezoid(force, approach), rel=2e-3)
+
+
+def test_work_at_every_step__errs_no_more_at_the_first_of_a_pair_than_at_its_second():
+    """A ramp on a punch, from steps which resolve all creep to steps which resolve none."""
+    material = rv.zener(1.0, 0.03, 0.03 * 2.4e-3)
+    scene, radius = punch(material, rv.Program().load(1.0, over=0.02), tolerance=1e-2)
+    time, _, _, stored, dissipated = rows(scene)
+    # W = int F dapproach with F = rate t and approach = rate I(t) / (2 a)
+    parts = [quad(lambda t: t * material.contact_compliance(t), *ends, epsrel=1e-12)[0] for ends in pairwise(time)]
+    work = 50.0**2 / (2 * radius) * np.cumsum(parts)
+    error = np.abs((stored + dissipated)[1:] / work - 1)
+    assert error.max() > 1e-2  # such steps are there
+    assert np.all(error[2:-1] < np.maximum(2e-3, 1.2 * np.maximum(error[1:-2], error[3:])))
 
 
 @pytest.mark.parametrize("kept", [2, 64])

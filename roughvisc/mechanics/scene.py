@@ -187,11 +187,11 @@ class Uncertainty:
     stored_excess: float = 0.0
     dissipated_excess: float = 0.0
 
-    def or_worse(self, other: Uncertainty) -> Uncertainty:
-        """The larger of both, part by part; what is added to the energies in the mean of both."""
+    def or_worse(self, other: Uncertainty, part: float) -> Uncertainty:
+        """The larger of both, part by part; what steps add to the energies lies a part of the way to the other's."""
         worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
-        excess = {name: 0.5 * (getattr(self, name) + getattr(other, name)) for name in _EXCESS}
-        return Uncertainty(**worse | excess)
+        here, there = ({name: getattr(one, name) for name in _EXCESS} for one in (self, other))
+        return Uncertainty(**worse | {name: (1 - part) * here[name] + part * there[name] for name in _EXCESS})
 
     def relative(self, state: State) -> float:
         """The largest of pressure, force and approach over what these have come to so far. [-]"""

@@ -482,7 +482,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             base = state
             continue
         if waiting is not None:
-            yield replace(waiting, uncertainty=waiting.uncertainty.or_worse(step.uncertainty))
+            yield _of_a_pair(waiting, step)
             waiting = None
         fresh = state.before is None and scene.time_step is None
         if alone and (fresh or (scene.remembers and scene.keeps(step.shown.time))):
@@ -579,7 +579,17 @@ def _judged(scene: Scene, state: State, segment: Segment, trial: Trial, error: f
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
         sharpness = sharpened(scene, state, compared.state, ahead)
         return replace(compared, state=replace(compared.state, sharpness=sharpness))
-    return _stating(compared, compared.uncertainty.or_worse(state.uncertainty))  # it took the same step
+    return _stating(compared, compared.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
+
+
+def _of_a_pair(waiting: Step, step: Step) -> Step:
+    """The first step of a pair, with what is stated of it by the second."""
+    companion = waiting.state.companion  # it waits where the pair began
+    if companion is None:
+        return waiting
+    first, second = waiting.shown.time - companion.now.time, step.shown.time - waiting.shown.time
+    part = first**3 / (first**3 + second**3)  # of what both add to the energies, which steps do by their cube
+    return replace(waiting, uncertainty=waiting.uncertainty.or_worse(step.uncertainty, part))
 
 
 def _restarted(scene: Scene, state: State, suggestion: float) -> State:

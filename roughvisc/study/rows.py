@@ -25,6 +25,9 @@ PERIMETER_CORRECTION = 0.088
 #: What the contact solver's errors of the past leave of a pressure, in units of the tolerance: measured on rows whose
 #: other errors are small (workflows/benchmarks/accuracy.py).
 _INHERITED = 0.02
+#: Part of the contact solver's error that is left in an energy, a sum over steps in which it has either sign: measured
+#: there too.
+_SUMMED = 0.5
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -211,7 +214,8 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
 
     Where hardly any compliance is there at once, pressure jumps in each cell that enters: nothing is promised of it,
-    and the short steps that lead over such a jump are no rows.
+    and the short steps that lead over such a jump are no rows; nor, under given approach, are those in which a cell
+    has entered, since the force jumps with it.
     """
     scene, state = step.scene, step.state
     if scene.time_step is not None:
@@ -222,7 +226,15 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     since = state.now.time - state.began
     if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
         return False
+    if step.control == "approach" and _entered(step):
+        return False
     return not found["approach_error"] > scene.tolerance * state.largest_approach
+
+
+def _entered(step: Step) -> bool:
+    """Whether a cell has come into contact within a step."""
+    before = step.state.before
+    return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))
 
 
 def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
@@ -241,26 +253,28 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
     -----
     The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
     under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
-    the approach.
+    the approach. The series' error is one of the largest values so far: what is left after unloading is a
+    difference of such values.
     """
     state, unknown, shown = step.state, step.uncertainty, step.shown
     largest_force, largest_approach = state.largest_force, state.largest_approach
-    solved = step.residual + series_error
+    solved = step.residual
     if step.scene.remembers and largest_force > 0:
         solved += _INHERITED * step.scene.tolerance
     force = approach = 0.0
     if step.control == "approach" or not step.given:
-        force = unknown.force + solved * shown.force
+        force = unknown.force + solved * shown.force + series_error * largest_force
     if step.control == "load" or not step.given:
-        approach = unknown.approach + (0.5 * step.bound**2 + series_error) * abs(shown.approach)
+        approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
     pressure = solved
     if largest_force > 0:
-        pressure = (unknown.pressure + solved * shown.force) / largest_force
+        pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
     relative = max(
         pressure,
         force / largest_force if largest_force > 0 else 0.0,
         approach / largest_approach if largest_approach > 0 else 0.0,
     )
+    carried = _SUMMED * solved + series_error
     return {
         "work": step.work,
         "stored_energy": step.stored,
@@ -272,8 +286,8 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
         "pressure_error": pressure,
         "force_error": force,
         "approach_error": approach,
-        "work_error": unknown.work + solved * abs(step.work),
-        "dissipated_energy_error": unknown.dissipated + solved * abs(step.dissipated),
+        "work_error": unknown.work + carried * abs(step.work),
+        "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
         "contact_area_lower": max(area - unknown.inside, 0.0),
         "contact_area_upper": area + unknown.outside,
     }
