@@ -24,22 +24,22 @@ _PUBLIC = {
         "roughvisc.topography.fitting": "fit_self_affine",
         "roughvisc.topography.writers": "save_scan",
         "roughvisc.topography.synthesis": "sphere cone flat_punch wavy self_affine",
-        "roughvisc.mechanics.materials": (
+        "roughvisc.mechanics.materials.models": (
             "Prony PowerLaw Tabulated elastic maxwell kelvin_voigt zener from_relaxation pair "
             "from_creep_table from_relaxation_table from_dynamic"
         ),
-        "roughvisc.mechanics.loading": "Program",
-        "roughvisc.study.simulate": "simulate",
-        "roughvisc.study.case": "read_study read_cases vary study_schema",
-        "roughvisc.study.store": "open_result",
-        "roughvisc.study.run": "run",
-        "roughvisc.study.sweep": "sweep",
-        "roughvisc.study.results": "open_results",
-        "roughvisc.study.plan": "plan",
-        "roughvisc.study.trade": "trade",
-        "roughvisc.study.validate": "validate",
-        "roughvisc.views.report": "report",
-        "roughvisc.views.handover": "to_csv deformed",
+        "roughvisc.mechanics.stepping.program": "Program",
+        "roughvisc.study.simulation.simulate": "simulate",
+        "roughvisc.study.statement.case": "read_study read_cases vary study_schema",
+        "roughvisc.study.storage.store": "open_result",
+        "roughvisc.study.execution.run": "run",
+        "roughvisc.study.execution.sweep": "sweep",
+        "roughvisc.study.storage.results": "open_results",
+        "roughvisc.study.cost.plan": "plan",
+        "roughvisc.study.trade.trade": "trade",
+        "roughvisc.study.validation.validate": "validate",
+        "roughvisc.views.report.page": "report",
+        "roughvisc.views.export": "to_csv deformed",
         "roughvisc.errors": "RoughviscError InputError EdgeContactError ConvergenceError",
     }.items()
     for name in names.split()

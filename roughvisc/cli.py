@@ -20,7 +20,7 @@ from roughvisc.errors import InputError, RoughviscError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roughvisc.study.case import Case
+    from roughvisc.study.statement.case import Case
 
 
 class _Failure(click.ClickException):
@@ -94,8 +94,8 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
     """
     from rich.console import Console
 
-    from roughvisc.study.case import read_cases
-    from roughvisc.study.run import result_folder
+    from roughvisc.study.execution.run import result_folder
+    from roughvisc.study.statement.case import read_cases
 
     cases = read_cases(study)
     folder = result_folder(cases[0], out)
@@ -116,8 +116,8 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
 @contextmanager
 def _profile(console: Console) -> Iterator[None]:
     """Print where the time of what runs inside went."""
-    from roughvisc.study.profile import profiled
-    from roughvisc.views.console import profile_table
+    from roughvisc.study.execution.profile import profiled
+    from roughvisc.views.console.tables import profile_table
 
     with profiled() as profile:
         yield
@@ -129,9 +129,9 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from dask.system import CPU_COUNT
     from scipy import fft
 
-    from roughvisc.study.run import run_case, unconverged
-    from roughvisc.study.store import open_result
-    from roughvisc.views.console import progress, result_table
+    from roughvisc.study.execution.run import run_case, unconverged
+    from roughvisc.study.storage.store import open_result
+    from roughvisc.views.console.tables import progress, result_table
 
     with progress(console, label) as report, fft.set_workers(CPU_COUNT):
         path = run_case(case, folder, progress=report)
@@ -159,10 +159,10 @@ def _run_all(
     """Compute and sum up a sweep."""
     from contextlib import ExitStack
 
-    from roughvisc.study.cluster import connect
-    from roughvisc.study.sweep import LOG, run_cases
-    from roughvisc.study.watch import watcher
-    from roughvisc.views.console import sweep_table
+    from roughvisc.study.execution.cluster import connect
+    from roughvisc.study.execution.sweep import LOG, run_cases
+    from roughvisc.study.execution.watch import watcher
+    from roughvisc.views.console.tables import sweep_table
 
     with ExitStack() as stack:
         client = None
@@ -207,8 +207,8 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.plan import plan as planned
-    from roughvisc.views.console import plan_tables
+    from roughvisc.study.cost.plan import plan as planned
+    from roughvisc.views.console.tables import plan_tables
 
     costs = planned(study, out, workers=workers)
     Console().print(plan_tables(costs))
@@ -239,13 +239,14 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from rich.console import Console
     from scipy import fft
 
-    from roughvisc.study import recommend, trade_file
-    from roughvisc.study.apply import apply
-    from roughvisc.study.case import read_study
-    from roughvisc.study.trade import trade as measured
-    from roughvisc.study.trade_watch import reporting
+    from roughvisc.study.statement.case import read_study
+    from roughvisc.study.trade import files as trade_file
+    from roughvisc.study.trade import recommend
+    from roughvisc.study.trade.apply import apply
+    from roughvisc.study.trade.trade import trade as measured
+    from roughvisc.study.trade.watch import reporting
+    from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.plot import trade as figure
-    from roughvisc.views.trade_table import trade_table
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
@@ -315,7 +316,7 @@ def scan(
     from roughvisc.topography.parameters import parameters
     from roughvisc.topography.readers import list_channels, open_scan
     from roughvisc.topography.writers import card_text, known_suffix
-    from roughvisc.views.console import scan_table
+    from roughvisc.views.console.tables import scan_table
     from roughvisc.views.plot import surface
 
     options = {
@@ -346,7 +347,7 @@ def scan(
 
 
 def _convert(height: Any, path: Path) -> None:
-    from roughvisc.study.store import whole_file
+    from roughvisc.study.storage.store import whole_file
     from roughvisc.topography.writers import save_scan
 
     with whole_file(path) as temporary:
@@ -354,7 +355,7 @@ def _convert(height: Any, path: Path) -> None:
 
 
 def _write_card(text: str, path: Path) -> None:
-    from roughvisc.study.store import whole_file
+    from roughvisc.study.storage.store import whole_file
 
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -373,7 +374,7 @@ def _sides(text: str | None) -> Any:
 
 
 def _draw(figure: Any, path: Path) -> None:
-    from roughvisc.study.store import whole_file
+    from roughvisc.study.storage.store import whole_file
 
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
@@ -397,10 +398,10 @@ def plot(result: Path, out: Path | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.store import open_result
-    from roughvisc.study.trade_file import is_trade, open_trade
+    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_files import results_of
+    from roughvisc.views.sweep_figures.files import results_of
 
     paths = sorted(p for p in result.glob("*.nc") if not p.name.startswith(".")) if result.is_dir() else [result]
     if not paths:
@@ -434,7 +435,7 @@ def report(results: Path, output: Path | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.views.report import report as write
+    from roughvisc.views.report.page import report as write
 
     _say(Console(), "Report", write(results, output))
 
@@ -453,8 +454,8 @@ def validate(cells: int) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.validate import validate as validated
-    from roughvisc.views.console import print_validation
+    from roughvisc.study.validation.validate import validate as validated
+    from roughvisc.views.console.tables import print_validation
 
     console = Console()
     with console.status("validating") as status:

@@ -6,10 +6,12 @@ The suite runs with the transforms that everybody has; test_transforms.py compar
 import os
 
 import pytest
+from click.testing import CliRunner
 
 os.environ["ROUGHVISC_TRANSFORMS"] = "scipy"
 
-from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.cli import main
+from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
 @pytest.fixture
@@ -24,3 +26,16 @@ def solved_on(monkeypatch):
 
     monkeypatch.setattr(HalfSpace, "__init__", noted)
     return shapes
+
+
+@pytest.fixture
+def invoke(tmp_path, monkeypatch):
+    """Runs a command in an empty folder; gives its status and what it wrote to either stream."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        done = CliRunner().invoke(main, [str(a) for a in arguments])
+        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+        return done.exit_code, done.stdout, done.stderr
+
+    return run

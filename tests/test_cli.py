@@ -5,26 +5,12 @@ import sys
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from test_run import BALL
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.study import run as run_module
-from roughvisc.study.store import write_result
-
-
-@pytest.fixture
-def invoke(tmp_path, monkeypatch):
-    """Runs a command in an empty folder; gives its status and what it wrote to either stream."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        done = CliRunner().invoke(main, [str(a) for a in arguments])
-        assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-        return done.exit_code, done.stdout, done.stderr
-
-    return run
+from roughvisc.study.execution import run as run_module
+from roughvisc.study.storage.store import write_result
 
 
 def write_study(text=BALL, *replacements):

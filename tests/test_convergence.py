@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.engine import engine_for
-from roughvisc.mechanics.halfspace import HalfSpace
-from roughvisc.mechanics.scene import Scene
-from roughvisc.mechanics.stepper import march
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.choice import engine_for
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.scene import Scene
 
 DURATION = 2.0
 COMMON = np.array([0.5, 1.0, 1.5, 2.0])

@@ -9,7 +9,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.mechanics import halfspace
+from roughvisc.mechanics.halfspace import operator as halfspace
 
 long = pytest.mark.long
 ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1
@@ -411,7 +411,7 @@ def counted(height, material, program, **settings):
 
 
 def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
-    from roughvisc.mechanics.memory import Modes
+    from roughvisc.mechanics.hereditary.memory import Modes
 
     kept = []
     sound = Modes.advance

@@ -1,25 +1,80 @@
-"""The floors of the package and the directions in which they may import each other."""
+"""The rooms of the package and the directions in which they may import each other."""
 
 import ast
 import pathlib
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
 PACKAGE = ROOT / "roughvisc"
 
-#: floor -> floors it may import from (its own is implied)
+#: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
+_LABELS = {"errors", "variables", "units"}
+_STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
+_STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
+_SIMULATION = {*_STORAGE, "study.storage", "mechanics.contact"}
+_EXECUTION = {*_SIMULATION, "study.simulation"}
+_COST = {*_EXECUTION, "study.execution"}
+_TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "variables": set(),
     "units": {"errors"},
-    "mechanics": {"errors"},
-    "topography": {"errors", "variables", "units"},
-    "study": {"errors", "variables", "units", "mechanics", "topography"},
-    "views": {"errors", "variables", "study"},
-    "cli": {"errors", "variables", "units", "mechanics", "topography", "study", "views", "__init__"},
+    "mechanics.materials": {"errors"},
+    "mechanics.halfspace": {"errors"},
+    "mechanics.contact": {"errors", "mechanics.halfspace"},
+    "mechanics.hereditary": {"errors", "mechanics.materials"},
+    "mechanics.stepping": {
+        "errors",
+        "mechanics.contact",
+        "mechanics.halfspace",
+        "mechanics.hereditary",
+        "mechanics.materials",
+    },
+    "mechanics.closed_forms": {"errors", "mechanics.materials", "mechanics.stepping"},
+    "topography": _LABELS,
+    "study.statement": _STATEMENT,
+    "study.storage": _STORAGE,
+    "study.simulation": _SIMULATION,
+    "study.execution": _EXECUTION,
+    "study.cost": _COST,
+    "study.trade": _TRADE,
+    "study.validation": {*_SIMULATION, "study.simulation", "mechanics.closed_forms"},
+    "views.observables": {*_LABELS, "study.statement", "topography"},
+    "views.figures": {*_LABELS, "study.statement", "study.trade", "topography", "views.observables"},
+    "views.sweep_figures": {*_LABELS, "study.statement", "study.storage", "views.observables", "views.figures"},
+    "views.plot": {*_LABELS, "views.figures", "views.sweep_figures"},
+    "views.export": {*_LABELS, "study.storage", "views.figures"},
+    "views.report": {
+        *_LABELS,
+        "study.statement",
+        "study.storage",
+        "topography",
+        "views.observables",
+        "views.figures",
+        "views.sweep_figures",
+        "views.plot",
+    },
+    "views.console": {*_LABELS, "study.execution", "study.trade", "study.validation", "views.figures"},
+    "cli": {
+        *_LABELS,
+        "topography",
+        "study.statement",
+        "study.storage",
+        "study.execution",
+        "study.cost",
+        "study.trade",
+        "study.validation",
+        "views.plot",
+        "views.console",
+        "views.report",
+        "views.sweep_figures",
+        "views.export",
+        "__init__",
+    },
     "__main__": {"cli"},
 }
 #: libraries that a floor may not import at all
@@ -29,10 +84,19 @@ FORBIDDEN = {
     "topography": {"dask", "distributed", "matplotlib"},
     "study": {"matplotlib"},
 }
+#: folders whose entries are sub-packages, and how many entries they may have
+MOST_ENTRIES = {"mechanics": 9, "study": 9, "views": 9}
 
 
-def floor(path):
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+def room(module):
+    """Room of a dotted module name below the package."""
+    parts = module.split(".")
+    return ".".join(parts[:2]) if parts[0] in MOST_ENTRIES else parts[0]
+
+
+def there_is(module):
+    path = PACKAGE.joinpath(*module.split("."))
+    return path.is_dir() or path.with_suffix(".py").exists()
 
 
 def imports(path):
@@ -47,18 +111,45 @@ def imports(path):
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
-FILES = sorted(p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem != "__init__")
+FILES = sorted(p for p in PACKAGE.rglob("*.py") if p != PACKAGE / "__init__.py")
+
+
+def module_of(path):
+    """Dotted name below the package."""
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+
+
+def modules(path):
+    """Modules of the package that a file imports, dotted names below the package."""
+    for name in imports(path):
+        head, _, rest = name.partition(".")
+        if head != "roughvisc" or not rest:
+            continue
+        while rest and not there_is(rest):
+            rest = rest.rpartition(".")[0]
+        yield rest or "__init__"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports__point_downward(path):
-    here = floor(path)
+    here = room(module_of(path))
     for name in imports(path):
-        parts = name.split(".")
-        assert parts[0] not in FORBIDDEN.get(here, set()), f"{here} imports {name}"
-        if parts[0] == "roughvisc" and parts[1:]:
-            there = parts[1] if (PACKAGE / parts[1]).exists() or (PACKAGE / f"{parts[1]}.py").exists() else "__init__"
-            assert there == here or there in ALLOWED[here], f"{here} imports {name}"
+        assert name.split(".")[0] not in FORBIDDEN.get(here.split(".")[0], set()), f"{here} imports {name}"
+    if here in MOST_ENTRIES:
+        return  # the folder's own first line
+    for module in modules(path):
+        assert room(module) == here or room(module) in ALLOWED[here], f"{here} imports {module}"
+
+
+def test_rooms__form_no_circle():
+    order = TopologicalSorter(ALLOWED)
+    assert set(ALLOWED) <= set(order.static_order())
+
+
+@pytest.mark.parametrize("folder", MOST_ENTRIES)
+def test_folders__hold_no_more_than_one_sees_at_a_glance(folder):
+    entries = [p for p in (PACKAGE / folder).iterdir() if p.name != "__pycache__"]
+    assert len(entries) <= MOST_ENTRIES[folder]
 
 
 def test_top_level__is_what_the_user_prescribed():

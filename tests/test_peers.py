@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from test_contact import rough_gap
+from support import rough_gap
 
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 tamaas = pytest.importorskip("tamaas")
 

@@ -6,8 +6,8 @@ import pathlib
 import numpy as np
 import pytest
 
-from roughvisc.study.case import read_cases, vary
-from roughvisc.study.run import run
+from roughvisc.study.execution.run import run
+from roughvisc.study.statement.case import read_cases, vary
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
 #: But the map of extremes, whose script holds each case against its closed form.

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 import roughvisc as rv
-from roughvisc.mechanics.growing_contact import ContactRelaxation
+from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation
 
 STUDY = Path(__file__).with_suffix(".toml")
 FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "stability_map.png"

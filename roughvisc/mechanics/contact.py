@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.halfspace import HalfSpace
+from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

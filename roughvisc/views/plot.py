@@ -12,20 +12,20 @@ from pathlib import Path
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.views.animate import animate
-from roughvisc.views.area_load import area_against_load
-from roughvisc.views.axes import fullest_frame, require
-from roughvisc.views.case_histories import histories_of_cases
-from roughvisc.views.distributions import contact_clusters, distributions
-from roughvisc.views.fields import maps
-from roughvisc.views.histories import history
-from roughvisc.views.loops import hysteresis
-from roughvisc.views.sections import section
-from roughvisc.views.stability import stability_map
-from roughvisc.views.surfaces import surface
-from roughvisc.views.sweep_files import save_sweep_figures
-from roughvisc.views.sweeps import sweep
-from roughvisc.views.trade import trade
+from roughvisc.views.figures.animate import animate
+from roughvisc.views.figures.area_load import area_against_load
+from roughvisc.views.figures.axes import fullest_frame, require
+from roughvisc.views.figures.distributions import contact_clusters, distributions
+from roughvisc.views.figures.fields import maps
+from roughvisc.views.figures.histories import history
+from roughvisc.views.figures.loops import hysteresis
+from roughvisc.views.figures.sections import section
+from roughvisc.views.figures.stability import stability_map
+from roughvisc.views.figures.surfaces import surface
+from roughvisc.views.figures.trade import trade
+from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+from roughvisc.views.sweep_figures.files import save_sweep_figures
+from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
     "animate",

@@ -6,8 +6,8 @@ import numpy as np
 from scenes import RADIUS, seconds, with_symmetry_and_without, without_window
 
 import roughvisc as rv
-from roughvisc.mechanics.halfspace import HalfSpace
-from roughvisc.study.profile import profiled
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.study.execution.profile import profiled
 
 
 def run(name, surface, material, program, **settings):

@@ -8,8 +8,8 @@ import numpy as np
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace import HalfSpace
-from roughvisc.study import scene
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.study.simulation import scene
 
 RADIUS = 1.0
 

@@ -15,10 +15,12 @@ from pathlib import Path
 import psutil
 from dask.system import CPU_COUNT
 
-from roughvisc.study import records, rows, run
-from roughvisc.study.case import Case, vary
-from roughvisc.study.sweep import run_cases
-from roughvisc.study.watch import Silence
+from roughvisc.study.execution import run
+from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.execution.watch import Silence
+from roughvisc.study.simulation import rows
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.storage import records
 
 STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": [1e-3, 1e-3], "shape": [64, 64],
 "hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 5e-5, "seed": 1},

@@ -1,0 +1,74 @@
+"""Analytic solutions of frictionless normal contact, as importable code: what the numerical solver is held against.
+
+Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``; viscoelastic ones take a
+material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
+"""
+
+from roughvisc.mechanics.closed_forms.elastic import (
+    AxisymmetricContact,
+    FlatPunchContact,
+    WavyContact,
+    flat_punch,
+    full_contact_pressure,
+    hertz,
+    johnson_greenwood_higginson,
+    sneddon_cone,
+    westergaard,
+)
+from roughvisc.mechanics.closed_forms.fixed_contact import (
+    full_contact_wave,
+    punch_approach,
+    punch_dissipation,
+    punch_force,
+    westergaard_half_width,
+)
+from roughvisc.mechanics.closed_forms.growing_contact import (
+    ContactRelaxation,
+    GrowingContact,
+    KelvinVoigtStep,
+    PowerLawRamp,
+    StepLoad,
+    hereditary_integral,
+    kelvin_voigt_step,
+    lee_radok,
+    lee_radok_step,
+    power_law_ramp,
+)
+from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
+from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
+from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
+
+__all__ = [
+    "AxisymmetricContact",
+    "Cone",
+    "ContactHistory",
+    "ContactRelaxation",
+    "FlatPunchContact",
+    "GrowingContact",
+    "Indenter",
+    "KelvinVoigtStep",
+    "Paraboloid",
+    "PowerLawRamp",
+    "SingleMaximum",
+    "StepLoad",
+    "WavyContact",
+    "flat_punch",
+    "full_contact_pressure",
+    "full_contact_wave",
+    "hereditary_integral",
+    "hertz",
+    "johnson_greenwood_higginson",
+    "kelvin_voigt_step",
+    "lee_radok",
+    "lee_radok_step",
+    "power_law_ramp",
+    "punch_approach",
+    "punch_dissipation",
+    "punch_force",
+    "punch_pressure",
+    "reduced_contact",
+    "sneddon_cone",
+    "ting",
+    "westergaard",
+    "westergaard_half_width",
+]

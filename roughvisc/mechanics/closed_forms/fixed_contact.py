@@ -1,0 +1,157 @@
+"""Viscoelastic contact on an area that does not change: a flat punch, and full contact of a wave."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, hereditary_integral
+from roughvisc.mechanics.materials.models import Material, Prony
+from roughvisc.mechanics.stepping.program import Program
+
+Array = NDArray[np.float64]
+
+
+def _control(program: Program, control: str) -> None:
+    if any(segment.control != control for segment in program.segments):
+        raise InputError(f"expected a program of {control}")
+
+
+def punch_approach(radius: float, material: Material, program: Program, t: ArrayLike) -> Array:
+    r"""Approach of a flat round punch under a history of load, which never falls to zero once it acts.
+
+    Parameters
+    ----------
+    radius : float
+        Radius ``a`` of the punch. [m]
+    material : Material
+        The half-space.
+    program : Program
+        Ramps, holds and jumps of load.
+    t : array_like
+        Times. [s]
+
+    Returns
+    -------
+    ndarray
+        Approach. [m]
+
+    Notes
+    -----
+    The pressure has no memory, :func:`punch_pressure`; the approach is
+
+    .. math:: \delta(t) = \frac{1}{2 a} \int_0^t C(t - s) \, dW(s)
+    """
+    _control(program, "load")
+    return hereditary_integral(material.contact_compliance, material.contact_integral, program, t) / (2 * radius)
+
+
+def punch_force(radius: float, material: Prony, program: Program, t: ArrayLike) -> Array:
+    r"""Force on a flat round punch under a history of approach, as long as it stays in contact.
+
+    Parameters
+    ----------
+    radius : float
+        Radius ``a`` of the punch. [m]
+    material : Prony
+        Exponential series with an instantaneous compliance.
+    program : Program
+        Ramps, holds and jumps of approach.
+    t : array_like
+        Times. [s]
+
+    Returns
+    -------
+    ndarray
+        Force; a negative one would need adhesion. [N]
+
+    Notes
+    -----
+    .. math:: W(t) = 2 a \int_0^t E(t - s) \, d\delta(s)
+    """
+    _control(program, "approach")
+    relaxation = ContactRelaxation.of(material)
+    return 2 * radius * hereditary_integral(relaxation, relaxation.integral, program, t)
+
+
+def punch_dissipation(radius: float, material: Prony, amplitude: float, period: float) -> float:
+    r"""Energy lost in a settled cycle of a flat round punch that stays in contact.
+
+    Parameters
+    ----------
+    radius : float
+        Radius ``a`` of the punch. [m]
+    material : Prony
+        Exponential series with an instantaneous compliance.
+    amplitude : float
+        Amplitude ``d`` of the approach, a sine about any mean. [m]
+    period : float
+        Period. [s]
+
+    Returns
+    -------
+    float
+        ``2 pi a E'' d^2``. [J]
+    """
+    return 2 * np.pi * radius * ContactRelaxation.of(material).loss(2 * np.pi / period) * amplitude**2
+
+
+def full_contact_wave(amplitude: float, wavenumber: float, material: Prony, t: ArrayLike) -> Array:
+    r"""Amplitude of the pressure that holds a wave of the surface flat, after full contact was made at once.
+
+    Parameters
+    ----------
+    amplitude : float
+        Of the profile, a cosine. [m]
+    wavenumber : float
+        Length of the wave vector, ``2 pi / wavelength``. [rad/m]
+    material : Prony
+        Exponential series with an instantaneous compliance.
+    t : array_like
+        Times since then. [s]
+
+    Returns
+    -------
+    ndarray
+        Amplitude of the pressure about its mean, in phase with the profile. [Pa]
+
+    Notes
+    -----
+    .. math:: p_q(t) = \tfrac{1}{2} E(t) |q| h_q
+
+    Contact stays full as long as the sum of the waves and the mean pressure is nowhere negative.
+    """
+    return ContactRelaxation.of(material)(t) * wavenumber * amplitude / 2
+
+
+def westergaard_half_width(
+    amplitude: float, wavelength: float, material: Material, program: Program, t: ArrayLike
+) -> Array:
+    r"""Half-width of the contacts of ``amplitude cos(2 pi x / wavelength)`` under a mean pressure that never falls.
+
+    Parameters
+    ----------
+    amplitude, wavelength : float
+        Of the profile. [m]
+    material : Material
+        The half-space.
+    program : Program
+        Rising ramps, holds and jumps of "load", here the mean pressure. [Pa]
+    t : array_like
+        Times. [s]
+
+    Returns
+    -------
+    ndarray
+        Half-width of a contact strip; half the wavelength in full contact. [m]
+
+    Notes
+    -----
+    As for other growing contacts, the elastic form holds with ``int C dp`` for mean pressure over modulus:
+
+    .. math:: \sin^2 \frac{\pi b}{l} = \frac{l}{\pi a} \int_0^t C(t - s) \, d\bar p(s)
+    """
+    _control(program, "load")
+    scaled = hereditary_integral(material.contact_compliance, material.contact_integral, program, t)
+    return np.asarray(wavelength / np.pi * np.arcsin(np.sqrt(np.minimum(scaled * wavelength / (np.pi * amplitude), 1))))

@@ -1,0 +1,398 @@
+"""Contact that only grows, on a linear viscoelastic half-space: Lee and Radok's solution under various loads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, punch_pressure
+from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
+from roughvisc.mechanics.materials.models import Material, Prony
+from roughvisc.mechanics.stepping.program import Program
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactRelaxation:
+    """Relaxation of the contact modulus, ``E(t) = E_e + sum E_k exp(-t / theta_k)``, of an exponential series.
+
+    Parameters
+    ----------
+    equilibrium : float
+        ``E_e``. [Pa]
+    moduli, times : ndarray
+        ``E_k`` [Pa] and ``theta_k`` [s].
+    """
+
+    equilibrium: float
+    moduli: Array
+    times: Array
+
+    @classmethod
+    def of(cls, material: Prony) -> ContactRelaxation:
+        """Of a material; ``E(t) = 2 G(t) / (1 - nu)``. An instantaneous compliance is required."""
+        equilibrium, moduli, times = material.relaxation_spectrum()
+        factor = 2 / (1 - material.poisson)
+        return cls(factor * equilibrium, factor * moduli, times)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """``E(t)``. [Pa]"""
+        t = np.asarray(t, dtype=float)
+        total = np.full(t.shape, self.equilibrium)
+        for modulus, time in zip(self.moduli, self.times, strict=True):
+            total = total + modulus * np.exp(-t / time)
+        return total
+
+    def integral(self, t: ArrayLike) -> Array:
+        """``int_0^t E``. [Pa s]"""
+        t = np.asarray(t, dtype=float)
+        total = self.equilibrium * t
+        for modulus, time in zip(self.moduli, self.times, strict=True):
+            total = total - modulus * time * np.expm1(-t / time)
+        return np.asarray(total)
+
+    def loss(self, frequency: float) -> float:
+        """Loss modulus ``E''`` at an angular frequency. [Pa]"""
+        x = frequency * self.times
+        return float(np.sum(self.moduli * x / (1 + x**2)))
+
+    def rate(self, t: ArrayLike) -> Array:
+        """``-dE/dt``, never negative. [Pa/s]"""
+        t = np.asarray(t, dtype=float)
+        total = np.zeros(t.shape)
+        for modulus, time in zip(self.moduli, self.times, strict=True):
+            total = total + modulus / time * np.exp(-t / time)
+        return total
+
+
+@dataclass(frozen=True)
+class StepLoad:
+    """Contact under a load that is applied at time zero and kept.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        The rigid indenter.
+    material : Material
+        The half-space.
+    force : float
+        The load. [N]
+    """
+
+    indenter: Indenter
+    material: Material
+    force: float
+
+    def radius(self, t: ArrayLike) -> Array:
+        """Contact radius at ``t >= 0``. [m]"""
+        return self.indenter.radius_at_scaled_force(self.force * self.material.contact_compliance(t))
+
+    def approach(self, t: ArrayLike) -> Array:
+        """Approach at ``t >= 0``. [m]"""
+        return self.indenter.reduced(self.radius(t))
+
+    def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
+        """Pressure at ``r`` [m] and ``t >= 0``, which are broadcast. [Pa]
+
+        The material must be an exponential series with an instantaneous compliance.
+        """
+        if not isinstance(self.material, Prony):
+            raise InputError("pressure under a step load is implemented for exponential series only")
+        relaxation = ContactRelaxation.of(self.material)
+        r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
+        entry = bisect(lambda s: self.radius(s) - r, np.zeros(r.shape), t)
+        entry = np.where(r <= self.radius(0.0), 0.0, entry)
+
+        # by parts, so that nothing cancels: E(0) s(t) + int E'(t - t') s(t') dt' would lose E(0)/E(t)
+        def growth(since_entry: Array, until_now: Array, entry: Array, r: Array, now: Array) -> Array:
+            final = self.indenter.scaled_pressure(r, self.radius(now))
+            then = self.indenter.scaled_pressure(r, self.radius(entry + since_entry))
+            with np.errstate(invalid="ignore"):
+                return relaxation.rate(until_now) * (final - then)
+
+        memory = integrate(growth, entry, t, entry, r, t)
+        final = self.indenter.scaled_pressure(r, self.radius(t))
+        return np.where(r < self.radius(t), relaxation(t - entry) * final + memory, 0.0)
+
+
+def lee_radok_step(sphere_radius: float, material: Material, force: float) -> StepLoad:
+    r"""A sphere on a viscoelastic half-space under a load applied at once and kept (Lee and Radok).
+
+    Parameters
+    ----------
+    sphere_radius : float
+        Radius of curvature ``R``. [m]
+    material : Material
+        The half-space; the pressure needs an exponential series with an instantaneous compliance.
+    force : float
+        The load ``W``. [N]
+
+    Returns
+    -------
+    StepLoad
+        ``radius(t)``, ``approach(t)``, ``pressure(r, t)``.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+
+    Notes
+    -----
+    .. math:: a(t)^3 = \tfrac{3}{4} R W C(t), \quad \delta = \frac{a^2}{R}, \quad
+              p = \frac{2}{\pi R} \left[ E(0) s(t) + \int_0^t E'(t - t') s(t') dt' \right], \quad
+              s = \operatorname{Re} \sqrt{a^2 - r^2}
+
+    with ``E(t)`` the relaxation of the contact modulus.
+
+    References
+    ----------
+    .. [1] E. H. Lee, J. R. M. Radok, "The contact problem for viscoelastic bodies", *J. Appl. Mech.* 27 (1960)
+       438-444.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.materials.models import maxwell
+    >>> press = lee_radok_step(1.0, maxwell(shear_modulus=0.1875, viscosity=0.1875), force=1.0)
+    >>> float(press.radius(0.0)), float(press.radius(7.0))
+    (1.0, 2.0)
+    """
+    if not (np.isfinite(force) and force > 0):
+        raise InputError(f"force is {force!r}: expected a positive number [N]")
+    return StepLoad(Paraboloid(sphere_radius), material, force)
+
+
+@dataclass(frozen=True)
+class KelvinVoigtStep(StepLoad):
+    """A load applied at once and kept on a Kelvin-Voigt solid, which does not yield at once."""
+
+    def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
+        """Pressure at ``r`` [m] and ``t > 0``; infinite at the edge. [Pa]"""
+        assert isinstance(self.material, Prony)
+        decay = np.exp(-np.asarray(t, dtype=float) / self.material.times[0])
+        modulus = 2 / ((1 - self.material.poisson) * self.material.compliances[0])
+        radius = self.radius(t)
+        viscous = punch_pressure(r, radius, self.force * decay)
+        return viscous + modulus * self.indenter.scaled_pressure(r, radius)
+
+
+def kelvin_voigt_step(sphere_radius: float, material: Prony, force: float) -> KelvinVoigtStep:
+    r"""A sphere on a Kelvin-Voigt half-space under a load applied at once and kept.
+
+    Parameters
+    ----------
+    sphere_radius : float
+        Radius of curvature ``R``. [m]
+    material : Prony
+        One retarded compliance and nothing else; see :func:`roughvisc.mechanics.materials.models.kelvin_voigt`.
+    force : float
+        The load ``W``. [N]
+
+    Returns
+    -------
+    KelvinVoigtStep
+        ``radius(t)``, ``approach(t)``, ``pressure(r, t)``.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite, or the material is another one.
+
+    Notes
+    -----
+    With ``C(t) = (1 - exp(-t/tau)) / E*`` the dashpot carries ``W exp(-t/tau)`` as a flat punch does:
+
+    .. math:: a^3 = \tfrac{3}{4} R W C(t), \quad
+              p = \frac{W e^{-t/\tau}}{2 \pi a \sqrt{a^2 - r^2}} + \frac{2 E^*}{\pi R} \sqrt{a^2 - r^2}
+    """
+    if not isinstance(material, Prony) or material.glassy or material.fluidity or len(material.compliances) != 1:
+        raise InputError("material is not a Kelvin-Voigt solid: expected one retarded compliance and nothing else")
+    if not (np.isfinite(force) and force > 0):
+        raise InputError(f"force is {force!r}: expected a positive number [N]")
+    return KelvinVoigtStep(Paraboloid(sphere_radius), material, force)
+
+
+def hereditary_integral(
+    kernel: Callable[[Array], Array], antiderivative: Callable[[Array], Array], program: Program, t: ArrayLike
+) -> Array:
+    """``int_0^t kernel(t - s) dv(s)`` over the values ``v`` of a program of ramps, holds and jumps of one control.
+
+    Parameters
+    ----------
+    kernel, antiderivative : callable
+        A function of time and its integral from zero, such as ``contact_compliance`` and ``contact_integral``.
+    program : Program
+        All of load or all of approach; no cycles.
+    t : array_like
+        Times; at a jump, the state after it. [s]
+
+    Returns
+    -------
+    ndarray
+        The integral: exact, a sum over the corners.
+    """
+    if len({segment.control for segment in program.segments}) > 1 or any(s.amplitude for s in program.segments):
+        raise InputError("expected a program of ramps, holds and jumps of one control")
+    t = np.asarray(t, dtype=float)
+    total = np.zeros(t.shape)
+    value = 0.0
+    for segment, start in zip(program.segments, program.corners, strict=False):
+        end = value if segment.end is None else segment.end
+        since = np.maximum(t - start, 0.0)
+        if segment.duration == 0:
+            total = total + np.where(t >= start, (end - value) * kernel(since), 0.0)
+        else:
+            over = np.maximum(since - segment.duration, 0.0)
+            total = total + (end - value) / segment.duration * (antiderivative(since) - antiderivative(over))
+        value = end
+    return total
+
+
+@dataclass(frozen=True)
+class GrowingContact:
+    """Contact under a load that never falls; see :func:`lee_radok`.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        The rigid indenter.
+    material : Material
+        The half-space.
+    program : Program
+        The load.
+    """
+
+    indenter: Indenter
+    material: Material
+    program: Program
+
+    def radius(self, t: ArrayLike) -> Array:
+        """Contact radius. [m]"""
+        compliance, integral = self.material.contact_compliance, self.material.contact_integral
+        return self.indenter.radius_at_scaled_force(hereditary_integral(compliance, integral, self.program, t))
+
+    def approach(self, t: ArrayLike) -> Array:
+        """Approach. [m]"""
+        return self.indenter.reduced(self.radius(t))
+
+
+def lee_radok(indenter: Indenter, material: Material, program: Program) -> GrowingContact:
+    """An axisymmetric indenter under a load that never falls, on any material.
+
+    Parameters
+    ----------
+    indenter : Indenter
+        A sphere (:class:`Paraboloid`) or a :class:`Cone`.
+    material : Material
+        Anything with ``contact_compliance(t)`` and ``contact_integral(t)``.
+    program : Program
+        Rising ramps, holds and jumps of load.
+
+    Returns
+    -------
+    GrowingContact
+        ``radius(t)`` and ``approach(t)``.
+
+    Raises
+    ------
+    InputError
+        If the load falls or the program prescribes something else.
+
+    Notes
+    -----
+    The radius is that of an elastic contact of unit modulus under the force ``int C dW``. For the pressure see
+    :func:`ting`, which includes this case.
+    """
+    value = 0.0
+    for segment in program.segments:
+        if segment.control != "load" or segment.amplitude or (segment.end is not None and segment.end < value):
+            raise InputError("a growing contact needs a program of load that never falls")
+        value = value if segment.end is None else segment.end
+    return GrowingContact(indenter, material, program)
+
+
+@dataclass(frozen=True)
+class PowerLawRamp:
+    """A sphere pressed at a constant loading rate on a power-law material; see :func:`power_law_ramp`."""
+
+    indenter: Paraboloid
+    loading_rate: float
+    coefficient: float
+    exponent: float
+
+    def radius(self, t: ArrayLike) -> Array:
+        """Contact radius. [m]"""
+        t = np.asarray(t, dtype=float)
+        scaled = self.loading_rate * self.coefficient * t ** (1 + self.exponent) / (1 + self.exponent)
+        return self.indenter.radius_at_scaled_force(scaled)
+
+    def approach(self, t: ArrayLike) -> Array:
+        """Approach. [m]"""
+        return self.indenter.reduced(self.radius(t))
+
+    def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
+        """Pressure at ``r`` [m] and ``t > 0`` [s], which are broadcast. [Pa]"""
+        r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
+        power = (1 + self.exponent) / 3  # a ~ t^power
+        radius = self.radius(t)
+        share = np.minimum(r / radius, 1.0) ** (1 / power)  # of the time, when the edge passes r
+        late = 1 - self.exponent
+
+        def rate(since: Array, share: Array) -> Array:
+            """``d sqrt(a^2 - r^2) / d(time)`` at a time ``share + since``, in units of now."""
+            start = np.where(share > 0, share, 1.0)
+            with np.errstate(over="ignore"):
+                ratio = start ** (2 * power) * np.expm1(2 * power * np.log1p(since / start))
+            squared = np.where(share > 0, ratio, since ** (2 * power))
+            return power * (share + since) ** (2 * power - 1) / np.sqrt(squared)
+
+        # both halves in a power of the distance to their end that leaves nothing singular there
+        half = (1 - share) / 2
+
+        def first(z: Array, _: Array, share: Array) -> Array:
+            return rate(z**6, share) * (1 - share - z**6) ** (-self.exponent) * 6 * z**5
+
+        def second(q: Array, _: Array, share: Array) -> Array:
+            return rate(1 - share - q ** (1 / late), share) / late
+
+        total = integrate(first, 0.0, half ** (1 / 6), share) + integrate(second, 0.0, half**late, share)
+        modulus = np.sinc(self.exponent) / self.coefficient * t ** (-self.exponent)
+        return np.where(r < radius, 2 / (np.pi * self.indenter.radius) * modulus * radius * total, 0.0)
+
+
+def power_law_ramp(sphere_radius: float, loading_rate: float, coefficient: float, exponent: float) -> PowerLawRamp:
+    r"""A sphere pressed at a constant loading rate on a material of contact compliance ``C = c t^alpha``.
+
+    Parameters
+    ----------
+    sphere_radius : float
+        Radius of curvature ``R``. [m]
+    loading_rate : float
+        ``dW/dt``. [N/s]
+    coefficient, exponent : float
+        ``c`` [1/(Pa s^alpha)] and ``0 < alpha < 1`` of the contact compliance.
+
+    Returns
+    -------
+    PowerLawRamp
+        ``radius(t)``, ``approach(t)``, ``pressure(r, t)``.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive, or the exponent not below one.
+
+    Notes
+    -----
+    .. math:: a^3 = \frac{3 R \dot W c}{4 (1 + \alpha)} t^{1 + \alpha}, \qquad
+              p = \frac{2}{\pi R} \int_{t_r}^t E(t - s) \frac{d}{ds} \sqrt{a(s)^2 - r^2} \, ds, \qquad
+              E(t) = \frac{\sin \pi\alpha}{\pi \alpha c} t^{-\alpha}
+    """
+    if not (loading_rate > 0 and coefficient > 0 and 0 < exponent < 1):
+        raise InputError("loading_rate and coefficient must be positive and exponent between 0 and 1")
+    return PowerLawRamp(Paraboloid(sphere_radius), loading_rate, coefficient, exponent)

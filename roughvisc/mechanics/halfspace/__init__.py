@@ -1,0 +1,1 @@
+"""From pressure to displacement of an elastic body, by fast Fourier transforms."""

@@ -1,0 +1,202 @@
+"""Half-space of unit contact compliance: pressure to surface displacement, and back approximately.
+
+A :class:`HalfSpace` knows a grid and its boundary. It knows neither material, time nor contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.kernel import free_space_symbol, periodic_symbol
+from roughvisc.mechanics.halfspace.transforms import transforms
+
+Array = NDArray[np.float64]
+Boundary = Literal["free", "periodic"]
+
+# Points of the columns transformed together, but at least so many columns, and rows: they stay in the cache (measured
+# at 64 to 1024 squared).
+_POINTS, _COLUMNS, _ROWS = 1 << 13, 32, 128
+# Cells from which several threads are faster than one (measured: slower at 512 squared, faster at 1024 squared).
+_THREADED = 1024**2
+
+
+class HalfSpace:
+    """Surface of an elastic half-space of unit contact compliance, sampled by equal rectangular cells.
+
+    Not for two threads at once: the transforms share their working memory from one call to the next.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+    boundary : {"free", "periodic"}
+        Free space (nothing outside the grid is loaded) or one period of an endless surface.
+    workers : int, optional
+        Threads of the transforms on large grids; None: as ``scipy.fft.set_workers`` has it, one where nobody has
+        set it. Smaller grids are slower with several, and get one.
+    mirrored : bool
+        Whether the cells are a quarter of the surface: beyond the first row and the first column their mirror images
+        carry the same pressure. All of it is displaced by all of them.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        spacing: tuple[float, float],
+        boundary: Boundary = "free",
+        workers: int | None = None,
+        *,
+        mirrored: bool = False,
+    ) -> None:
+        if boundary not in ("free", "periodic"):
+            raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
+        self.shape = shape
+        self.spacing = spacing
+        self.boundary = boundary
+        self.mirrored = mirrored
+        self.workers = workers if shape[0] * shape[1] >= _THREADED else 1
+        self._transforms = transforms(mirrored)
+        #: Number of cells of the surface, mirror images included.
+        self.surface_shape = (self._transforms.images * shape[0], self._transforms.images * shape[1])
+        if boundary == "free":
+            padded = [2 * fft.next_fast_len(n, real=True) for n in self.surface_shape]
+            symbol = free_space_symbol((padded[0], padded[1]), spacing)
+            self._points = (padded[0] // self._transforms.images, padded[1] // self._transforms.images)
+        else:
+            symbol = periodic_symbol(self.surface_shape, spacing)
+            self._points = shape
+        self._symbol = self._transforms.cropped(symbol, self._points)
+
+    @property
+    def cell_area(self) -> float:
+        """Area that one cell stands for, its mirror images included. [m2]"""
+        return self._transforms.images**2 * self.spacing[0] * self.spacing[1]
+
+    @cached_property
+    def largest_influence(self) -> float:
+        """Largest eigenvalue of the influence matrix, or a bound on it. [m]"""
+        return float(np.max(self._symbol)) or self.spacing[0]
+
+    @cached_property
+    def self_influence(self) -> float:
+        """Displacement of a cell under unit pressure on it alone, and on its mirror images. [m]"""
+        unit = np.zeros(self.shape)
+        unit[0, 0] = 1
+        return float(self.displacement(unit)[0, 0])
+
+    def displacement(self, pressure: Array) -> Array:
+        """Surface displacement under a pressure: one convolution.
+
+        Parameters
+        ----------
+        pressure : ndarray, shape (nx, ny)
+            Pressure over the contact modulus. [-]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            Displacement; with periodic boundaries its mean is zero. [m]
+        """
+        return self._convolved(pressure, self._symbol)
+
+    def rough_displacement(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
+
+        Parameters
+        ----------
+        pressure : ndarray of float32, shape (nx, ny)
+            Of ordinary size: single precision underflows. [-]
+
+        Returns
+        -------
+        ndarray of float32, shape (nx, ny)
+            Displacement over :attr:`largest_influence`. [-]
+        """
+        return self._convolved(pressure, self._rough_symbol)
+
+    @cached_property
+    def _rough_symbol(self) -> NDArray[np.float32]:
+        return (self._symbol / self.largest_influence).astype(np.float32)
+
+    def _convolved(self, pressure: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+        """Convolution in the precision of both."""
+        if self.boundary == "periodic":
+            return self._filtered(pressure, symbol)
+        along, (nx, ny), my = self._transforms, self.shape, self._points[1]
+        # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
+        # columns go forward, are multiplied and come back while they stay in the cache.
+        spectrum, room = (_as_single(memory, pressure.dtype) for memory in self._working_memory)
+        for rows in _blocks(nx, _ROWS):
+            spectrum[rows] = along.of_rows(pressure[rows], n=my, axis=1, workers=self.workers)
+        for block in _blocks(spectrum.shape[1], room.shape[1]):
+            columns = room[:, : block.stop - block.start]
+            columns[:nx] = spectrum[:, block]
+            columns[nx:] = 0
+            columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=self.workers)
+            along.multiply(columns, symbol[:, block])
+            columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=self.workers)
+            spectrum[:, block] = columns[:nx]
+        displacement = np.empty(self.shape, pressure.dtype)
+        for rows in _blocks(nx, _ROWS):
+            displacement[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
+        return displacement
+
+    @cached_property
+    def _working_memory(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Transforms along y, and some columns of their transforms: taken anew each time, half of it is page faults."""
+        mx, count = self._points[0], self._transforms.width(self._points[1])
+        together = min(max(_POINTS // mx, _COLUMNS), count)
+        kind = complex if self._transforms.is_complex else float
+        return np.empty((self.shape[0], count), kind), np.empty((mx, together), kind)
+
+    def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Pressure that causes about this displacement: the preconditioner of the contact solver.
+
+        Parameters
+        ----------
+        displacement : ndarray of float32, shape (nx, ny)
+            Of ordinary size: single precision underflows. [m]
+
+        Returns
+        -------
+        ndarray of float32, shape (nx, ny)
+            Pressure over the contact modulus. [-]
+
+        Notes
+        -----
+        The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
+        positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
+        """
+        return self._filtered(displacement, self._inverse_symbol)
+
+    @cached_property
+    def _inverse_symbol(self) -> NDArray[np.float32]:
+        symbol = periodic_symbol(self.surface_shape, self.spacing)
+        symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or self.spacing[0]
+        return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
+
+    def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
+        field_q = self._transforms.of_field(field, workers=self.workers)
+        self._transforms.multiply(field_q, symbol)
+        return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+
+
+def _as_single(memory: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+    """The first half of some memory as numbers of half the size, where these are wanted."""
+    if kind == np.float64:
+        return memory
+    halved = np.complex64 if memory.dtype == np.complex128 else np.float32
+    return memory.reshape(-1).view(halved)[: memory.size].reshape(memory.shape)
+
+
+def _blocks(length: int, size: int) -> Iterator[slice]:
+    return (slice(first, min(first + size, length)) for first in range(0, length, size))

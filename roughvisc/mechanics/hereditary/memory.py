@@ -1,0 +1,257 @@
+"""The hereditary integral: what a material remembers of the pressures it has carried.
+
+A memory reduces one time step to an elastic problem,
+
+    ``q_n = alpha p_n + carried``,    ``u_n = K q_n``,
+
+with a scalar ``alpha`` [1/Pa] and a known field. It is linear, so it acts as well on the displacement at unit
+compliance, ``v = K p``, which the contact solver has anyway: then the whole history costs no convolution. It knows
+nothing of contact, transforms or grids; its state is a plain value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
+
+Array = NDArray[np.float64]
+
+#: How pressure is taken to run within a step. ``linear``: second order, exact for piecewise-linear pressure.
+#: ``bdf2``: second order, damps what relaxes within a step. ``euler``: its start. ``right``: constant, jumping at
+#: the start of the step.
+Rule = Literal["linear", "bdf2", "euler", "right"]
+ActsOn = Literal["displacement", "pressure", "both"]
+
+
+class Memory(Protocol):
+    """What the stepper asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
+
+    @property
+    def acts_on(self) -> ActsOn:
+        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa], or ``(p, v)``."""
+        ...
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """The rules that it knows."""
+        ...
+
+    def start(self, shape: tuple[int, int]) -> Any:
+        """State at rest."""
+        ...
+
+    def predict(self, state: Any, step: float, rule: Rule) -> tuple[float, Array]:
+        """``alpha`` [1/Pa] and the carried field of a step ahead, which may be zero (a jump). [s]"""
+        ...
+
+    def advance(self, state: Any, step: float, rule: Rule, field: Array) -> Any:
+        """State after that step, at whose end the field was ``field``."""
+        ...
+
+    def restart(self, state: Any) -> Any:
+        """State in which no step reaches behind the present instant: after a jump or a corner."""
+        ...
+
+    def enlarged(
+        self, state: Any, shape: tuple[int, int], offset: tuple[int, int], displaced: Callable[[Array], Array]
+    ) -> Any:
+        """State on a larger grid, in which the present one begins at ``offset``; not of displacements alone.
+
+        ``displaced`` gives the displacement at unit compliance under a pressure there.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ModesState:
+    """State of an exponential series.
+
+    Attributes
+    ----------
+    modes : ndarray, shape (m, nx, ny) or (m, 2, nx, ny)
+        Internal variables ``z_i`` with ``tau_i z_i' = field - z_i``; for a fluidity ``z' = field``.
+    field : ndarray, shape (nx, ny) or (2, nx, ny)
+        Field at the present instant.
+    earlier : ndarray or None
+        ``modes`` one step ago, where the next step may use them by the two-step rule.
+    step : float
+        Length of the last step. [s]
+    """
+
+    modes: Array
+    field: Array
+    earlier: Array | None = None
+    step: float = 0.0
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Recursive memory of a Prony series: one field for each exponential, none for an elastic material.
+
+    Parameters
+    ----------
+    material : Prony
+        The series.
+    acts_on : {"displacement", "pressure", "both"}
+        What the fields are; the pressure form survives a change of grid and costs one convolution a step, both
+        together survive it and cost none.
+    """
+
+    material: Prony
+    acts_on: ActsOn = "displacement"
+    rules: tuple[Rule, ...] = ("linear", "bdf2", "euler", "right")
+
+    def start(self, shape: tuple[int, int]) -> ModesState:
+        """State at rest."""
+        field = (2, *shape) if self.acts_on == "both" else shape
+        return ModesState(np.zeros((len(self._weights), *field)), np.zeros(field))
+
+    def predict(self, state: ModesState, step: float, rule: Rule) -> tuple[float, Array]:
+        """``alpha`` [1/Pa] and the carried field of a step ahead. [s]"""
+        own, earlier, before, after = self.coefficients(state, step, rule)
+        weights = self._weights
+        alpha = self.factor * self.material.glassy + float(np.sum(weights * after))
+        carried = float(np.sum(weights * before)) * state.field
+        for weight, mode in zip(weights * own, state.modes, strict=True):
+            carried += weight * mode
+        if state.earlier is not None and np.any(earlier):
+            for weight, mode in zip(weights * earlier, state.earlier, strict=True):
+                carried += weight * mode
+        return alpha, carried
+
+    def advance(self, state: ModesState, step: float, rule: Rule, field: Array) -> ModesState:
+        """State after a step at whose end the field was ``field``."""
+        if step == 0:
+            return ModesState(state.modes, field, None, 0.0)
+        own, earlier, before, after = self.coefficients(state, step, rule)
+        modes = np.empty_like(state.modes)
+        for i, mode in enumerate(modes):
+            np.multiply(state.modes[i], own[i], out=mode)
+            if earlier[i] and state.earlier is not None:
+                mode += earlier[i] * state.earlier[i]
+            if before[i]:
+                mode += before[i] * state.field
+            mode += after[i] * field
+        return ModesState(modes, field, state.modes if "bdf2" in self.rules else None, step)
+
+    def restart(self, state: ModesState) -> ModesState:
+        """State whose next step does not reach behind the present instant."""
+        return ModesState(state.modes, state.field)
+
+    def enlarged(
+        self,
+        state: ModesState,
+        shape: tuple[int, int],
+        offset: tuple[int, int],
+        displaced: Callable[[Array], Array],
+    ) -> ModesState:
+        """State on a larger grid: pressure is zero in what is new, and displaces all of it."""
+        if self.acts_on == "displacement":
+            raise ValueError("displacements reach beyond the grid: a memory of them alone cannot be enlarged")
+
+        def moved(fields: Array) -> Array:
+            larger = padded(fields, shape, offset)
+            for pair in larger.reshape(-1, 2, *shape) if self.acts_on == "both" else ():
+                pair[1] = displaced(pair[0])
+            return larger
+
+        earlier = None if state.earlier is None else moved(state.earlier)
+        return ModesState(moved(state.modes), moved(state.field), earlier, state.step)
+
+    @property
+    def factor(self) -> float:
+        """Contact compliance over shear compliance. [-]"""
+        return 0.5 * (1 - self.material.poisson)
+
+    def products(self, modes: Array, dual: tuple[Array, Array], cells: NDArray[np.intp]) -> Array:
+        """Inner product ``p K z_i`` of a pressure with each exponential, summed over the cells. [Pa2 m]
+
+        ``dual`` is the pressure and its displacement at unit compliance, ``cells`` where the pressure is not zero.
+        """
+        fields = modes[: len(self.material.times)]
+        if self.acts_on == "pressure":  # the kernel is symmetric; where nothing was ever in contact z is zero
+            return np.einsum("mxy,xy->m", fields, dual[1])
+        displaced = fields[:, 1] if self.acts_on == "both" else fields
+        flat = displaced.reshape(len(displaced), dual[0].size)
+        # einsum, not a matrix product: the same bits whatever the number of threads
+        return np.einsum("mc,c->m", flat.take(cells, axis=1), dual[0].reshape(-1).take(cells))
+
+    @property
+    def _weights(self) -> Array:
+        """Contact compliance of each mode, [1/Pa]; a fluidity, [1/(Pa s)], comes last."""
+        fluidity = [self.material.fluidity] if self.material.fluidity else []
+        return self.factor * np.array([*self.material.compliances, *fluidity])
+
+    def coefficients(self, state: ModesState, step: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+        """``z_n = own z_(n-1) + earlier z_(n-2) + before field_(n-1) + after field_n``, a fluidity last."""
+        if rule == "bdf2" and state.earlier is None:
+            raise ValueError("the two-step rule needs two states: start with 'linear' or 'euler'")
+        x = step / np.array(self.material.times) if self.material.times else np.zeros(0)
+        retarded = _step_coefficients(x, step, state.step, rule)
+        if not self.material.fluidity:
+            return retarded
+        flowing = _flow_coefficients(step, state.step, rule)
+        joined = [np.append(mode, flow) for mode, flow in zip(retarded, flowing, strict=True)]
+        return joined[0], joined[1], joined[2], joined[3]
+
+
+def _step_coefficients(x: Array, step: float, last: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+    """Coefficients of retarded modes, ``x = step / time``; all positive but ``earlier``, for any ``x >= 0``."""
+    zero = np.zeros_like(x)
+    if rule == "linear":
+        after = one_less_mean_decay(x)
+        large = np.maximum(x, 0.3)
+        # the two forms of (1 - (1 + x) exp(-x)) / x each cancel on the other's side
+        before = np.where(x < 0.3, -np.expm1(-x) - after, (1 - (1 + large) * np.exp(-large)) / large)
+        return np.exp(-x), zero, before, after
+    if rule == "right":
+        return np.exp(-x), zero, zero, -np.expm1(-x)
+    if rule == "euler":
+        return 1 / (1 + x), zero, zero, x / (1 + x)
+    own, earlier, beta = _two_step(step, last)
+    return own / (1 + beta * x), earlier / (1 + beta * x), zero, beta * x / (1 + beta * x)
+
+
+def _flow_coefficients(step: float, last: float, rule: Rule) -> tuple[float, float, float, float]:
+    """The same for a fluidity, ``z' = field``."""
+    if rule == "linear":
+        return 1.0, 0.0, step / 2, step / 2
+    if rule in ("right", "euler"):
+        return 1.0, 0.0, 0.0, step
+    own, earlier, beta = _two_step(step, last)
+    return own, earlier, 0.0, beta * step
+
+
+def _two_step(step: float, last: float) -> tuple[float, float, float]:
+    """Variable-step BDF2: ``z_n = own z_(n-1) + earlier z_(n-2) + beta step z_n'``."""
+    ratio = step / last
+    return (1 + ratio) ** 2 / (1 + 2 * ratio), -(ratio**2) / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio)
+
+
+def padded(fields: Array, shape: tuple[int, int], offset: tuple[int, int]) -> Array:
+    """Fields on a larger grid, zero in what is new; the last two axes are the grid's."""
+    larger = np.zeros((*fields.shape[:-2], *shape))
+    nx, ny = fields.shape[-2:]
+    larger[..., offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = fields
+    return larger
+
+
+def mean_compliance(material: Material, step: float) -> float:
+    """Mean contact compliance over the first ``step`` of creep, ``int_0^h C / h``. [1/Pa]"""
+    return float(material.mean_contact_compliance(0.0, step))
+
+
+def stiff_ratio(material: Material, step: float) -> float:
+    """Weight of the old over the new pressure in a ``linear`` step; above a half it rings.
+
+    ``C(h) / mean C - 1``: zero for an elastic material, one for a dashpot or a Kelvin-Voigt solid.
+    """
+    mean = mean_compliance(material, step)
+    return float(material.contact_compliance(step)) / mean - 1 if mean > 0 else math.inf

@@ -1,0 +1,276 @@
+"""Materials from measurements as they come: creep, relaxation, or dynamic moduli, in shear or in tension."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.checks import check_poisson, checked_rows
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
+from roughvisc.mechanics.materials.tabulated import Tabulated
+
+Array = NDArray[np.float64]
+Kind = Literal["shear", "tensile"]
+
+#: terms offered to a fit, in a decade of times
+_PER_DECADE = (1, 1.5, 2, 3, 4, 6)
+#: how much larger the misfit may be than the smallest found, for the sake of fewer terms
+_ALLOWED = 1.1
+#: rms misfit below which nothing is gained: no rheometer measures so well
+_ACCURATE = 2e-4
+#: how far beyond the measured times terms are offered: a slower one is a plateau, a faster one is not seen
+_BEYOND = 3.0
+#: estimated error between rows beyond which a smooth spectrum is tried: its terms in a decade, and the weight of the
+#: steps from term to term beside the misfit of the rows
+_ROUGH, _SMOOTH_PER_DECADE, _STEPS = 0.01, 3, 0.01
+#: rows that are left out in turn, at most
+_LEFT_OUT = 40
+
+
+def from_creep_table(
+    times: Sequence[float],
+    compliances: Sequence[float],
+    kind: Kind = "shear",
+    noise: float = 0.0,
+    poisson: float = 0.5,
+) -> Tabulated:
+    """Material from a creep test: ``J(t)`` in shear, or ``D(t)`` in tension with ``J = 2 (1 + nu) D``.
+
+    Parameters
+    ----------
+    times : sequence of float
+        Ascending, the first may be zero. [s]
+    compliances : sequence of float
+        ``J`` or ``D`` at these times. [1/Pa]
+    kind : {"shear", "tensile"}
+        Which of them.
+    noise : float
+        Largest relative decrease that counts as noise.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Tabulated
+        The table itself, without a fit.
+
+    Raises
+    ------
+    InputError
+        As :class:`~roughvisc.mechanics.materials.tabulated.Tabulated`.
+    """
+    values = np.asarray(compliances, dtype=float) * _tensile_to_shear(kind, poisson)
+    return Tabulated(tuple(times), tuple(values.tolist()), noise, poisson)
+
+
+def from_relaxation_table(
+    times: Sequence[float], moduli: Sequence[float], kind: Kind = "shear", poisson: float = 0.5
+) -> Prony:
+    """Material from a relaxation test, by a positive series of exponentials.
+
+    Parameters
+    ----------
+    times : sequence of float
+        Ascending, the first may be zero. [s]
+    moduli : sequence of float
+        ``G`` or ``E`` at these times. [Pa]
+    kind : {"shear", "tensile"}
+        Which of them; ``G = E / (2 (1 + nu))``.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Prony
+        Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
+        times that were measured.
+
+    Raises
+    ------
+    InputError
+        If a row is negative, not finite, or not ascending in time; the row is named, counted from 0.
+
+    Notes
+    -----
+    ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
+    ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.from_relaxation`, which is exact. Outside the
+    measured times the series says what its slowest and its fastest terms say.
+
+    The error between rows is estimated by leaving out each inner row in turn and predicting it from the others, which
+    lie twice as far apart there: mostly too large, hardly ever too small. If it exceeds 1 %, a smooth spectrum is
+    tried, with the steps from term to term small as well, and taken if it predicts the rows twice as well.
+    """
+    t, values = checked_rows(("time", "modulus"), times, moduli)
+    for row in np.flatnonzero(values == 0)[:1]:
+        raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
+    shear = values / _tensile_to_shear(kind, poisson)
+    known = t[t > 0]
+    spectrum = _sparsest(
+        lambda theta: np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)]),
+        (known[0] / _BEYOND, known[-1] * _BEYOND),
+        shear,
+        shear,
+        t,
+    )
+    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
+
+
+def from_dynamic(
+    frequencies: Sequence[float],
+    storage: Sequence[float],
+    loss: Sequence[float],
+    *,
+    frequency_unit: Literal["rad/s", "Hz"],
+    shift_factors: ArrayLike | None = None,
+    kind: Kind = "shear",
+    poisson: float = 0.5,
+) -> Prony:
+    """Material from dynamic moduli, a master curve if shift factors are given, by a positive series.
+
+    Parameters
+    ----------
+    frequencies : sequence of float
+        In any order: several temperatures may overlap. [`frequency_unit`]
+    storage, loss : sequence of float
+        ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
+    frequency_unit : {"rad/s", "Hz"}
+        Angular frequency, or cycles a second; there is no default, since the wrong one shifts all times by 2 pi.
+    shift_factors : sequence of float, optional
+        ``a_T`` of each row (or one for all), which its frequency is multiplied by.
+    kind : {"shear", "tensile"}
+        Which moduli; ``G = E / (2 (1 + nu))``.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Prony
+        Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
+        frequencies that were measured.
+
+    Raises
+    ------
+    InputError
+        If a number is negative or not finite, or a frequency or a shift factor is not positive; the row is named.
+
+    Notes
+    -----
+    ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
+    are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
+    it is smaller.
+    """
+    if frequency_unit not in ("rad/s", "Hz"):
+        raise InputError(f"frequency_unit is {frequency_unit!r}: expected 'rad/s' or 'Hz'")
+    given = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    factors = np.ones(given.size) if shift_factors is None else np.asarray(shift_factors, dtype=float)
+    factors = np.full(given.size, float(factors)) if factors.ndim == 0 else factors
+    names = ("frequency", "storage modulus", "loss modulus", "shift factor")
+    given, elastic, viscous, factors = checked_rows(names, given, storage, loss, factors, ascending=False)
+    omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
+    for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
+        raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
+    factor = _tensile_to_shear(kind, poisson)
+    elastic, viscous = elastic / factor, viscous / factor
+    target = np.append(elastic, viscous)
+
+    def columns(theta: Array) -> Array:
+        x = omega[:, None] * theta
+        in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
+        return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
+
+    spectrum = _sparsest(
+        columns,
+        (1 / (_BEYOND * omega.max()), _BEYOND / omega.min()),
+        target,
+        np.maximum(target, 1e-3 * np.tile(np.hypot(elastic, viscous), 2)),
+        np.tile(omega, 2),
+    )
+    return spectrum.material(omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", poisson)
+
+
+def _tensile_to_shear(kind: Kind, poisson: float) -> float:
+    """Shear compliance over the compliance measured."""
+    check_poisson(poisson)
+    if kind not in ("shear", "tensile"):
+        raise InputError(f"kind is {kind!r}: expected 'shear' or 'tensile'")
+    return 2 * (1 + poisson) if kind == "tensile" else 1.0
+
+
+@dataclass(frozen=True)
+class _Spectrum:
+    """Moduli [Pa], the equilibrium modulus first, at relaxation times [s], and the relative misfit of each datum.
+
+    ``between`` is the largest error of rows predicted from the others.
+    """
+
+    moduli: Array
+    theta: Array
+    misfit: Array
+    between: float = math.nan
+
+    @property
+    def terms(self) -> int:
+        return int(np.count_nonzero(self.moduli))
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.misfit**2)))
+
+    def material(self, rows: int, span: str, poisson: float) -> Prony:
+        used = np.flatnonzero(self.moduli[1:])
+        series = from_relaxation(
+            float(self.moduli[0]), self.moduli[1:][used].tolist(), self.theta[used].tolist(), poisson
+        )
+        misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
+        if not math.isnan(self.between):
+            misfit += f", error between rows up to about {self.between:.2g} (rows predicted from the others)"
+        return dataclasses.replace(series, note=f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}")
+
+
+def _sparsest(
+    columns: Callable[[Array], Array], within: tuple[float, float], target: Array, scale: Array, at: Array
+) -> _Spectrum:
+    """The spectrum of fewest terms among those whose misfit is about the smallest, or a smooth one if rows are few.
+
+    ``at`` tells where a datum was measured: data with the same value are one row.
+    """
+
+    def fitted(theta: Array, steps: float, kept: Array) -> Array:
+        matrix = columns(theta)[kept] / scale[kept, None]
+        between = np.diff(np.eye(theta.size), axis=0) * (steps / np.max(target))
+        matrix = np.vstack([matrix, np.column_stack([np.zeros(theta.size - 1), between])])
+        wanted = np.append(target[kept] / scale[kept], np.zeros(theta.size - 1))
+        return nonnegative(matrix, wanted, np.ones(wanted.size))
+
+    def spectrum(theta: Array, steps: float = 0.0) -> _Spectrum:
+        moduli = fitted(theta, steps, np.ones(at.size, bool))
+        return _Spectrum(moduli, theta, (columns(theta) @ moduli - target) / scale)
+
+    def predicted(one: _Spectrum, steps: float = 0.0) -> _Spectrum:
+        """With the largest error of rows predicted from the others, those at the ends excepted."""
+        inner = np.unique(at)[1:-1]
+        if inner.size == 0:
+            return one
+        matrix, worst = columns(one.theta), 0.0
+        for row in inner[:: math.ceil(inner.size / _LEFT_OUT)]:
+            out = at == row
+            error = (matrix[out] @ fitted(one.theta, steps, ~out) - target[out]) / scale[out]
+            worst = max(worst, float(np.abs(error).max()))
+        return dataclasses.replace(one, between=worst)
+
+    found = [spectrum(lattice(*within, per_decade)) for per_decade in _PER_DECADE]
+    enough = max(_ALLOWED * min(one.rms for one in found), _ACCURATE)
+    sparse = predicted(min((one for one in found if one.rms <= enough), key=lambda one: one.terms))
+    if not sparse.between > _ROUGH:
+        return sparse
+    smooth = predicted(spectrum(lattice(*within, _SMOOTH_PER_DECADE), _STEPS), _STEPS)
+    return smooth if smooth.rms <= max(2 * enough, _ROUGH / 10) and smooth.between < sparse.between / 2 else sparse

@@ -1,0 +1,180 @@
+"""Linear viscoelastic materials: creep compliances ``J(t)`` and what the contact needs of them.
+
+The half-space enters the contact through one function, the contact compliance
+``C(t) = 1/E*(t) = (1 - nu) J(t) / 2`` with the shear creep compliance ``J``; two deformable bodies add theirs.
+
+The constructors take either a Poisson ratio, constant in time (a half unless given), or an elastic bulk modulus,
+with which it changes in time: see :func:`roughvisc.mechanics.materials.bulk.with_elastic_bulk`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.mechanics.materials.bulk import in_volume
+from roughvisc.mechanics.materials.checks import check_number
+from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
+from roughvisc.mechanics.materials.power_law import PowerLaw
+from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.tabulated import Tabulated
+
+__all__ = [
+    "Material",
+    "Pair",
+    "PowerLaw",
+    "Prony",
+    "Tabulated",
+    "elastic",
+    "from_creep_table",
+    "from_dynamic",
+    "from_relaxation",
+    "from_relaxation_table",
+    "kelvin_voigt",
+    "maxwell",
+    "one_less_mean_decay",
+    "pair",
+    "zener",
+]
+
+Array = NDArray[np.float64]
+
+
+class Material(Protocol):
+    """What the solver asks of a material."""
+
+    @property
+    def poisson(self) -> float:
+        """Poisson ratio."""
+        ...
+
+    @property
+    def note(self) -> str:
+        """What a result should say of how the material was found; often empty."""
+        ...
+
+    def contact_compliance(self, t: ArrayLike) -> Array:
+        """Contact compliance ``C(t)``, [1/Pa], at times after the load was applied. [s]"""
+        ...
+
+    def contact_integral(self, t: ArrayLike) -> Array:
+        """First antiderivative ``int_0^t C``. [s/Pa]"""
+        ...
+
+    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
+        """Mean of ``C`` over ``[s, s + h]``, [1/Pa], to full precision for any ``s`` and ``h``. [s]"""
+        ...
+
+
+def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus: float | None = None) -> Prony:
+    """Elastic half-space: a shear modulus [Pa] and no memory."""
+    check_number("shear_modulus", shear_modulus, "Pa")
+    return in_volume(Prony(1 / shear_modulus), poisson, bulk_modulus)
+
+
+def maxwell(
+    shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
+) -> Prony:
+    """Maxwell fluid: a spring [Pa] in series with a dashpot [Pa s]; ``J = 1/G + t/eta``."""
+    check_number("shear_modulus", shear_modulus, "Pa")
+    check_number("viscosity", viscosity, "Pa s")
+    return in_volume(Prony(1 / shear_modulus, fluidity=1 / viscosity), poisson, bulk_modulus)
+
+
+def kelvin_voigt(
+    shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
+) -> Prony:
+    """Kelvin-Voigt solid: a spring [Pa] beside a dashpot [Pa s]; no instantaneous compliance."""
+    check_number("shear_modulus", shear_modulus, "Pa")
+    check_number("viscosity", viscosity, "Pa s")
+    shear = Prony(0.0, compliances=(1 / shear_modulus,), times=(viscosity / shear_modulus,))
+    return in_volume(shear, poisson, bulk_modulus)
+
+
+def zener(
+    shear_modulus: float,
+    kelvin_modulus: float,
+    kelvin_viscosity: float,
+    poisson: float | None = None,
+    *,
+    bulk_modulus: float | None = None,
+) -> Prony:
+    """Zener solid: a spring ``G`` [Pa] in series with a Kelvin element ``G_K`` [Pa], ``eta_K`` [Pa s]."""
+    check_number("shear_modulus", shear_modulus, "Pa")
+    check_number("kelvin_modulus", kelvin_modulus, "Pa")
+    check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
+    shear = Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,))
+    return in_volume(shear, poisson, bulk_modulus)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two deformable bodies pressed on each other; made by :func:`pair`."""
+
+    a: Material
+    b: Material
+
+    @property
+    def poisson(self) -> float:
+        """A half, as for a series that stands for two bodies; each body has its own."""
+        return 0.5
+
+    @property
+    def note(self) -> str:
+        """The notes of both."""
+        return _notes(self.a, self.b)
+
+    def creep_compliance(self, t: ArrayLike) -> Array:
+        """Shear creep compliance of one incompressible body that would make the same contact. [1/Pa]"""
+        return 4 * self.contact_compliance(t)
+
+    def contact_compliance(self, t: ArrayLike) -> Array:
+        """Sum of the contact compliances. [1/Pa]"""
+        return self.a.contact_compliance(t) + self.b.contact_compliance(t)
+
+    def contact_integral(self, t: ArrayLike) -> Array:
+        """Its first antiderivative. [s/Pa]"""
+        return self.a.contact_integral(t) + self.b.contact_integral(t)
+
+    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
+        """Its mean over ``[s, s + h]``. [1/Pa]"""
+        return self.a.mean_contact_compliance(s, h) + self.b.mean_contact_compliance(s, h)
+
+
+def pair(a: Material, b: Material) -> Prony | Pair:
+    """Two deformable bodies: their contact compliances add.
+
+    Parameters
+    ----------
+    a, b : Material
+        The two; which is above does not matter.
+
+    Returns
+    -------
+    Prony or Pair
+        One series, at a Poisson ratio of a half, where both are series.
+
+    Examples
+    --------
+    >>> float(pair(elastic(2e6, 0.3), maxwell(1e6, 1e6)).contact_compliance(3.0))  # 0.35/2e6 + 0.25 (1 + 3)/1e6
+    1.175e-06
+    """
+    if not (isinstance(a, Prony) and isinstance(b, Prony)):
+        return Pair(a, b)
+    glassy, fluidity = 0.0, 0.0
+    compliances: dict[float, float] = {}
+    for body in (a, b):
+        share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body
+        glassy += share * body.glassy
+        fluidity += share * body.fluidity
+        for compliance, time in zip(body.compliances, body.times, strict=True):
+            compliances[time] = compliances.get(time, 0.0) + share * compliance
+    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b))
+
+
+def _notes(a: Material, b: Material) -> str:
+    return "; ".join(f"{name}: {body.note}" for name, body in (("a", a), ("b", b)) if body.note)

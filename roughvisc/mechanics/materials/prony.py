@@ -1,0 +1,139 @@
+"""Creep compliance as a series of exponentials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.checks import check_number, check_poisson
+from roughvisc.mechanics.materials.secular import merged, secular_roots
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prony:
+    r"""Exponential (Prony) series of the shear creep compliance.
+
+    .. math:: J(t) = J_0 + \varphi t + \sum_i J_i \left(1 - e^{-t/\tau_i}\right)
+
+    Parameters
+    ----------
+    glassy : float
+        Instantaneous compliance ``J_0``; zero for a material that cannot jump. [1/Pa]
+    fluidity : float
+        Inverse of the steady shear viscosity, zero for a solid. [1/(Pa s)]
+    compliances, times : sequence of float
+        Retarded compliances ``J_i`` [1/Pa] and retardation times ``tau_i`` [s].
+    poisson : float
+        Poisson ratio, constant in time.
+    note : str
+        How the series was found, if not stated: number of terms, misfit. No part of the comparison.
+
+    Raises
+    ------
+    InputError
+        If a value is negative or not finite, a retardation time is not positive, the Poisson ratio lies
+        outside (-1, 0.5], or the material is rigid.
+    """
+
+    glassy: float
+    fluidity: float = 0.0
+    compliances: tuple[float, ...] = ()
+    times: tuple[float, ...] = ()
+    poisson: float = 0.5
+    note: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))
+        object.__setattr__(self, "times", tuple(float(t) for t in self.times))
+        if len(self.compliances) != len(self.times):
+            raise InputError(f"{len(self.compliances)} compliances for {len(self.times)} times: expected as many")
+        check_number("glassy", self.glassy, "1/Pa", zero=True)
+        check_number("fluidity", self.fluidity, "1/(Pa s)", zero=True)
+        for i, (compliance, time) in enumerate(zip(self.compliances, self.times, strict=True)):
+            check_number(f"compliances[{i}]", compliance, "1/Pa", zero=True)
+            check_number(f"times[{i}]", time, "s")
+        check_poisson(self.poisson)
+        if self.glassy + self.fluidity + sum(self.compliances) == 0:
+            raise InputError("all compliances are zero: a rigid material cannot be pressed")
+
+    def creep_compliance(self, t: ArrayLike) -> Array:
+        """Shear creep compliance ``J(t)``. [1/Pa]"""
+        t = np.asarray(t, dtype=float)
+        retarded = np.sum(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
+        flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
+        return np.asarray(self.glassy + flowed + retarded)
+
+    def contact_compliance(self, t: ArrayLike) -> Array:
+        """Contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
+        return 0.5 * (1 - self.poisson) * self.creep_compliance(t)
+
+    def contact_integral(self, t: ArrayLike) -> Array:
+        """First antiderivative ``int_0^t C``. [s/Pa]"""
+        t = np.asarray(t, dtype=float)
+        total = self.glassy * t + self.fluidity * t**2 / 2
+        for compliance, time in zip(self.compliances, self.times, strict=True):
+            total = total + compliance * time * one_less_mean_decay(t / time) * (t / time)
+        return np.asarray(0.5 * (1 - self.poisson) * total)
+
+    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
+        """Mean of ``C`` over ``[s, s + h]``, [1/Pa]; ``C(s)`` for ``h = 0``. [s]"""
+        s, h = np.asarray(s, dtype=float), np.asarray(h, dtype=float)
+        compliances, times = self._terms
+        age, x = s[..., None] / times, h[..., None] / times
+        # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
+        retarded = np.sum(compliances * (np.exp(-age) * one_less_mean_decay(x) - np.expm1(-age)), axis=-1)
+        return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array]:
+        """Retarded compliances [1/Pa] and times [s]."""
+        return np.array(self.compliances), np.array(self.times)
+
+    def relaxation_spectrum(self) -> tuple[float, Array, Array]:
+        r"""Shear relaxation modulus as ``G(t) = G_e + sum G_k exp(-t / theta_k)``.
+
+        Returns
+        -------
+        equilibrium : float
+            ``G_e``, zero for a fluid. [Pa]
+        moduli, times : ndarray
+            ``G_k`` [Pa] and ``theta_k`` [s].
+
+        Raises
+        ------
+        InputError
+            If there is no instantaneous compliance: the relaxation modulus then holds an impulse.
+
+        Notes
+        -----
+        The relaxation rates are the zeros of ``J_0 - phi/mu + sum J_i r_i / (r_i - mu)``, ``r_i = 1/tau_i``,
+        one above each pole (the fluidity is a pole at zero).
+        """
+        if self.glassy == 0:
+            raise InputError("a material without instantaneous compliance has no finite relaxation modulus")
+        weights, rates = merged(self.compliances, self.times)
+        poles = np.append(0.0, rates) if self.fluidity else rates
+        strengths = np.append(self.fluidity, weights * rates) if self.fluidity else weights * rates
+        roots = secular_roots(strengths, poles, self.glassy)
+        moduli = np.array([1 / (rate * float(np.sum(strengths / offset**2))) for rate, offset in roots])
+        equilibrium = 0.0 if self.fluidity else 1 / (self.glassy + float(np.sum(weights)))
+        return equilibrium, moduli, np.array([1 / rate for rate, _ in roots])
+
+
+# (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding
+_POWERS = np.arange(1, 14)
+_SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
+
+
+def one_less_mean_decay(x: ArrayLike) -> Array:
+    """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
+    x = np.asarray(x, dtype=float)
+    series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
+    large = np.maximum(x, 0.3)
+    return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)

@@ -1,0 +1,1 @@
+"""The march through time: loading program, state, steps and their errors."""

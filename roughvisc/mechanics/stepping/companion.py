@@ -1,0 +1,161 @@
+"""What the time steps leave unknown: the difference to a companion, the same march in steps twice as long.
+
+The rules for a step are of second order, so that the companion is about four times as far off and the difference is
+three times the error; where they are of first order, because contact jumps or creep is not resolved, it is the error.
+Energies are sums over the steps, whose error follows the second order closely: its leading part is taken off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
+
+Array = NDArray[np.float64]
+
+_NO_FIELD = np.zeros((0, 0))
+#: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
+#: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
+STATED = 1.0
+#: The same of energies, from which a third of the difference is taken off; and of those of soft materials.
+_STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
+# Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
+# where a cell has entered within the companion's step.
+_ENTERED = 0.3
+# Steps are shortened where what is stated exceeds the first part of the tolerance and has grown by more than a factor
+# since it was last told, and lengthened again where it is below the second part. Their share stays between two limits.
+_MOST_USED, _LEAST_USED = 0.7, 0.3
+_GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
+
+
+def bare(state: State) -> State:
+    """A companion's state without what it is never asked for, so that it holds few fields."""
+    before = None if state.before is None else replace(state.before, pressure=_NO_FIELD, unit_displacement=None)
+    displacement = state.displacement if state.energy is None else _NO_FIELD
+    return replace(state, before=before, displacement=displacement)
+
+
+def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> tuple[Array, Array]:
+    """Where the companion of a state may be: as far from it as when both were last at the same instant.
+
+    Parameters
+    ----------
+    now : Instant
+        The state's.
+    companion, together : Instant or None
+        The companion's, and the state's then; None where that is not known.
+
+    Returns
+    -------
+    pressure, displacement : ndarray, shape (nx, ny)
+        [Pa], and at unit compliance [Pa m].
+    """
+    assert now.unit_displacement is not None
+    if companion is None or together is None:
+        return now.pressure, now.unit_displacement
+    pressure = now.pressure + companion.pressure
+    pressure -= together.pressure
+    if companion.unit_displacement is None or together.unit_displacement is None:
+        return np.maximum(pressure, 0, out=pressure), now.unit_displacement
+    displacement = now.unit_displacement + companion.unit_displacement
+    displacement -= together.unit_displacement
+    return np.maximum(pressure, 0, out=pressure), displacement
+
+
+def difference(
+    scene: Scene, step: Step, companion: State, displacement: Array, earlier: Array | None, asked: bool
+) -> Uncertainty:
+    """What is stated of a step, from where its companion is at the same time.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    step : Step
+        The step.
+    companion : State
+        Its companion after a step of its own.
+    displacement, earlier : ndarray, shape (nx, ny)
+        Displacement after that step [m], and pressure before it [Pa], if there was one.
+    asked : bool
+        Whether the area's part is wanted too.
+
+    Notes
+    -----
+    What is compared are the pressures by which both go on. The one that is shown of a step in which hardly any
+    compliance is there at once is more accurate.
+    """
+    fine, coarse = step.state.now, companion.now
+    area = scene.halfspace.cell_area
+    inside, outside = _undecided(scene, step, coarse, displacement) if asked else (0, 0)
+    (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
+    entered, soft = 0.0, scene.is_soft(scene.program.duration)
+    if earlier is not None and soft:
+        entered = _ENTERED * area * float(np.sum(fine.pressure, where=earlier == 0))
+    share = _STATED_SOFT if soft else _STATED_ENERGY
+    unresolved = 0.0 if step.state.energy is None else step.state.energy.unresolved
+    return Uncertainty(
+        pressure=STATED * area * float(np.sum(np.abs(fine.pressure - coarse.pressure))) + entered,
+        approach=STATED * abs(fine.approach - coarse.approach),
+        force=STATED * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
+        work=share * abs(step.state.work - companion.work) + unresolved,
+        dissipated=share * abs(lost - companion_lost) + unresolved,
+        inside=area * inside,
+        outside=area * outside,
+        stored_excess=(kept - companion_kept) / -3,
+        dissipated_excess=(lost - companion_lost) / -3,
+    )
+
+
+def sharpened(scene: Scene, before: State, state: State, ahead: float) -> float:
+    """Part of the tolerance's share that steps may use from here on, by what those so far have come to. [-]
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    before, state : State
+        As of the last two instants at which the companion has told.
+    ahead : float
+        What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
+    """
+    used, earlier = (_used(scene, one) / ahead for one in (state, before))
+    if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
+        wanted = max(_MOST_USED / used, 0.5)
+    elif used < _LEAST_USED:
+        wanted = 1.5
+    else:
+        return state.sharpness
+    # in steps of sqrt(2): what rounding does to small differences must not show in the length of steps
+    wanted = 2 ** (0.5 * round(2 * math.log2(wanted)))
+    return min(max(state.sharpness * wanted, _SHARPEST), _BLUNTEST)
+
+
+def _used(scene: Scene, state: State) -> float:
+    """What is stated of a state, over the tolerance."""
+    unknown = state.uncertainty
+    if scene.is_soft(scene.program.duration):  # pressure and force jump with every cell that enters
+        unknown = replace(unknown, pressure=0.0, force=0.0)
+    return unknown.relative(state) / scene.tolerance
+
+
+def _energies(state: State) -> tuple[float, float]:
+    """Stored and dissipated. [J]"""
+    return (0.0, 0.0) if state.energy is None else (state.energy.stored, state.energy.dissipated)
+
+
+def _undecided(scene: Scene, step: Step, coarse: Instant, displacement: Array) -> tuple[int, int]:
+    """Cells in contact that may be out of it, and cells out of contact that may be in it."""
+    fine = step.shown.pressure
+    contact = fine > 0
+    inside = contact & (fine <= np.abs(fine - coarse.pressure))
+    gap = scene.gap + step.displacement - step.level
+    moved = step.displacement - step.level - (displacement - coarse.approach)
+    outside = ~contact & ((coarse.pressure > 0) | (gap <= np.abs(moved)))
+    if scene.present is not None:
+        outside &= scene.present
+    return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))

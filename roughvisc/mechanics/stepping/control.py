@@ -1,0 +1,222 @@
+"""The choice of time steps: by an error estimate that costs nothing, onto kept times exactly.
+
+The estimate is the difference between a solution and the linear extrapolation it was started from.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from roughvisc.mechanics.hereditary.memory import Rule
+from roughvisc.mechanics.stepping.program import Segment
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trial
+
+# Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
+_SHARE = 0.5
+#: Shortest step, in lengths of the segment or of the way to the first kept time.
+SMALLEST_STEP = 1e-6
+# A cycle takes so many steps at least: what a sine loses in a cycle is then right within 2/3 (pi / n)^2, 2.6 %, and
+# ten times better without the leading part of that.
+_STEPS_A_CYCLE = 16
+# The two-step rule is stable while steps grow by no more than 1 + sqrt(2) (E. Hairer, S. P. Norsett, G. Wanner, Solving
+# Ordinary Differential Equations I, section III.5).
+_GROWTH = 2.4
+# Steps double at most, or grow so many times where the estimate is below this part of what is allowed.
+_FASTEST, _EASY = 4.0, 0.02
+# What can be wrong by less than this part of the tolerance is not looked at.
+_NOT_SEEN = 0.01
+# Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
+_ROUNDING = 1e-11
+
+
+def retarded(scene: Scene, length: float) -> float:
+    """Part of the compliance that a step of some length can get wrong: what creeps within it and after it. [-]
+
+    Notes
+    -----
+    Pressure taken as linear in a step of length ``h`` is wrong by up to ``p'' h^2 / 8``. Later displacements inherit
+    that by the creep that is still to come, ``C(T) - C(h)``; the displacement at the end of the step by
+    ``int_0^h C'(s) 6 s (h - s) / h^2 ds``, which is ``C(h) - C(0)`` for slow creep and falls as ``6 tau / h`` for
+    creep that ends at once: the least of two bounds stands for it.
+    """
+    final = scene.final
+    if final == 0:
+        return 0.0
+    return (max(final - scene.compliance(length), 0.0) + _crept_within(scene, length)) / final
+
+
+def _crept_within(scene: Scene, length: float) -> float:
+    """What a step can get wrong of its own end. [1/Pa]"""
+    at_end = scene.compliance(length)
+    late = 6 * (at_end - scene.mean_compliance(length))
+    return max(min(at_end - scene.glassy, late), 0.0)
+
+
+def error_limit(scene: Scene, state: State, arrival: float) -> float:
+    """Largest estimate with which a step that lands on a time is accepted."""
+    return _allowed(scene, state) * (1 if scene.keeps(arrival) else 2)
+
+
+def _allowed(scene: Scene, state: State) -> float:
+    """Estimated error that a step may make. [-]"""
+    return _SHARE * state.sharpness * scene.tolerance
+
+
+def step_length(scene: Scene, state: State, segment: Segment, event: float, end: float) -> float:
+    """Length of the next step, landing exactly on events and never leaving a splinter before one."""
+    distance = event - state.now.time
+    if scene.time_step is not None:
+        return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
+    length = state.suggestion or _first_length(scene, state, segment, event)
+    length = max(length, shortest_step(scene, state, segment))
+    if "bdf2" not in scene.memory.rules:
+        length = min(length, _longest_linear(scene, distance))
+    if segment.amplitude and retarded(scene, length) > _NOT_SEEN * scene.tolerance:
+        length = min(length, segment.period / _STEPS_A_CYCLE)
+    if length >= distance * (1 - 1e-9):
+        # steps go in pairs up to what is shown: a single one would not tell what it got wrong
+        single = state.behind == 0 and event == end and (state.before is None or scene.keeps(end))
+        return distance / 2 if single and retarded(scene, distance) > _NOT_SEEN * scene.tolerance else distance
+    return distance / 2 if length > distance / 2 else length
+
+
+def shortest_step(scene: Scene, state: State, segment: Segment) -> float:
+    """No step is shorter: by the segment, or by the first time kept in it. [s]"""
+    length = min(segment.duration, scene.next_kept(state.now.time) - state.began)
+    return SMALLEST_STEP * length
+
+
+def _longest_linear(scene: Scene, distance: float) -> float:
+    """Longest step in which pressure taken as linear does not ring. [s]"""
+    length = distance
+    while scene.stiff_ratio(length) > 0.5 and length > 1e-9 * distance:
+        length /= 2
+    return length
+
+
+def _first_length(scene: Scene, state: State, segment: Segment, event: float) -> float:
+    """Length of the first step after an event: the longest that neither program nor creep make too inaccurate."""
+    if not scene.remembers:
+        return math.inf if scene.times is not None else min(segment.duration, segment.period) / 20
+    span, allowed = min(segment.duration, segment.period), 12 * _allowed(scene, state)
+    glassy, length = scene.glassy, span
+    while length > SMALLEST_STEP * span:
+        now = scene.compliance(length)
+        crept = _crept_within(scene, length) / now * min(1.0, now / glassy - 1) if glassy else 0.0
+        if retarded(scene, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
+            break
+        length /= 1.5
+    wrong = retarded(scene, length)
+    if state.now.force == 0:
+        length = min(length, 2 * _allowed(scene, state) / wrong * (event - state.now.time)) if wrong else length
+    if state.unresolved:
+        length = min(length, _allowed(scene, state) * span)
+    return length
+
+
+def rule_for(scene: Scene, state: State, length: float, growth: float = _GROWTH) -> Rule:
+    """Piecewise-linear pressure where it does not ring, else the damped two-step rule or its start.
+
+    ``growth`` is the largest ratio of a step to the one before with which the two-step rule is taken.
+    """
+    if "bdf2" not in scene.memory.rules:
+        return "linear"
+    if state.before is None:
+        return "euler" if scene.is_soft(length) else "linear"
+    if scene.stiff_ratio(length) <= 0.5:
+        return "linear"
+    # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
+    return "bdf2" if length <= growth * (state.now.time - state.before.time) else "euler"
+
+
+def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: float) -> float:
+    """Relative error in time of a step, from its difference to the extrapolation; NaN without one."""
+    if state.before is None:
+        return math.nan
+    if not scene.remembers:
+        return 0.0
+    share = retarded(scene, trial.length)
+    last = state.now.time - state.before.time
+    ahead = max(1.0, growth(state, segment, trial.instant.time, event))
+    soft = 1.0
+    if segment.control == "load" and scene.glassy < 0.01 * scene.compliance(trial.length):
+        since = state.contact_since
+        elapsed = scene.compliance(trial.instant.time - since)
+        soft = scene.compliance(max(event, trial.instant.time) - since) / elapsed if elapsed > 0 else 1.0
+    force = max(state.largest_force, trial.instant.force * ahead)
+    approach = max(
+        state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
+    )
+    difference = float(np.sum(np.abs(trial.instant.pressure - state.extrapolated(trial.length))))
+    pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
+    ratio = trial.length / last
+    if segment.control == "load":
+        found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach
+    else:
+        found, now, before, scale = trial.instant.force, state.now.force, state.before.force, force
+    ahead_of_it = now + ratio * (now - before)
+    if segment.control == "approach":  # no force is negative
+        ahead_of_it = max(ahead_of_it, 0.0)
+    scalar_error = abs(found - ahead_of_it) / scale if scale > 0 else 0.0
+    fading = _fading(scene, state, trial, event)
+    if segment.control == "approach":
+        scalar_error *= fading
+    return share * _error_constant(trial, last) * max(fading * pressure_error, scalar_error)
+
+
+def _unresolved_approach(scene: Scene, now: Instant) -> float:
+    """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
+    pressure = now.force / (now.pressure.size * scene.halfspace.cell_area)
+    return _ROUNDING * scene.compliance(now.time) * pressure * scene.halfspace.largest_influence
+
+
+def _error_constant(trial: Trial, last: float) -> float:
+    """Error of a step's rule over the step's difference to the extrapolation; ``last`` is the step before. [s]"""
+    return trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
+
+
+def _fading(scene: Scene, state: State, trial: Trial, event: float) -> float:
+    """What an error in the pressure of a step counts for at the next kept time.
+
+    Where hardly any compliance is there at once, each cell that enters makes the pressure jump. What a step gets
+    wrong then counts by its share of the creep till the next kept time; not so while contact recedes, when the
+    pressure is smooth and what it was stays in the dent that it leaves.
+    """
+    if scene.times is None or not scene.is_soft(trial.length) or _receding(state, trial):
+        return 1.0
+    remaining = event - trial.instant.time
+    own = scene.mean_compliance(trial.length)
+    return own / scene.mean_compliance(trial.length + remaining)
+
+
+def _receding(state: State, trial: Trial) -> bool:
+    """Whether fewer cells are in contact after a step than before it."""
+    return bool(np.count_nonzero(trial.instant.pressure) < np.count_nonzero(state.now.pressure))
+
+
+def growth(state: State, segment: Segment, time: float, event: float) -> float:
+    """What is prescribed at the next event over what is now: errors are relative to the larger."""
+    now = segment.value(time - state.began, state.start)
+    then = segment.value(event - state.began, state.start)
+    return then / now if now > 0 else 1.0
+
+
+def suggestion(scene: Scene, trial: Trial, error: float, state: State) -> float:
+    """Length of the next step."""
+    if math.isnan(error) or state.before is None:
+        return trial.length
+    most = 2.0
+    if error < _EASY * _allowed(scene, state) and scene.stiff_ratio(_FASTEST * trial.length) <= 0.5:
+        most = _FASTEST
+    if error == 0:
+        return most * trial.length
+    last = state.now.time - state.before.time
+    constant = _error_constant(trial, last)
+    curvature = error / (constant * trial.length * (trial.length + last))
+    target = _allowed(scene, state) / curvature
+    length = min(math.sqrt(4.2 * target), most * trial.length, scene.program.duration)
+    if scene.stiff_ratio(length) > 0.5:
+        length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + 8.4 * target))
+    return max(min(length, most * trial.length), 0.2 * trial.length)

@@ -1,0 +1,399 @@
+"""What is prescribed, and what changes while a march goes on: plain values, all of them frozen."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.stepping.energy import Energy
+from roughvisc.mechanics.stepping.program import Control, Program
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
+# shows its pressure through one discarded short solve.
+_SOFT = 0.1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is prescribed: nothing in it changes while the march goes on.
+
+    Attributes
+    ----------
+    halfspace : HalfSpace
+        Grid and boundary.
+    gap : ndarray, shape (nx, ny)
+        Undeformed gap at first touch, zero at the highest peak, which may lie between the cells; any finite number
+        where absent. [m]
+    material, memory : Material, Memory
+        The material and the form in which its past is kept.
+    program : Program
+        What is prescribed, when.
+    times : tuple of float or None
+        Times to step onto exactly, ascending; None: none but the program's corners. [s]
+    tolerance : float
+        On the relative error in time of pressure (L1) and approach, relative to the largest values so far.
+    time_step : float or None
+        Fixed step; None chooses steps by the tolerance. [s]
+    present : ndarray of bool or None
+        Cells where there is material; None: all.
+    accept_edge : bool
+        In free space, whether cells at the border of the grid may carry pressure.
+    enlarge : callable or None
+        Where the grid gets too small for the contact: gives this scene on a larger grid and the cell of it at which
+        the present grid begins, or None if the profile is not known farther out. The memory must be one of pressures.
+    outside : float
+        Least undeformed gap of the domain beyond the grid; infinite where the grid is all of it. [m]
+    """
+
+    halfspace: HalfSpace
+    gap: Array
+    material: Material
+    memory: Memory
+    program: Program
+    times: tuple[float, ...] | None = None
+    tolerance: float = 1e-3
+    time_step: float | None = None
+    present: Mask | None = None
+    accept_edge: bool = False
+    enlarge: Callable[[Scene], tuple[Scene, tuple[int, int]] | None] | None = None
+    outside: float = math.inf
+
+    def lowest(self, field: Array) -> float:
+        """Least value over the present cells."""
+        return float(np.min(field if self.present is None else field[self.present]))
+
+    def compliance(self, t: float) -> float:
+        """Contact compliance. [1/Pa]"""
+        return self._known[0](min(t, self.program.duration))
+
+    def mean_compliance(self, step: float) -> float:
+        """Mean contact compliance over the first so many seconds of creep. [1/Pa]"""
+        return self._known[1](min(step, self.program.duration))
+
+    def stiff_ratio(self, step: float) -> float:
+        """As :func:`~roughvisc.mechanics.hereditary.memory.stiff_ratio`, no longer than the program."""
+        mean = self.mean_compliance(step)
+        return self.compliance(step) / mean - 1 if mean > 0 else math.inf
+
+    @cached_property
+    def _known(self) -> tuple[Callable[[float], float], Callable[[float], float]]:
+        """Both functions of the material, which are asked for the same few times over and over."""
+        once = lru_cache(maxsize=32)
+        return once(lambda t: float(self.material.contact_compliance(t))), once(partial(mean_compliance, self.material))
+
+    @cached_property
+    def glassy(self) -> float:
+        """Instantaneous contact compliance. [1/Pa]"""
+        return self.compliance(0.0)
+
+    @cached_property
+    def final(self) -> float:
+        """Contact compliance after all of the program. [1/Pa]"""
+        return self.compliance(self.program.duration)
+
+    @property
+    def can_jump(self) -> bool:
+        """Whether the material has an instantaneous compliance."""
+        return self.glassy > 0
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the past matters: without creep nothing that is computed depends on the steps."""
+        return self.final > self.glassy
+
+    def is_soft(self, length: float) -> bool:
+        """Whether hardly any of a step's compliance is there at once."""
+        return self.glassy < _SOFT * self.compliance(length)
+
+    def keeps(self, time: float) -> bool:
+        """Whether a time is kept. [s]"""
+        return self.times is None or time in self._kept
+
+    def next_kept(self, time: float) -> float:
+        """The first time to step onto after another, infinite if there is none. [s]"""
+        times = self.times or ()
+        at = bisect_right(times, time)
+        return times[at] if at < len(times) else math.inf
+
+    @cached_property
+    def _kept(self) -> frozenset[float]:
+        return frozenset(self.times or ())
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A state of the surfaces at one time.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    pressure : ndarray, shape (nx, ny)
+        [Pa]
+    force, approach : float
+        [N], [m]
+    unit_displacement : ndarray, shape (nx, ny), or None
+        Displacement that the pressure causes at unit compliance; None where that is not known. [Pa m]
+    """
+
+    time: float
+    pressure: Array
+    force: float
+    approach: float
+    unit_displacement: Array | None = None
+
+
+_EXCESS = ("stored_excess", "dissipated_excess")
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What the time steps leave unknown at an instant, by the companion that takes steps twice as long.
+
+    Attributes
+    ----------
+    pressure : float
+        Of the pressure, its absolute values summed. [N]
+    approach, force : float
+        [m], [N]
+    work, dissipated : float
+        [J]
+    inside, outside : float
+        Area in contact that may be none, and area out of contact that may be in it. [m2]
+    stored_excess, dissipated_excess : float
+        What steps of finite length add to these energies, to leading order. [J]
+    """
+
+    pressure: float = 0.0
+    approach: float = 0.0
+    force: float = 0.0
+    work: float = 0.0
+    dissipated: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+    stored_excess: float = 0.0
+    dissipated_excess: float = 0.0
+
+    def or_worse(self, other: Uncertainty, part: float) -> Uncertainty:
+        """The larger of both, part by part; what steps add to the energies lies a part of the way to the other's."""
+        worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
+        here, there = ({name: getattr(one, name) for name in _EXCESS} for one in (self, other))
+        return Uncertainty(**worse | {name: (1 - part) * here[name] + part * there[name] for name in _EXCESS})
+
+    def relative(self, state: State) -> float:
+        """The largest of pressure, force and approach over what these have come to so far. [-]"""
+        if math.isnan(self.pressure):  # unknown, of surfaces at rest too
+            return math.nan
+        force, approach = state.largest_force, state.largest_approach
+        by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
+        return max(by_force, self.approach / approach if approach > 0 else 0.0)
+
+
+#: Of a march that has no companion.
+UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
+
+
+@dataclass(frozen=True)
+class State:
+    """All that a march needs to go on: a plain value.
+
+    Attributes
+    ----------
+    now, before : Instant
+        The present instant, and the one before if the next step may extrapolate from it.
+    displacement : ndarray, shape (nx, ny)
+        Total displacement of the half-space at the present instant. [m]
+    memory : object
+        State of the memory at the present instant.
+    segment : int
+        Index of the segment of the program.
+    began, start : float
+        Time at which the segment began [s], and the value of what it controls then [N or m].
+    suggestion : float
+        Length of the next step; zero after an event. [s]
+    largest_force, largest_approach : float
+        So far. [N], [m]
+    contact_since : float
+        Time at which the surfaces last came into contact. [s]
+    work : float
+        Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
+    energy : Energy or None
+        What of it is stored and what is dissipated; None where the memory is no series of exponentials.
+    companion : State or None
+        The same march with steps twice as long, as far as it has come; None while it is no other than this one.
+    behind : int
+        Accepted steps since the companion was last at the present instant.
+    uncertainty : Uncertainty
+        As of then.
+    sharpness : float
+        Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
+    unresolved : bool
+        Whether a jump was prescribed that the material cannot follow at once.
+    blind : bool
+        Whether the next estimate leaves the pressure out, once.
+    rejected_error : float
+        Estimate of the last attempt at this step, if it was rejected.
+    iterations, convolutions : int
+        Spent so far, rejected steps included.
+    """
+
+    now: Instant
+    displacement: Array
+    memory: Any
+    before: Instant | None = None
+    segment: int = 0
+    began: float = 0.0
+    start: float = 0.0
+    suggestion: float = 0.0
+    largest_force: float = 0.0
+    largest_approach: float = 0.0
+    contact_since: float = 0.0
+    work: float = 0.0
+    energy: Energy | None = None
+    companion: State | None = None
+    behind: int = 0
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    sharpness: float = 1.0
+    unresolved: bool = False
+    blind: bool = False
+    rejected_error: float = math.inf
+    iterations: int = 0
+    convolutions: int = 0
+
+    def extrapolated(self, length: float) -> Array:
+        """Pressure a step ahead by the last two, cut at zero; the last one where there is no other. [Pa]"""
+        if self.before is None or length == 0:
+            return self.now.pressure
+        ahead = _beyond(self.before.pressure, self.now.pressure, self._ratio(length), 1.0)
+        return np.maximum(ahead, 0, out=ahead)
+
+    def first_guess(self, length: float, scale: float) -> tuple[Array, Array | None]:
+        """The extrapolated pressure and its unit displacement, both scaled, in memory of their own.
+
+        The latter is None where it would cost a convolution: where pressure is cut at zero.
+        """
+        now, before = self.now, self.before
+        if before is None or length == 0:
+            return now.pressure * scale, None if now.unit_displacement is None else now.unit_displacement * scale
+        ratio = self._ratio(length)
+        pressure = _beyond(before.pressure, now.pressure, ratio, scale)
+        if np.min(pressure) < 0:
+            return np.maximum(pressure, 0, out=pressure), None
+        if now.unit_displacement is None or before.unit_displacement is None:
+            return pressure, None
+        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale)
+
+    def _ratio(self, length: float) -> float:
+        """Of a step's length to that of the last one."""
+        assert self.before is not None
+        return length / (self.now.time - self.before.time)
+
+
+def _beyond(before: Array, now: Array, ratio: float, scale: float) -> Array:
+    """``scale * (now + ratio * (now - before))``."""
+    there = now - before
+    there *= ratio
+    there += now
+    there *= scale
+    return there
+
+
+@dataclass(frozen=True)
+class Step:
+    """An accepted step.
+
+    Attributes
+    ----------
+    shown : Instant
+        What to report: the state's present instant, its pressure resolved where the material cannot jump.
+    displacement : ndarray, shape (nx, ny)
+        Total displacement of the half-space then. [m]
+    effective : ndarray or None
+        Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
+    level : float
+        Rigid-body approach that belongs to the displacement: ``gap = undeformed gap + displacement - level``. [m]
+    control : {"load", "approach"}
+        What was prescribed.
+    given : bool
+        Whether the program stated its value; else it was found before, and kept.
+    bound : float
+        Bound on the relative error of the pressure left by the contact solver, in the energy norm.
+    residual : float
+        Estimate of it in the mean (L1).
+    uncertainty : Uncertainty
+        What the time steps leave unknown of it.
+    converged : bool
+        Whether the contact solver reached its tolerance.
+    scene : Scene
+        The scene, on the grid that it has by now.
+    state : State
+        The state after the step.
+    """
+
+    shown: Instant
+    displacement: Array
+    effective: Array | None
+    level: float
+    control: Control
+    given: bool
+    bound: float
+    residual: float
+    uncertainty: Uncertainty
+    converged: bool
+    scene: Scene
+    state: State
+
+    @property
+    def time_error(self) -> float:
+        """Relative error of pressure (L1), force and approach that the time steps leave. [-]"""
+        return self.uncertainty.relative(self.state)
+
+    @property
+    def stored(self) -> float:
+        """Energy stored in the springs of the material; NaN where the memory is no series. [J]"""
+        return self.state.energy.stored - self.uncertainty.stored_excess if self.state.energy else math.nan
+
+    @property
+    def dissipated(self) -> float:
+        """Energy dissipated in its dashpots so far; NaN where the memory is no series. [J]"""
+        return self.state.energy.dissipated - self.uncertainty.dissipated_excess if self.state.energy else math.nan
+
+    @property
+    def work(self) -> float:
+        """Work of the pressure on the displacement since the start. [J]"""
+        return self.stored + self.dissipated if self.state.energy else self.state.work
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A step that was computed and is not yet accepted."""
+
+    instant: Instant
+    displacement: Array
+    effective: Array | None
+    length: float
+    rule: Rule
+    control: Control = "load"
+    bound: float = 0.0
+    residual: float = 0.0
+    converged: bool = True
+    iterations: int = 0
+    convolutions: int = 0
+
+    @property
+    def apart(self) -> bool:
+        """Whether the surfaces are apart."""
+        return self.instant.force == 0

@@ -1,0 +1,256 @@
+"""What a case will cost, found without computing it: coarse marches, a timed solve, and counted arrays."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.choice import Engine
+from roughvisc.mechanics.hereditary.direct import History, history_bytes
+from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.study.simulation.scene import Ground, prepare
+from roughvisc.study.statement.case import Case
+
+#: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
+#: to 512 squared the convolutions so found were -1 to +22 % off, the steps -8 to +7 %.
+_COARSE = (17, 33)
+#: Cost may grow from a grid to one twice as fine by factors within these.
+_STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
+#: Seconds for one coarse march, and for timing solves.
+_MARCH, _CALIBRATION = 3.0, 2.0
+#: Largest grid that a solve is timed on; larger ones are taken to cost as N log N. [cells]
+_TIMED = 1024**2
+#: What the grid's error costs: the march again on a quarter of the cells and a sixteenth, which is dearer by the cell.
+_AGAIN = 1.5
+#: What the interpreter and the libraries take, measured. [bytes]
+_PROCESS = 230e6
+#: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
+_WRITE, _ROUNDED = 3e-9, 0.5
+#: Frames of a field that are in memory at once while the file is written.
+_FRAMES_TOGETHER = 8
+
+
+@dataclass(frozen=True)
+class March:
+    """What a march through a case takes.
+
+    Attributes
+    ----------
+    steps, rows : float
+        Accepted steps, and kept ones.
+    convolutions : float
+        Displacements and applications of the preconditioner.
+    damped : float
+        Part of the steps that the two-step rule takes.
+    contact : float
+        Largest contact fraction.
+    whole : bool
+        Whether the coarse marches came to their end in the time that they were given.
+    level : float
+        Largest approach: what lies deeper cannot be touched. [m]
+    """
+
+    steps: float
+    rows: float
+    convolutions: float
+    damped: float
+    contact: float
+    whole: bool
+    level: float = math.inf
+
+
+def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
+    """Every so-many-eth point of a surface, about ``side`` each way, over the same size. [m]"""
+    picks, coords = [], {}
+    for axis in ("x", "y"):
+        count = height.sizes[axis]
+        few = min(side, count)
+        picks.append(np.floor((np.arange(few) + 0.5) * count / few).astype(int))
+        length = 2 * float(height[axis][0]) if count == 1 else float(height[axis][1] - height[axis][0]) * count
+        coords[axis] = (np.arange(few) + 0.5) * length / few
+    kept = {"missing": height.attrs["missing"]} if "missing" in height.attrs else {}
+    return xr.DataArray(height.values[np.ix_(*picks)], dims=("x", "y"), coords=coords, attrs=kept)
+
+
+def march_of(case: Case, height: xr.DataArray) -> March:
+    """Steps and convolutions of a case, from marches over coarse grids.
+
+    Raises
+    ------
+    InputError
+        If the case is impossible.
+    """
+    found = [_march(case, coarse(height, side)) for side in _COARSE]
+    octaves = math.log2(max(math.sqrt(height.size) / _COARSE[1], 1.0))
+    first, second = found
+    grown = {
+        "steps": second.steps * _growth(first.steps, second.steps, _STEPS_GROW) ** octaves,
+        "convolutions": second.convolutions * _growth(first.convolutions, second.convolutions, _WORK_GROWS) ** octaves,
+    }
+    if case.settings.solve.time_step != "auto":
+        grown["steps"] = second.steps
+    rows = grown["steps"] if case.settings.keep.times == "all" else second.rows
+    return March(**{**vars(second), **grown, "rows": rows, "whole": first.whole and second.whole})
+
+
+def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
+    return min(max(second / max(first, 1.0), limits[0]), limits[1])
+
+
+def _march(case: Case, height: xr.DataArray) -> March:
+    settings = case.settings
+    times = None if settings.keep.times == "all" else settings.keep.times
+    program = case.program()
+    scene, _ = prepare(
+        Ground(height, "absent"),
+        case.material(),
+        program,
+        boundary=settings.solve.boundary,
+        tolerance=settings.solve.tolerance,
+        time_step=settings.solve.time_step,
+        times=times,
+        edge="accept",
+        memory=settings.solve.memory,
+    )
+    steps = rows = damped = 0
+    reached = contact = level = 0.0
+    work, instants = 0, [0.0]
+    until = time.perf_counter() + _MARCH
+    kept = set(scene.times or ())
+    for step in march(scene) if settings.solve.method == "fast" else march_seed(scene):
+        now = step.shown.time
+        steps += 1
+        rows += times is None or now in kept
+        damped += now > reached and _is_damped(scene, now - reached)
+        contact = max(contact, float(np.mean(step.shown.pressure > 0)))
+        level = max(level, step.level)
+        work, reached = step.state.convolutions, now
+        instants.append(now)
+        if time.perf_counter() > until:
+            break
+    whole = reached >= program.duration
+    stretch = 1.0
+    if not whole:  # what is left is taken to go on as the later half of the steps went
+        half = len(instants) // 2
+        pace = (reached - instants[half]) / max(steps - half, 1)
+        stretch += (program.duration - reached) / pace / steps if pace else 0.0
+    kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
+    return March(steps * stretch, kept_rows, work * stretch, part, contact, bool(whole), level)
+
+
+def _is_damped(scene: Scene, length: float) -> bool:
+    return "bdf2" in scene.memory.rules and scene.stiff_ratio(length) > 0.5
+
+
+class Stopwatch:
+    """Seconds a convolution takes within a solve, by grid and boundary; measured once each, in two seconds in all."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[tuple[int, ...], str], float] = {}
+        self._left = _CALIBRATION
+
+    def seconds(self, height: xr.DataArray, boundary: str) -> float:
+        """Seconds of one convolution and what goes with it, one thread. [s]"""
+        grid = (height.shape, boundary)
+        if grid not in self._found:
+            self._found[grid] = self._measured(height, boundary)
+        return self._found[grid]
+
+    def _measured(self, height: xr.DataArray, boundary: str) -> float:
+        alike = [grid for grid in self._found if grid[1] == boundary]
+        if self._left <= 0 and alike:  # as N log N from the grid nearest in size
+            nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
+            return self._found[nearest] * work(height.size) / work(math.prod(nearest[0]))
+        cells = height.size
+        if cells > _TIMED:
+            height = coarse(height, math.isqrt(_TIMED))
+        began = time.perf_counter()
+        ground = Ground(height, "absent")
+        halfspace: HalfSpace = ground.halfspace("free" if boundary == "free" else "periodic")
+        gap = ground.gap
+        load = 0.02 * float(np.mean(gap)) / (halfspace.self_influence or halfspace.spacing[0]) * gap.size
+        seconds = math.inf
+        for iterations in itertools.chain((2,), itertools.repeat(6)):
+            start = time.perf_counter()
+            state = solve_contact(
+                halfspace, gap, load=load or 1.0, tolerance=1e-15, max_iterations=iterations, present=ground.present
+            )
+            now = time.perf_counter()
+            seconds = min(seconds, (now - start) / max(state.convolutions, 1))
+            if now - began > min(0.5, self._left) or gap.max() == 0:
+                break
+        self._left -= time.perf_counter() - began
+        return seconds * work(cells) / work(height.size)
+
+
+def windows(ground: Ground) -> tuple[tuple[float, float], ...]:
+    """Windows that follow a contact on a surface, from the present one to the whole domain, which is the ground's then.
+
+    The least gap beyond each [m], and the part of the surface's cells that it takes.
+    """
+
+    def present() -> tuple[float, float]:
+        return ground.window.outside, math.prod(ground.window.shape) / ground.height.size
+
+    found = [present()]
+    while not ground.window.whole:
+        ground.widen()
+        found.append(present())
+    return tuple(found)
+
+
+def solved_on(windows: Iterable[tuple[float, float]], level: float) -> float:
+    """Part of the surface's cells that are solved on where the approach comes to a level. [m]"""
+    return next(part for outside, part in windows if outside > level)
+
+
+def work(cells: float) -> float:
+    return cells * math.log2(cells + 2)
+
+
+def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0) -> float:
+    """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
+    convolution *= work(window * cells) / work(cells)
+    modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
+    past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
+    stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
+    writing = found.rows * cells * 8 * len(case.settings.keep.fields) * _WRITE
+    again = _AGAIN if case.settings.solve.grid_error else 1.0
+    return found.convolutions * convolution * again + stepping + writing
+
+
+def memory(case: Case, cells: int, found: March, engine: Engine, part: float = 1.0) -> float:
+    """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
+    field = 8.0 * cells
+    surface, solver = 3.0, 14.0  # measured at 512 squared: together 13 to 18, as 5 to 45 % of the cells are in contact
+    companion = 0.0  # measured there: 8 fields with one exponential
+    transforms = 4.3 if case.settings.solve.boundary == "free" else 1.4  # symbols, spectra
+    past = 0.0
+    if isinstance(engine.memory, Modes):
+        modes = len(engine.memory.material.times) + bool(engine.memory.material.fluidity)
+        past = (3 if "bdf2" in engine.memory.rules else 2) * modes * part * field
+        companion = 7.0 + modes if modes else 0.0
+    elif isinstance(engine.memory, History):
+        past = 1.5 * history_bytes(found.contact * cells, found.steps)
+        companion = 7.0
+    kept = min(found.rows, _FRAMES_TOGETHER) * field
+    return _PROCESS + (surface + (transforms + solver + companion) * part) * field + past + kept
+
+
+def disk(case: Case, cells: int, found: March) -> float:
+    """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
+    dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
+    pressure = found.contact if found.contact < 0.02 else dense
+    fields = sum(pressure if name == "pressure" else dense for name in case.settings.keep.fields)
+    return 20e3 + 8.0 * cells * (found.rows * fields + 1.0) + found.rows * 120

@@ -1,0 +1,73 @@
+"""The files that a case names, put where every worker finds them: workers share nothing but the output folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.store import whole_file
+
+
+def pack(case: Case, folder: Path) -> str:
+    """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.
+
+    Parameters
+    ----------
+    case : Case
+        What to compute.
+    folder : Path
+        Where the copies go, each in a folder of its own named by its content; made if need be.
+    """
+    stated = json.loads(case.to_json())
+    for table in ("surface", "material"):
+        if table in stated:
+            stated[table] = _moved(stated[table], folder)
+    return json.dumps(stated)
+
+
+def _moved(stated: Any, folder: Path) -> Any:
+    if isinstance(stated, list):
+        return [_moved(entry, folder) for entry in stated]
+    if not isinstance(stated, dict):
+        return stated
+    return {
+        key: str(_copy(Path(value), folder)) if key == "file" and isinstance(value, str) else _moved(value, folder)
+        for key, value in stated.items()
+    }
+
+
+def _copy(path: Path, folder: Path) -> Path:
+    """Copy of a file, and of the scan that it names if it is a card, as they lie to each other."""
+    path = path.absolute()
+    named = _named_by(path)
+    files = [path] if named is None else [path, Path(os.path.normpath(path.parent / named))]
+    root = Path(os.path.commonpath([file.parent for file in files]))
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(f"{file.relative_to(root)}\0".encode())
+        with file.open("rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    there = folder / digest.hexdigest()[:16]
+    for file in files:
+        copy = there / file.relative_to(root)
+        if not copy.exists():
+            with whole_file(copy) as temporary:
+                shutil.copyfile(file, temporary)
+    return there / path.relative_to(root)
+
+
+def _named_by(path: Path) -> str | None:
+    """Relative path of the scan that a surface card names."""
+    if path.suffix.lower() != ".toml":
+        return None
+    try:
+        named = tomllib.loads(path.read_text(encoding="utf-8")).get("file")
+    except (OSError, ValueError):
+        return None  # it is refused where it is opened
+    return named if isinstance(named, str) and not Path(named).is_absolute() else None

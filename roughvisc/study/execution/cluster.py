@@ -1,0 +1,108 @@
+"""Dask clients: of a cluster on this machine, set up for few long tasks, and of a scheduler that runs elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from roughvisc.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: What a worker imports anyway, xarray's look for other kinds of arrays included.
+_PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
+
+
+@contextmanager
+def local_client(processes: int) -> Iterator[Client]:
+    """Client of a cluster on this machine, seen from this machine only."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    settings = {
+        # a case merely queued on a dying worker is not to blame, and is not to die with it
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.scheduler.allowed-failures": 1,
+        "distributed.comm.timeouts.connect": "60s",
+        # one long task a worker: nobody reads its statistical profile, and sampling takes time from it
+        "distributed.worker.profile.enabled": False,
+        # a process that computes for seconds need not wake up fifty times a second to see whether it is awake
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.tick.limit": "60s",
+        "distributed.worker.memory.monitor-interval": "500ms",
+        "distributed.admin.system-monitor.interval": "2s",
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.scheduler.active-memory-manager.start": False,  # cases share no data
+    } | _quick_start()
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=processes,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        client.run(_leave_interrupts_to_the_sweep)
+        yield client
+
+
+def _quick_start() -> dict[str, str]:
+    """Settings with which workers are forked from one process that has imported everything: each saves a second."""
+    if sys.platform != "linux":  # elsewhere a fork is not safe, or there is none
+        return {}
+    import dask
+
+    try:
+        from distributed.utils import get_mp_context
+    except ImportError:  # an older Dask, which settles that when it is imported
+        return {}
+    settings = {"distributed.worker.multiprocessing-method": "forkserver"}
+    with dask.config.set(settings):
+        get_mp_context().set_forkserver_preload(_PRELOADED)  # as Dask asks for it, whose own list would import more
+    return settings
+
+
+@contextmanager
+def connect(address: str | None = None, file: Path | None = None) -> Iterator[Client]:
+    """Client of a scheduler that runs already.
+
+    Parameters
+    ----------
+    address : str, optional
+        As ``tcp://host:8786``.
+    file : path, optional
+        What ``dask scheduler --scheduler-file`` wrote; this or the address is given.
+
+    Raises
+    ------
+    InputError
+        If it does not answer.
+    """
+    from distributed import Client
+
+    if (address is None) == (file is None):
+        raise InputError("found both an address and a file of the scheduler: expected one of them")
+    if file is not None and not file.is_file():
+        raise InputError(f"{file}: does not exist: expected what dask scheduler --scheduler-file wrote")
+    try:
+        where = {"address": address} if file is None else {"scheduler_file": str(file)}
+        client = Client(**where, set_as_default=False, timeout="20s")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
+    with client:
+        yield client
+
+
+def _leave_interrupts_to_the_sweep() -> None:
+    """A terminal's Ctrl-C reaches all its processes: the sweep's own then tells the workers to stop."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

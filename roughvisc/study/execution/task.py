@@ -1,0 +1,157 @@
+"""What a process does for a sweep: bring one case to its file, tell how far it is, stop when asked, survive errors."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy import fft
+
+from roughvisc.errors import InUseError, RoughviscError
+from roughvisc.study.execution.run import run_case, unconverged
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.index import Entry, read_entry
+
+log = logging.getLogger("roughvisc")
+
+Progress = Callable[[float, float], None]
+
+#: How a case ended. ``hindered``: something outside the case was in the way (a full disk, another run that computes
+#: it), so the same command tries again; ``failed`` is what would fail again.
+Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
+#: Seconds between two reports of one case.
+_REPORT_EVERY = 0.5
+
+#: Sweeps whose cases are to stop, in this process.
+_stopped: set[str] = set()
+#: netCDF-4 does not stand two threads, so a process brings one case at a time whatever its number of threads.
+_one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended: small enough to be sent from a worker.
+
+    Attributes
+    ----------
+    key : str
+        Of the case.
+    kind : str
+        How it ended.
+    message : str
+        What to tell the user; empty where all went well.
+    error : str
+        Name of the exception's class, if there was one.
+    trace : str
+        Traceback of an exception that nobody raised on purpose.
+    seconds : float
+        Wall time. [s]
+    entry : Entry or None
+        What an index keeps of the file, if there is one.
+    reused : bool
+        Whether it ended so in an earlier run.
+    """
+
+    key: str
+    kind: Kind
+    message: str = ""
+    error: str = ""
+    trace: str = ""
+    seconds: float = 0.0
+    entry: Entry | None = None
+    reused: bool = False
+
+
+def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bool] | None, threads: int) -> Outcome:
+    """Bring a case to its file and say how that ended; :class:`KeyboardInterrupt` passes through.
+
+    Parameters
+    ----------
+    case : Case
+        What to compute.
+    folder : Path
+        Of the results.
+    progress : callable
+        Called with the time reached and the time at the end. [s]
+    stop : callable, optional
+        Asked at every step.
+    threads : int
+        Of the transforms.
+    """
+    began = time.perf_counter()
+    try:
+        with fft.set_workers(threads):
+            path = run_case(case, folder, progress=progress, stop=stop)
+        outcome = outcome_of(read_entry(path))
+    except RoughviscError as error:
+        kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
+        outcome = Outcome(case.key, kind, str(error), type(error).__name__)
+    except OSError as error:  # a full disk, a folder that went away: not the fault of the case
+        place = f"{error.filename}: " if error.filename else ""
+        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", type(error).__name__)
+    except Exception as error:
+        text = f"{type(error).__name__}: {error}"
+        outcome = Outcome(case.key, "failed", text, type(error).__name__, traceback.format_exc())
+    return replace(outcome, seconds=time.perf_counter() - began)
+
+
+def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
+    """How a case ended whose file is there."""
+    message = unconverged(entry.histories)
+    return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
+
+
+def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:
+    """The task of a worker: :func:`bring`, with progress sent to the scheduler.
+
+    Parameters
+    ----------
+    text : str
+        The case as JSON.
+    key : str
+        What the sweep calls it.
+    folder : str
+        Of the results, absolute.
+    sweep : str
+        Name of the sweep: the topic of the reports, and what :func:`stop_sweep` is told.
+    threads : int or None
+        Of the transforms; None: as many as the worker has.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    last = -np.inf
+
+    def report(now: float, end: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _REPORT_EVERY:
+            last = time.monotonic()
+            worker.log_event(sweep, {"key": key, "now": float(now), "end": float(end)})
+
+    with _one_at_a_time:
+        if sweep in _stopped:
+            return Outcome(key, "interrupted")
+        report(0.0, 0.0)
+        try:
+            case = Case.from_json(text)
+            if case.key != key:
+                there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
+                return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
+            threads = threads or worker.state.nthreads
+            return bring(case, Path(folder), progress=report, stop=lambda: sweep in _stopped, threads=threads)
+        except RoughviscError as error:  # a file that this machine does not have
+            return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
+        except KeyboardInterrupt:  # would take the worker down with it
+            return Outcome(key, "interrupted")
+
+
+def stop_sweep(sweep: str) -> None:
+    """Have the cases of a sweep stop at their next step, in this process."""
+    _stopped.add(sweep)

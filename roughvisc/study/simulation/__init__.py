@@ -1,0 +1,1 @@
+"""One case becomes a Dataset ``(time, x, y)``."""

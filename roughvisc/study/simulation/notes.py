@@ -1,0 +1,114 @@
+"""What a result says of its own limits: left out since nothing asked for it, or beyond what the method promises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.mechanics.hereditary.choice import Engine
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.variables import FIELDS
+
+#: What a result says of a material without instantaneous compliance.
+NO_JUMP = (
+    "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
+    "comes into contact. The approach keeps the tolerance; of pressure, force and work each row states its own error."
+)
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
+#: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
+#: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+LARGEST_SLOPE = 0.3
+#: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
+_AT_ONCE = 0.1
+
+
+def left_out(
+    engine: Engine,
+    boundary: str,
+    method: str,
+    fields: Sequence[str],
+    every_step: bool,
+    window: bool = False,
+    mirrored: bool = False,
+) -> str:
+    """What nothing asks for, and is therefore not modelled, computed or kept."""
+    out = []
+    if engine.note.startswith("no memory"):
+        out.append("history (the material is elastic)")
+    elif engine.memory.acts_on != "pressure" and method == "fast":
+        out.append("convolutions of the past")
+    if boundary == "periodic":
+        out.append("padding")
+    if window:
+        out.append("what lies too deep to be touched")
+    if mirrored:
+        out.append("three quarters of the surface (they are its mirror images)")
+    absent = [name for name in FIELDS if name not in fields]
+    if absent:
+        out.append(f"{' and '.join(absent)} in the file")
+    if not every_step:
+        out.append("steps between kept times in the file")
+    return ", ".join(out)
+
+
+def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
+    """Where the tolerance is not promised, or was not reached; empty if it is."""
+    notes = []
+    at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
+    if at_once == 0:
+        notes.append(NO_JUMP)
+    elif at_once < _AT_ONCE * final:
+        notes.append(
+            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: pressure, and force under a given "
+            "approach, nearly jump in each cell that comes into contact. The approach keeps the tolerance; of "
+            "pressure, force and work each row states its own error."
+        )
+    errors = dataset["stated_error"].values
+    missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
+    if missed.size:
+        fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
+        says = "states" if missed.size == 1 else "state"
+        notes.append(
+            f"{missed.size} of {errors.size} rows {says} an error above the tolerance, {errors[missed].max():.2g} at "
+            f"worst (stated_error).{fixed}"
+        )
+    return " ".join(notes)
+
+
+def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
+    """What to say of a surface that is too steep for small slopes; empty if it is not.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    boundary : {"free", "periodic"}
+        In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
+    approach : float
+        The largest at kept times, from the highest cell. [m]
+    """
+    slope = loaded_slope(height, np.inf if boundary == "periodic" else approach)
+    if not slope > LARGEST_SLOPE:
+        return ""
+    return (
+        f"The rms slope of the loaded surface is {slope:.2g}: the method takes slopes as small, and leaves out what is "
+        f"of the order of its square. Beyond {LARGEST_SLOPE:g} the results are a rough guess."
+    )
+
+
+def loaded_slope(height: xr.DataArray, depth: float) -> float:
+    """Root mean square slope between neighbouring cells of which one lies within a depth [m] of the highest."""
+    values = height.values
+    highest = np.nanmax(values)
+    squares = 0.0
+    for axis, name in enumerate(("x", "y")):
+        if values.shape[axis] == 1:
+            continue
+        first, second = np.delete(values, -1, axis), np.delete(values, 0, axis)
+        loaded = np.fmax(first, second) >= highest - depth
+        steps = (second - first)[loaded & np.isfinite(first) & np.isfinite(second)]
+        side = float(height[name][1] - height[name][0])
+        squares += float(np.mean((steps / side) ** 2)) if steps.size else 0.0
+    return float(np.sqrt(squares))

@@ -1,0 +1,325 @@
+"""From arrays to labels: each kept instant becomes a row of the result Dataset."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
+from roughvisc.mechanics.stepping.scene import Scene, Step
+from roughvisc.study.simulation.mirror import quarter, unfold
+from roughvisc.study.simulation.scene import Ground
+from roughvisc.study.storage.records import RowStore
+from roughvisc.variables import STATUS_MEANINGS, annotate
+
+#: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
+#: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
+PERIMETER_CORRECTION = 0.088
+
+#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance: measured on rows whose
+#: other errors are small (workflows/benchmarks/accuracy.py).
+_INHERITED = 0.02
+#: Part of the contact solver's error that is left in an energy, a sum over steps in which it has either sign: measured
+#: there too.
+_SUMMED = 0.5
+#: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
+_SINGLE = 1e-4
+
+Array = NDArray[np.float64]
+
+
+class Rows:
+    """Kept instants of one march, in order.
+
+    Where the march goes on in a window, or the grid may grow, a row keeps what was in contact and the effective
+    pressure there, from which its fields over the final domain follow: nothing outside ever carried pressure.
+
+    Parameters
+    ----------
+    ground : Ground
+        The surface, which may grow meanwhile.
+    fields : sequence of str
+        Fields to keep.
+    store : RowStore
+        Where the rows are kept; what is in it counts as rows of an earlier part of the march.
+    tolerance : float
+        Of the march: where it leaves room for single precision, what lies beyond a window is computed so.
+    series_error : float
+        Relative error of the series that stands for the material.
+    """
+
+    def __init__(
+        self, ground: Ground, fields: Sequence[str], store: RowStore, tolerance: float, series_error: float = 0.0
+    ) -> None:
+        self._ground = ground
+        self._fields = tuple(fields)
+        self._store = store
+        self._series_error = series_error
+        single = tolerance >= _SINGLE
+        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, single=single))
+        self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
+
+    def __len__(self) -> int:
+        return len(self._store.plain)
+
+    def add(self, step: Step, converged: bool, wall_time: float) -> None:
+        """Take up an accepted step; ``converged``: all of those since the last row."""
+        shown, window = step.shown, self._ground.window
+        contact = shown.pressure > 0
+        touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
+        arrays: dict[str, Array] = {}
+        if window.whole:
+            gap = self._ground.gap + step.displacement
+            self._settle(gap, step.level)
+            gap[contact] = 0.0
+            mean_gap = float(np.nanmean(gap))
+            fields = {"pressure": shown.pressure, "gap": gap, "displacement": step.displacement}
+            arrays = {name: fields[name] for name in self._fields}
+        else:
+            assert step.effective is not None, "a window asks for a memory of pressures"
+            mean_gap = self._mean_gap(window, step.effective, step.level)
+        if step.scene.enlarge is not None and step.effective is not None:
+            arrays |= {"source_pressure": shown.pressure, "source": step.effective}
+        row = {
+            "time": shown.time,
+            "force": shown.force,
+            "approach": shown.approach,
+            **stated(step, self._series_error, touching),
+            "iterations": step.state.iterations,
+            "convolutions": step.state.convolutions,
+            "status": self._status(step, converged, contact),
+            "wall_time": wall_time,
+            "contact_area": touching,
+            "contact_area_corrected": max(touching - _staircase(contact, step.scene), 0.0),
+            "contact_fraction": touching / self._area(),
+            "mean_gap": mean_gap,
+        }
+        grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
+        self._store.append({"row": row, "grid": grid}, _of_their_own(arrays))
+
+    def dataset(self, scene: Scene, method: str) -> xr.Dataset:
+        """All rows, on the final domain; fields in a file are read when they are asked for."""
+        height = self._ground.height
+        rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
+        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        for counter in ("iterations", "convolutions"):
+            columns[counter] = np.diff(columns[counter], prepend=0)
+        stamp = columns.pop("time")
+        variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
+        for name in self._fields:
+            frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
+            variables[name] = (("time", "x", "y"), frames)
+        highest = {"highest": self._ground.highest}
+        variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
+        if "filled" in height.coords:
+            variables["filled"] = (("x", "y"), height["filled"].values)
+        dataset = xr.Dataset(
+            variables,
+            coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values},
+            attrs={
+                "Conventions": "CF-1.11",
+                "boundary": scene.halfspace.boundary,
+                "tolerance": scene.tolerance,
+                "method": method,
+                "history": str(height.attrs.get("history", "")),
+            },
+        )
+        return annotate(dataset)
+
+    def _window(self, index: int) -> Window:
+        """The window of the final domain that a row was solved on."""
+        grid = self._store.plain[index]["grid"]
+        return self._ground.window_at(grid["corner"], grid["shape"])
+
+    def _recounted(self, index: int) -> dict[str, float]:
+        """What is counted over the domain, where that has grown since the row was taken up."""
+        row, grid = (self._store.plain[index][part] for part in ("row", "grid"))
+        if tuple(grid["domain"]) == self._ground.window.domain:
+            return {}
+        source = self._store.arrays(index, "source")["source"]
+        window = self._window(index)
+        if self._ground.present.all():
+            mean_gap = self._mean_gap(window, source, grid["level"])
+        else:
+            gap = np.empty(window.domain)
+            self._fill("gap", index, window, gap)
+            mean_gap = float(np.nanmean(gap))
+        return {"contact_fraction": row["contact_area"] / self._area(), "mean_gap": mean_gap}
+
+    def _mean_gap(self, window: Window, source: Array, level: float) -> float:
+        """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
+        return self._ground.mean_gap + float(np.sum(source * self._mean_influence(window))) - level
+
+    def _frame(self, name: str, index: int, out: Array) -> Array:
+        """A field of a row over the final surface, written to ``out``, which holds zeros."""
+        window = self._window(index)
+        touched = out[window.surface_cells] if name == "pressure" else out  # zeros that stay cost nothing
+        if self._ground.mirrored:
+            self._fill(name, index, window, touched[quarter(touched.shape)])
+            unfold(touched)
+        else:
+            self._fill(name, index, window, touched)
+        return out
+
+    def _fill(self, name: str, index: int, window: Window, out: Array) -> None:
+        """Write a field over the domain, the pressure over the window alone."""
+        if window.whole:
+            out[...] = self._store.arrays(index, name)[name]
+            return
+        arrays = self._store.arrays(index, "source_pressure", "source")
+        if name == "pressure":
+            out[...] = arrays["source_pressure"]
+            return
+        for rows, displacement in self._reach(window).rows(arrays["source"]):
+            if name == "displacement":
+                out[rows] = displacement
+            else:
+                np.add(displacement, self._ground.gap[rows], out=out[rows])
+                self._settle(out[rows], self._store.plain[index]["grid"]["level"], rows)
+        if name == "gap":
+            out[window.cells][arrays["source_pressure"] > 0] = 0.0
+
+    def _settle(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
+        """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
+        gap -= level
+        np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
+        absent = ~self._ground.present[rows]
+        if absent.any():
+            gap[absent] = np.nan
+
+    def _area(self) -> float:
+        """Of the surface. [m2]"""
+        dx, dy = self._ground.spacing
+        return dx * dy * self._ground.height.size
+
+    def _status(self, step: Step, converged: bool, contact: NDArray[np.bool_]) -> int:
+        if not converged:
+            meaning = "not_converged"
+        elif step.shown.force == 0:
+            meaning = "open"
+        elif self._ground.window.whole and contact[self._ground.present].all():
+            meaning = "full_contact"
+        else:
+            meaning = "converged"
+        return STATUS_MEANINGS.index(meaning)
+
+
+def keeps_its_word(step: Step, series_error: float) -> bool:
+    """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
+
+    Where hardly any compliance is there at once, pressure jumps in each cell that enters: nothing is promised of it,
+    and the short steps that lead over such a jump are no rows; nor, under given approach, are those in which a cell
+    has entered, since the force jumps with it.
+    """
+    scene, state = step.scene, step.state
+    if scene.time_step is not None:
+        return True
+    found = stated(step, series_error, 0.0)
+    if not scene.is_soft(scene.program.duration):
+        return not found["stated_error"] > scene.tolerance
+    since = state.now.time - state.began
+    if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
+        return False
+    if step.control == "approach" and _entered(step):
+        return False
+    return not found["approach_error"] > scene.tolerance * state.largest_approach
+
+
+def _entered(step: Step) -> bool:
+    """Whether a cell has come into contact within a step."""
+    before = step.state.before
+    return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))
+
+
+def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
+    """Work and energies of a step, and what is stated of its accuracy.
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    series_error : float
+        Relative error of the series that stands for the material.
+    area : float
+        Counted contact area. [m2]
+
+    Notes
+    -----
+    The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
+    under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
+    the approach. The series' error is one of the largest values so far: what is left after unloading is a
+    difference of such values.
+    """
+    state, unknown, shown = step.state, step.uncertainty, step.shown
+    largest_force, largest_approach = state.largest_force, state.largest_approach
+    solved = step.residual
+    if step.scene.remembers and largest_force > 0:
+        solved += _INHERITED * step.scene.tolerance
+    force = approach = 0.0
+    if step.control == "approach" or not step.given:
+        force = unknown.force + solved * shown.force + series_error * largest_force
+    if step.control == "load" or not step.given:
+        approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
+    pressure = solved
+    if largest_force > 0:
+        pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
+    relative = max(
+        pressure,
+        force / largest_force if largest_force > 0 else 0.0,
+        approach / largest_approach if largest_approach > 0 else 0.0,
+    )
+    carried = _SUMMED * solved + series_error
+    return {
+        "work": step.work,
+        "stored_energy": step.stored,
+        "dissipated_energy": step.dissipated,
+        "stated_error": relative,
+        "time_error": step.time_error,
+        "residual": step.residual,
+        "residual_bound": step.bound,
+        "pressure_error": pressure,
+        "force_error": force,
+        "approach_error": approach,
+        "work_error": unknown.work + carried * abs(step.work),
+        "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
+        "contact_area_lower": max(area - unknown.inside, 0.0),
+        "contact_area_upper": area + unknown.outside,
+    }
+
+
+def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
+    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
+    own: dict[int, Array] = {}
+    for array in arrays.values():
+        if id(array) not in own:
+            own[id(array)] = array if array.base is None else array.copy()
+    return {name: own[id(array)] for name, array in arrays.items()}
+
+
+def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
+    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
+
+    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
+    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
+    """
+    free = ~contact if scene.present is None else scene.present & ~contact
+    # a face across x is dy long and lies in a strip dx wide, and the other way round
+    faces = sum(_faces(np.moveaxis(contact, axis, 0), np.moveaxis(free, axis, 0), scene) for axis in (0, 1))
+    return PERIMETER_CORRECTION * scene.halfspace.cell_area * faces
+
+
+def _faces(contact: NDArray[np.bool_], free: NDArray[np.bool_], scene: Scene) -> int:
+    """Number of faces across the first axis between cells in contact and present cells out of contact."""
+    faces = np.count_nonzero(contact[1:] & free[:-1]) + np.count_nonzero(contact[:-1] & free[1:])
+    mirrored = scene.halfspace.mirrored  # beyond a mirror a cell's neighbour is its image
+    if scene.halfspace.boundary == "periodic" and not mirrored:
+        faces += np.count_nonzero(contact[0] & free[-1]) + np.count_nonzero(contact[-1] & free[0])
+    elif scene.outside < math.inf:  # the surface goes on beyond the window, and nothing touches there
+        faces += np.count_nonzero(contact[-1]) + (0 if mirrored else np.count_nonzero(contact[0]))
+    return int(faces)

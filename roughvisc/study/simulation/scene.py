@@ -1,0 +1,343 @@
+"""From labels to arrays: a surface, a material and a program become the scene that the stepper marches through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
+from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
+from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, Kind, engine_for
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.stepping.control import SMALLEST_STEP
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.simulation.mirror import is_mirrored, quarter
+from roughvisc.study.simulation.representable import check_loads, check_times
+from roughvisc.topography.grid import axis_step
+from roughvisc.topography.indenters import grown, highest
+
+#: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
+GROWTH, MOST_CELLS = 1.5, 4096**2
+#: The window begins so many cells wide, on surfaces whose shorter side has so many.
+_FIRST_EXTENT, _WORTH_FOLLOWING = 32, 96
+#: Cells of the longer side on which the window after a jump at the start is foreseen.
+_FORESEEN_ON = 40
+
+
+class Ground:
+    """The labelled surface under a scene, and the window of it that is solved on.
+
+    Both may grow while the scene is marched through: ``growths`` times so far. The window follows the contact in free
+    space, where only what is pressed matters; elsewhere it is the whole surface.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Profile, peaks up. [m]
+    missing : {"refuse", "absent"}
+        What missing heights mean.
+    follow : bool
+        Whether to begin with a small window, where all of the surface is present.
+    mirror : bool
+        Whether to solve on a quarter of a surface that is its own mirror image in x and in y.
+    """
+
+    def __init__(
+        self,
+        height: xr.DataArray,
+        missing: Literal["refuse", "absent"] = "refuse",
+        *,
+        follow: bool = False,
+        mirror: bool = False,
+    ) -> None:
+        self._missing = missing
+        self.growths = 0
+        height = _checked(height)
+        self.mirrored = mirror and is_mirrored(height.values)
+        self._lay(height)
+        self._extent = float(_FIRST_EXTENT)
+        if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
+            self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
+
+    def _lay(self, height: xr.DataArray) -> None:
+        self.height = height
+        present = np.isfinite(height.values)
+        _check_missing(height, present, self._missing)
+        cells = quarter(height.shape) if self.mirrored else ...
+        #: What is solved for: the surface, or the quarter of it at the end of both axes.
+        self.domain = height[cells]
+        values = self.domain.values
+        self.present: NDArray[np.bool_] = present[cells]
+        #: Height of the highest point, which on an indenter may lie between the cells. [m]
+        self.highest = highest(height)
+        #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
+        self.gap = self.highest - values
+        #: The least of it, which is not zero where the highest point lies between the cells. [m]
+        self.least_gap = float(np.nanmin(self.gap))
+        self.gap[~self.present] = 0.0
+        #: Its mean over the present cells. [m]
+        self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
+        self.spacing = (_side(self.height, "x"), _side(self.height, "y"))
+        self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """Centre of the window's first cell. [m]"""
+        first = self.window.first
+        return float(self.domain["x"].values[first[0]]), float(self.domain["y"].values[first[1]])
+
+    def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
+        """Half-space on the window's grid."""
+        return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored)
+
+    def can_grow(self) -> bool:
+        """Whether the profile is known beyond its grid: its recipe still gives the heights."""
+        return "recipe" in self.height.attrs and grown(self.height, 1.0) is not None
+
+    def enlarge(self, scene: Scene) -> tuple[Scene, tuple[int, int]] | None:
+        """The scene on a larger grid, and the cell of it where the present one begins; None if it cannot grow."""
+        x, y = self.corner
+        if self.window.whole:
+            larger = grown(self.height, GROWTH)
+            if larger is None or larger.size > MOST_CELLS:
+                return None
+            self._lay(_checked(larger))
+        else:
+            self.widen()
+        self.growths += 1
+        first = (self._cell("x", x) - self.window.first[0], self._cell("y", y) - self.window.first[1])
+        halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
+        return replace(scene, halfspace=halfspace, **self.shown()), first
+
+    def widen(self) -> None:
+        """Go on to the next larger window, which is the whole surface in the end."""
+        before = self.window
+        while self.window == before:
+            self._extent *= GROWTH
+            self.window = window_around(self.gap, int(self._extent), self.mirrored)
+
+    def shown(self) -> dict[str, Any]:
+        """What a scene takes from the surface."""
+        return {
+            "gap": np.ascontiguousarray(self.gap[self.window.cells]),
+            "present": None if self.present.all() else self.present,
+            "outside": self.window.outside,
+        }
+
+    def _cell(self, axis: str, position: float) -> int:
+        """Index in the domain of the cell at a position. [m]"""
+        return int(np.searchsorted(self.domain[axis].values, position))
+
+    def window_at(self, corner: Sequence[float], shape: Sequence[int]) -> Window:
+        """A window of the present domain that was solved on before: its first cell's centre and its shape."""
+        first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
+        return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
+
+
+def follows(boundary: str, edge: str, method: str) -> bool:
+    """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
+    return boundary == "free" and edge == "error" and method == "fast"
+
+
+def prepare(
+    ground: Ground,
+    material: Material,
+    program: Program,
+    *,
+    boundary: Boundary,
+    tolerance: float,
+    time_step: float | Literal["auto"],
+    times: int | Sequence[float] | None,
+    edge: Literal["error", "accept"],
+    memory: Kind = "auto",
+) -> tuple[Scene, Engine]:
+    """Scene of a case and what models its material; see :func:`roughvisc.simulate` for the parameters.
+
+    Raises
+    ------
+    InputError
+        If any of it is wrong; nothing has been computed then.
+    """
+    if edge not in ("error", "accept"):
+        raise InputError(f"edge is {edge!r}: expected 'error' or 'accept'")
+    if not (isinstance(tolerance, int | float) and 0 < tolerance < 1):
+        raise InputError(f"tolerance is {tolerance!r}: expected a number between 0 and 1")
+    if time_step != "auto" and not (isinstance(time_step, int | float) and 0 < time_step < math.inf):
+        raise InputError(f"time_step is {time_step!r}: expected 'auto' or a positive number [s]")
+    if not program.segments:
+        raise InputError("the program is empty: expected at least one segment")
+    check_times(program, time_step)
+    if not hasattr(material, "mean_contact_compliance"):
+        raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
+    check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
+    if boundary == "periodic" and ground.present.all():
+        _check_approach(program, ground.mean_gap)
+    foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
+    while ground.window.outside <= foreseen:
+        ground.widen()
+    grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
+    kept = kept_times(program, times)
+    acts_on: Literal["pressure", "displacement"] = "pressure" if grows else "displacement"
+    engine = engine_for(material, program.duration, tolerance, acts_on, memory, shortest_age(program, kept, tolerance))
+    scene = Scene(
+        halfspace=ground.halfspace(boundary),
+        material=engine.material,
+        memory=engine.memory,
+        program=program,
+        times=kept,
+        tolerance=float(tolerance),
+        time_step=None if time_step == "auto" else float(time_step),
+        accept_edge=edge == "accept",
+        enlarge=ground.enlarge if grows else None,
+        **ground.shown(),
+    )
+    return scene, engine
+
+
+def _foreseen(ground: Ground, program: Program, material: Material) -> float:
+    """About the approach right after a jump at the start, from every so-many-eth cell; zero if there is none. [m]"""
+    segment, glassy = program.segments[0], float(material.contact_compliance(0.0))
+    value = segment.end or 0.0
+    if segment.duration > 0 or value <= 0 or glassy <= 0:
+        return 0.0
+    if segment.control == "approach":
+        return value
+    stride = math.ceil(max(ground.height.shape) / _FORESEEN_ON)
+    gap = ground.gap[::stride, ::stride]
+    dx, dy = (stride * side for side in ground.spacing)
+    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=ground.mirrored)
+    load = value * glassy / halfspace.cell_area
+    return solve_contact(halfspace, gap, load=load, tolerance=1e-2, max_iterations=50).approach
+
+
+def _checked(height: xr.DataArray) -> xr.DataArray:
+    if not isinstance(height, xr.DataArray) or height.dims != ("x", "y"):
+        found = getattr(height, "dims", type(height).__name__)
+        raise InputError(f"height is {found}: expected a DataArray with dimensions ('x', 'y')")
+    if 0 in height.shape:
+        raise InputError(f"height has {height.shape[0]} x {height.shape[1]} cells: expected at least one each way")
+    height = height.astype(float, copy=False)
+    for axis in ("x", "y"):
+        _side(height, axis)
+    if np.isinf(height.values).any():
+        raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
+    return height
+
+
+def _side(height: xr.DataArray, axis: str) -> float:
+    """Side of the cells along one axis, [m]; a single cell begins at zero."""
+    if height.sizes[axis] > 1:
+        return axis_step(height, axis, "height")
+    centre = float(height[axis].values[0]) if axis in height.coords else math.nan
+    if not 0 < centre < math.inf:
+        raise InputError(f"height: the only cell along {axis!r} is centred at {centre:g} m: expected half its side")
+    return 2 * centre
+
+
+def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:
+    if missing not in ("refuse", "absent"):
+        raise InputError(f"missing is {missing!r}: expected 'refuse' or 'absent'")
+    if not present.any():
+        raise InputError("height is missing everywhere: expected at least one finite height")
+    absent = missing == "absent" or height.attrs.get("missing") == "absent"
+    if not present.all() and not absent:
+        row, column = np.argwhere(~present)[0]
+        raise InputError(
+            f"height is missing at {np.count_nonzero(~present)} of {present.size} points, the first at cell "
+            f"({row}, {column}): fill it (fill = true in a study, rv.fill in Python), or say missing='absent' "
+            "if there is no material"
+        )
+
+
+def _check_approach(program: Program, full: float) -> None:
+    """Refuse an approach beyond the one of full contact, which has none: pressure may rise without limit there.
+
+    Where cells are absent the half-space bulges into them, and every approach has its force.
+    """
+    for i, segment in enumerate(program.segments):
+        largest = (segment.end or 0.0) + abs(segment.amplitude)
+        if segment.control == "approach" and segment.end is not None and largest >= full:
+            raise InputError(
+                f"program.{i}: approach goes to {largest:.6g} m, and with periodic boundaries contact is full at "
+                f"{full:.6g} m: expected less"
+            )
+
+
+def shortest_age(program: Program, kept: Sequence[float] | None, tolerance: float) -> float:
+    """Shortest age, beside zero, at which the compliance matters to what is kept. [s]
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    kept : sequence of float or None
+        Kept times, None for every accepted step. [s]
+    tolerance : float
+        Relative error that is allowed.
+
+    Returns
+    -------
+    float
+        Zero for a program of jumps alone.
+
+    Notes
+    -----
+    What is kept soonest after a corner of the program resolves the shortest interval. Pressure that came in the last
+    part ``f`` of an interval ``h`` is all that meets ages below ``f h``. What a compliance that ascends from the right
+    value at age zero can be wrong by there is the creep till then: for the whole interval less than ``f`` of
+    ``C(h)``. With a tenth of the tolerance for ``f`` that is as much as the error beyond may be. Steps below a
+    millionth of a segment are not taken, so that ``f`` need not be less.
+    """
+    spans = [min(segment.duration, segment.period) for segment in program.segments if segment.duration > 0]
+    if not spans:
+        return 0.0
+    if kept is None:
+        return SMALLEST_STEP * min(spans)
+    times = np.array(sorted(kept))
+    after = [times[times > corner][:1] - corner for corner in program.corners]
+    return float(min([*spans, *np.concatenate(after)])) * max(SERIES_SHARE * tolerance, SMALLEST_STEP)
+
+
+def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Times to keep, ascending, snapped to the program's corners. [s]
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    times : int, sequence of float or None
+        A count, evenly from 0+ to the end; a list; None for every accepted step.
+
+    Raises
+    ------
+    InputError
+        If a time lies outside the program, or the count is not positive.
+    """
+    if times is None:
+        return None
+    duration = program.duration
+    if isinstance(times, int | np.integer):
+        if times < 1:
+            raise InputError(f"times is {times}: expected a positive count, a list, or None")
+        listed = np.linspace(0, duration, times) if times > 1 else np.array([duration])
+    else:
+        listed = np.unique(np.asarray(times, dtype=float))
+    corners = np.array(program.corners)
+    kept = []
+    for value in listed:
+        nearest = float(corners[np.argmin(np.abs(corners - value))])
+        snapped = nearest if abs(nearest - value) <= 1e-12 * duration else float(value)
+        if not 0 <= snapped <= duration:
+            raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
+        kept.append(snapped)
+    return tuple(kept)

@@ -1,0 +1,1 @@
+"""What is asked: study files, their schema, cases and what identifies them."""

@@ -1,0 +1,245 @@
+"""Cases: one simulation, stated whole; read from study files, varied, and known by what determines its numbers."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.identity import case_key, surface_content
+from roughvisc.study.statement.problems import Problems, in_sweep, line, report
+from roughvisc.study.statement.schema import Study, study_schema
+from roughvisc.study.statement.variation import expand, place
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from roughvisc.mechanics.materials.models import Material
+    from roughvisc.mechanics.stepping.program import Program
+
+__all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One simulation: a surface, a material, a program, and how it is computed.
+
+    Made by :func:`read_study`, :func:`read_cases` or :meth:`from_json`, which check it; changed by :func:`vary`.
+
+    Parameters
+    ----------
+    settings : Study
+        The tables of the study file, checked, in SI.
+    origin : Path or None
+        The study file that it came from.
+    varied : mapping
+        What a sweep set for this case: dotted key -> value in SI.
+    """
+
+    settings: Study
+    origin: Path | None = None
+    varied: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """Title of the study."""
+        return self.settings.title
+
+    @cached_property
+    def key(self) -> str:
+        """Sixteen hexadecimal digits that stand for all that determines the numbers, and for nothing else."""
+        return case_key(self.settings)
+
+    @cached_property
+    def surface_sha256(self) -> str:
+        """SHA-256 of the scan's file; of a generated surface: of its recipe."""
+        return surface_content(self.settings.surface)[0]
+
+    def height(self) -> xr.DataArray:
+        """Heights of the surface as conditioned, peaks up. [m]
+
+        Raises
+        ------
+        InputError
+            If the scan cannot be read, or its conditioning or its recipe is impossible.
+        """
+        try:
+            return self.settings.surface.height()
+        except InputError as error:
+            raise InputError(line(self.origin, "surface", str(error))) from error
+
+    def material(self) -> Material:
+        """The material."""
+        return self.settings.material.build()
+
+    def program(self) -> Program:
+        """The loading program."""
+        return self.settings.loading()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # the classes of the tables are made at run time, so a case travels to another process as its text
+        return Case.from_json, (self.to_json(),)
+
+    def to_json(self) -> str:
+        """The case as JSON, whole: :meth:`from_json` gives it back, with the same key."""
+        stated = _stated(self.settings)
+        if self.varied:
+            stated["varied"] = dict(self.varied)
+        if self.origin is not None:
+            stated["origin"] = str(self.origin.absolute())
+        return json.dumps(stated)
+
+    @classmethod
+    def from_json(cls, text: str) -> Case:
+        """A case from :meth:`to_json`, as the attribute ``case`` of a result holds it."""
+        try:
+            data = json.loads(text)
+            if not isinstance(data, dict):
+                raise InputError("found no JSON object")
+        except ValueError as error:
+            raise InputError(f"not a case written by to_json: {error}") from error
+        origin, varied = data.pop("origin", None), data.pop("varied", {})
+        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied)
+
+
+def read_study(path: str | Path) -> Case:
+    """The case that a study file states.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file; files that it names are sought relative to it.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or anything in it is unknown, missing, impossible or in a wrong unit (all
+        problems are named, one a line), or if it holds a sweep: see :func:`read_cases`.
+    """
+    cases = read_cases(path)
+    if len(cases) > 1 or cases[0].varied:
+        raise InputError(f"{path}: sweep: found {len(cases)} cases: expected one; read_cases() reads them all")
+    return cases[0]
+
+
+def read_cases(path: str | Path) -> list[Case]:
+    """All the cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
+
+    A table ``[[sweep]]`` holds lists of one length, taken together entry by entry; several tables follow each other.
+    Without a sweep there is one case.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file; files that it names are sought relative to it.
+
+    Returns
+    -------
+    list of Case
+        In the order of the lists, the last key varying fastest.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_study` does, for any of the cases.
+    """
+    path = Path(path)
+    data = _toml(path)
+    sweep = data.pop("sweep", {})
+    changes = expand(sweep, lambda key, found: InputError(line(path, key, found)))
+    cases: list[Case] = []
+    problems: dict[str, list[int]] = {}
+    for number, change in enumerate(changes):
+        try:
+            cases.append(_varied(data, change, path, path))
+        except Problems as error:
+            for problem in error.lines:
+                problems.setdefault(problem, []).append(number)
+    if problems:
+        raise InputError(report(path, [in_sweep(problem, where, changes) for problem, where in problems.items()]))
+    return cases
+
+
+def vary(case: Case, changes: Mapping[str, Any]) -> Case:
+    """A case with some of its values changed.
+
+    Parameters
+    ----------
+    case : Case
+    changes : mapping
+        Dotted key -> value as a study file would have it: ``{"program.0.load": "2 N", "solve.tolerance": 1e-4}``.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        If a key does not exist or a value is refused.
+    """
+    data = json.loads(case.to_json())
+    data.pop("origin", None)
+    data.pop("varied", None)
+    try:
+        changed = _varied(data, changes, case.origin, None)
+    except Problems as error:
+        raise InputError(report(case.origin, error.lines)) from error
+    return Case(changed.settings, changed.origin, {**case.varied, **changed.varied})
+
+
+def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, reading: Path | None) -> Case:
+    for key, value in changes.items():
+        try:
+            data = place(data, key, value)
+        except InputError as error:
+            raise Problems([f"{key}: {error}"]) from error
+    settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
+    stated = _stated(settings)
+    return Case(settings, origin, {key: _at(stated, key, value) for key, value in changes.items()})
+
+
+def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> Study:
+    try:
+        return Study.model_validate(data, context={"folder": folder})
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
+        raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist: expected a study file (TOML)") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no valid TOML: {error}") from error
+
+
+def _stated(settings: Study) -> dict[str, Any]:
+    return settings.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
+
+
+def _at(stated: Any, key: str, otherwise: Any) -> Any:
+    """Value at a dotted key, in SI as the checked study has it."""
+    for part in key.split("."):
+        if isinstance(stated, list):
+            stated = stated[int(part)]
+        elif part in stated:
+            stated = stated[part]
+        else:
+            return otherwise
+    return stated

@@ -1,0 +1,106 @@
+"""What determines the numbers of a case, and its digest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.study.statement.schema import Study
+from roughvisc.study.statement.schema.surface import FileSurface, SurfaceSection
+from roughvisc.topography.readers import sha256
+
+#: Raised by whoever changes the numbers that an unchanged case gives.
+NUMERICS_REVISION = 5
+
+#: Keys of ``[solve]`` that came later, with the value that changes nothing: it leaves a case's key as it was.
+_SINCE_ADDED = {"memory": "auto", "grid_error": False}
+#: Keys of a surface card that say whence it came and change no height.
+_PROSE = {
+    "title",
+    "name",
+    "description",
+    "comment",
+    "licence",
+    "license",
+    "source",
+    "instrument",
+    "sha256",
+    "synthetic",
+}
+
+
+def case_key(settings: Study) -> str:
+    """Digest of all that determines the numbers: sixteen hexadecimal digits.
+
+    The surface counts by the content of its file and not by its path, as do tables of a material; the program by
+    its segments and not by how they were written, and no title counts.
+    """
+    stated = settings.model_dump(
+        mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
+    )
+    for name, usual in _SINCE_ADDED.items():
+        if stated["solve"][name] == usual:
+            del stated["solve"][name]
+    stated["program"] = [
+        [segment.control, segment.duration, segment.end, segment.amplitude, segment.period]
+        for segment in settings.loading().segments
+    ]
+    stated["material"] = settings.material.content()
+    stated["surface"] = surface_content(settings.surface)
+    stated["numerics"] = [NUMERICS_REVISION, transform_engine().split()[0]]
+    return _digest(stated)[:16]
+
+
+def surface_content(surface: SurfaceSection) -> tuple[str, dict[str, Any]]:
+    """Digest of what the surface is made of, and what is done to it.
+
+    Returns
+    -------
+    sha256 : str
+        Of the scan's file; for a card, of the file that it names; for a recipe, of the recipe.
+    treatment : dict
+        The conditioning, of the card too.
+    """
+    stated = surface.model_dump(mode="json", serialize_as_any=True)
+    if not isinstance(surface, FileSurface):
+        treatment = {key: stated.pop(key) for key in SurfaceSection.model_fields}
+        return _digest(stated), treatment
+    path = Path(stated.pop("file"))
+    if path.suffix.lower() != ".toml":
+        return _checksum(path), stated
+    try:
+        card = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no surface card in TOML: {error}") from error
+    stated["card"] = {key: value for key, value in card.items() if key not in _PROSE and key != "file"}
+    if isinstance(card.get("file"), str):
+        return _checksum(path.parent / card["file"]), stated
+    return _digest(stated["card"]), stated
+
+
+def _checksum(path: Path) -> str:
+    try:
+        return sha256(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a scan file") from error
+
+
+def _digest(stated: Any) -> str:
+    """SHA-256 of nested values, the same wherever they are equal to 15 significant digits."""
+    text = json.dumps(_rounded(stated), sort_keys=True, separators=(",", ":"), default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return f"{value + 0.0:.15g}"
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(entry) for entry in value]
+    return value

@@ -1,0 +1,251 @@
+"""``[material]``: the models by name, what each is built by, and the kind of each of its keys."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationInfo, WrapValidator, create_model, model_validator
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials import models as materials
+from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
+from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, optional, shown
+from roughvisc.study.statement.schema.section import Section, nearest, refuse
+
+MODULUS = measured("Pa", above=0)
+COMPLIANCE = measured("1/Pa", least=0)
+VISCOSITY = measured("Pa s", above=0)
+TIMES = listed(measured("s", above=0), "times [s]")
+INSTANTS = listed(measured("s", least=0), "times [s]")
+POISSON = measured("1", above=-1, most=0.5)
+
+#: a behaviour in volume: one or the other
+_VOLUME = {"poisson": POISSON, "bulk_modulus": MODULUS}
+_KIND = choice("shear", "tensile")
+
+#: name of a model -> what builds it, and the kind of each of its keys; the constructor's defaults hold here too
+MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
+    "elastic": (materials.elastic, {"shear_modulus": MODULUS, **_VOLUME}),
+    "maxwell": (materials.maxwell, {"shear_modulus": MODULUS, "viscosity": VISCOSITY, **_VOLUME}),
+    "kelvin_voigt": (materials.kelvin_voigt, {"shear_modulus": MODULUS, "viscosity": VISCOSITY, **_VOLUME}),
+    "zener": (
+        materials.zener,
+        {"shear_modulus": MODULUS, "kelvin_modulus": MODULUS, "kelvin_viscosity": VISCOSITY, **_VOLUME},
+    ),
+    "from_relaxation": (
+        materials.from_relaxation,
+        {
+            "equilibrium": measured("Pa", least=0),
+            "moduli": listed(MODULUS, "moduli [Pa]"),
+            "times": TIMES,
+            **_VOLUME,
+        },
+    ),
+    "prony": (
+        materials.Prony,
+        {
+            "glassy": COMPLIANCE,
+            "fluidity": measured("1/(Pa s)", least=0),
+            "compliances": listed(COMPLIANCE, "compliances [1/Pa]"),
+            "times": TIMES,
+            "poisson": POISSON,
+        },
+    ),
+    "power_law": (
+        materials.PowerLaw,
+        {
+            "glassy": COMPLIANCE,
+            "coefficient": measured("1/Pa", above=0),
+            "exponent": measured("1", above=0, below=1),
+            "time_scale": measured("s", above=0),
+            "poisson": POISSON,
+        },
+    ),
+    "tabulated": (
+        materials.from_creep_table,
+        {
+            "times": INSTANTS,
+            "compliances": listed(COMPLIANCE, "compliances [1/Pa]"),
+            "kind": _KIND,
+            "noise": measured("1", least=0, below=1),
+            "poisson": POISSON,
+        },
+    ),
+    "relaxation_table": (
+        materials.from_relaxation_table,
+        {"times": INSTANTS, "moduli": listed(MODULUS, "moduli [Pa]"), "kind": _KIND, "poisson": POISSON},
+    ),
+    "dynamic": (
+        materials.from_dynamic,
+        {
+            "frequencies": listed(measured("1", above=0), "frequencies [frequency_unit]"),
+            "storage": listed(measured("Pa", least=0), "storage moduli [Pa]"),
+            "loss": listed(measured("Pa", least=0), "loss moduli [Pa]"),
+            "frequency_unit": choice(*FREQUENCY_UNITS),
+            "shift_factors": listed(measured("1", above=0), "shift factors"),
+            "kind": _KIND,
+            "poisson": POISSON,
+        },
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a CSV file that a model may be read from.
+
+    Attributes
+    ----------
+    name, unit : str
+        As in the heading, and in SI.
+    unit_key : str
+        Key that says the column's unit where the heading does not.
+    optional : bool
+        Whether the file need not have it.
+    """
+
+    name: str
+    unit: str
+    unit_key: str
+    optional: bool = False
+
+
+#: model -> its keys that the columns of ``file`` may stand for
+COLUMNS: dict[str, dict[str, Column]] = {
+    "tabulated": {
+        "times": Column("time", "s", "time_unit"),
+        "compliances": Column("compliance", "1/Pa", "compliance_unit"),
+    },
+    "relaxation_table": {
+        "times": Column("time", "s", "time_unit"),
+        "moduli": Column("modulus", "Pa", "modulus_unit"),
+    },
+    "dynamic": {
+        "frequencies": Column("frequency", "", "frequency_unit"),
+        "storage": Column("storage", "Pa", "modulus_unit"),
+        "loss": Column("loss", "Pa", "modulus_unit"),
+        "shift_factors": Column("shift_factor", "1", "", optional=True),
+    },
+}
+
+
+class MaterialSection(Section):
+    """One material by the name of its model; each model has a class of its own, made from :data:`MODELS`."""
+
+    model: str
+
+    def build(self) -> materials.Material:
+        """The material itself."""
+        constructor, kinds = MODELS[self.model]
+        stated = {key: getattr(self, key) for key in kinds}
+        return constructor(
+            **{
+                key: value.build() if isinstance(value, MaterialSection) else value
+                for key, value in stated.items()
+                if value is not None
+            }
+        )
+
+    def content(self) -> dict[str, Any]:
+        """All that determines the material, the same however it was stated."""
+        kinds = MODELS[self.model][1]
+        stated: dict[str, Any] = {"model": self.model}
+        for key in kinds:
+            value = getattr(self, key)
+            if value is not None:
+                stated[key] = value.content() if isinstance(value, MaterialSection) else value
+        if "bulk_modulus" in kinds and "bulk_modulus" not in stated:
+            stated.setdefault("poisson", 0.5)
+        return stated
+
+    @model_validator(mode="after")
+    def _builds(self) -> MaterialSection:
+        self.build()
+        return self
+
+
+def _section(name: str) -> type[MaterialSection]:
+    constructor, kinds = MODELS[name]
+    parameters, columns = inspect.signature(constructor).parameters, COLUMNS.get(name, {})
+    fields: dict[str, Any] = {}
+    for key, kind in kinds.items():
+        default = parameters[key].default
+        if key in columns:
+            default = None  # missing with a file, and asked for by _with_columns without one
+        elif default is inspect.Parameter.empty:
+            default = ...
+        fields[key] = (optional(kind) if default is None else kind, default)
+    if columns:
+        fields["file"] = (optional(FilePath), None)
+        keys = {column.unit_key for column in columns.values()} - {"", *kinds}
+        fields |= {key: (optional(Text), None) for key in sorted(keys)}
+    return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
+
+
+def _with_columns(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+    """The table with the columns of its ``file`` in the file's place, so that a case is whole in itself."""
+    columns = COLUMNS.get(str(data["model"]), {})
+    needed = [key for key, column in columns.items() if not column.optional]
+    units = sorted({column.unit_key for column in columns.values()} - {"", *MODELS[data["model"]][1]})
+    if "file" not in data or not columns:
+        for key in (key for key in needed if key not in data):
+            raise refuse(key, f"missing: expected file, or {' and '.join(needed)}")
+        for key in (key for key in units if key in data):
+            raise refuse(key, "found without a file: expected units where the values are")
+        return data
+    for key in (key for key in columns if key in data):
+        raise refuse("file", f"found beside {key}: expected one of them")
+    for key in (key for key in units if not isinstance(data.get(key, ""), str)):
+        raise refuse(key, f"found {shown(data[key])}: expected a unit")
+    if data["model"] == "dynamic" and data.get("frequency_unit") not in FREQUENCY_UNITS:
+        found = f"found {shown(data['frequency_unit'])}" if "frequency_unit" in data else "missing"
+        raise refuse("frequency_unit", f"{found}: expected {' or '.join(map(repr, FREQUENCY_UNITS))}")
+    try:
+        read = read_columns(
+            located(data["file"], info),
+            {column.name: column.unit or data["frequency_unit"] for column in columns.values()},
+            {column.name: data[column.unit_key] for column in columns.values() if column.unit_key in data},
+            [column.name for column in columns.values() if column.optional],
+        )
+    except InputError as error:
+        raise refuse("file", str(error)) from error
+    kept = {key: value for key, value in data.items() if key not in (*units, "file")}
+    return kept | {key: values for key, values in zip(columns, read, strict=True) if values}
+
+
+def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, ValidationInfo], Any]:
+    def pick(data: Any, _: Any, info: ValidationInfo) -> Any:
+        """The table as the class of the model that it names."""
+        if isinstance(data, MaterialSection):
+            return data
+        if not isinstance(data, dict):
+            raise InputError(f"found {shown(data)}: expected a table with a model")
+        if "model" not in data:
+            raise refuse("model", f"missing: expected one of {', '.join(sections)}")
+        name = data["model"]
+        if not isinstance(name, str) or name not in sections:
+            raise refuse("model", f"found {shown(name)}, which is no known model{nearest(name, sections)}")
+        return sections[name].model_validate(_with_columns(data, info), context=info.context)
+
+    return pick
+
+
+SECTIONS = {name: _section(name) for name in MODELS}
+
+#: one of two bodies: any model but a pair
+_BODY = Annotated[
+    reduce(or_, SECTIONS.values()), WrapValidator(_picker(dict(SECTIONS))), Field(description="a table with a model")
+]
+MODELS["pair"] = (materials.pair, {"a": _BODY, "b": _BODY})
+SECTIONS["pair"] = _section("pair")
+
+AnyMaterial = Annotated[
+    reduce(or_, SECTIONS.values()),
+    WrapValidator(_picker(SECTIONS)),
+    Field(description="a [material] table with a model"),
+]

@@ -1,0 +1,87 @@
+"""``[solve]`` and ``[keep]``: how it is computed, and what is kept of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, shown, whole
+from roughvisc.study.statement.schema.section import Section, nearest
+from roughvisc.variables import FIELDS
+
+_STEP = measured("s", above=0)
+_INSTANT = measured("s", least=0)
+_STEP_WANTED = "'auto', or a time in s above 0"
+_TIMES_WANTED = "'all', a count, or a list of times in s"
+
+
+def _checked(kind: Any, value: Any) -> Any:
+    """The value as the check of a kind leaves it."""
+    return kind.__metadata__[0].func(value)
+
+
+def _step(value: Any) -> Any:
+    if value == "auto":
+        return value
+    try:
+        return _checked(_STEP, value)
+    except InputError:
+        raise InputError(f"found {shown(value)}: expected {_STEP_WANTED}") from None
+
+
+def _times(value: Any) -> Any:
+    if value == "all":
+        return value
+    if isinstance(value, int) and not isinstance(value, bool):
+        return _checked(whole(1), value)
+    instants = a_list(value, _TIMES_WANTED)
+    if not instants:
+        raise InputError(f"found an empty list: expected {_TIMES_WANTED}")
+    return tuple(sorted({_checked(_INSTANT, instant) for instant in instants}))
+
+
+def _fields(value: Any) -> Any:
+    wanted = f"a list of fields out of {', '.join(FIELDS)}"
+    names = a_list(value, wanted)
+    for name in names:
+        if name not in FIELDS:
+            raise InputError(f"found {shown(name)}, which is no field{nearest(name, FIELDS)}")
+    return tuple(name for name in FIELDS if name in names)
+
+
+class SolveSection(Section):
+    """How it is computed."""
+
+    boundary: choice("free", "periodic") = "free"
+    tolerance: measured("1", above=0, below=1) = 1e-3
+    time_step: Annotated[
+        Any,
+        BeforeValidator(_step),
+        WithJsonSchema({"type": ["number", "string"]}),
+        Field(description=_STEP_WANTED),
+    ] = "auto"
+    method: choice("fast", "seed") = "fast"
+    edge: choice("error", "accept") = "error"
+    memory: choice("auto", "direct") = "auto"
+    grid_error: Flag = False
+
+
+class KeepSection(Section):
+    """What is kept of it."""
+
+    fields: Annotated[
+        tuple[str, ...],
+        BeforeValidator(_fields),
+        WithJsonSchema({"type": "array", "items": {"enum": list(FIELDS)}}),
+        Field(description=f"a list of fields out of {', '.join(FIELDS)}"),
+    ] = ("pressure", "gap")
+    times: Annotated[
+        Any,
+        BeforeValidator(_times),
+        WithJsonSchema({"type": ["integer", "array", "string"], "items": {"type": ["number", "string"]}}),
+        Field(description=_TIMES_WANTED),
+    ] = "all"
+    # relative, of the fields in the file; none: exact
+    precision: measured("1", above=0, below=1) | None = None

@@ -1,0 +1,117 @@
+"""``[surface]``: an instrument file, a surface card or a recipe, and what is done to its heights."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field, WrapValidator, create_model
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, either
+from roughvisc.study.statement.schema.entries import FilePath, Flag, Text, measured, optional, paired, shown, whole
+from roughvisc.study.statement.schema.section import close, nearest, refuse
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PURE = measured("1", above=0)
+#: One cell along an axis is a strip; self-affine roughness needs waves both ways.
+_GRID = {"size": (SIZE, ...), "shape": (paired(whole(1), "a whole number of cells"), ...)}
+
+#: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
+RECIPES: dict[str, dict[str, Any]] = {
+    "sphere": {"radius": (LENGTH, ...), **_GRID, "exact": (Flag, False)},
+    "cone": {"slope": (PURE, ...), **_GRID},
+    "flat_punch": {"radius": (LENGTH, ...), **_GRID},
+    "wavy": {"amplitude": (LENGTH, ...), "wavelength": (LENGTH, ...), **_GRID, "waves": (whole(1, 2), 2)},
+    "self_affine": {
+        **_GRID,
+        "shape": (SHAPE, ...),
+        "hurst": (measured("1", above=0, most=1), ...),
+        "rms_slope": (optional(PURE), None),
+        "rms_height": (optional(LENGTH), None),
+        "rolloff": (optional(LENGTH), None),
+        "shortcut": (optional(LENGTH), None),
+        "anisotropy": (PURE, 1.0),
+        "seed": (whole(0), ...),
+    },
+}
+
+
+_CHANNEL = "the name or the number of a channel"
+
+
+def _channel(value: Any) -> Any:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, str | int)):
+        raise InputError(f"found {shown(value)}: expected {_CHANNEL}")
+    return value
+
+
+class SurfaceSection(Conditioned):
+    """A surface, and what is done to its heights."""
+
+    def raw(self) -> xr.DataArray:
+        """The heights as read or made. [m]"""
+        raise NotImplementedError
+
+    def height(self) -> xr.DataArray:
+        """The heights as conditioned, peaks up. [m]"""
+        return self.conditioned(self.raw())
+
+
+class FileSurface(SurfaceSection):
+    """An instrument file or a surface card."""
+
+    file: FilePath
+    format: optional(Text) = None
+    channel: either(_channel, ["string", "integer"], _CHANNEL) = None
+    unit: optional(Text) = None
+    spacing: optional(SIZE) = None
+
+    def raw(self) -> xr.DataArray:
+        from roughvisc.topography.readers import open_scan
+
+        return open_scan(self.file, format=self.format, channel=self.channel, unit=self.unit, spacing=self.spacing)
+
+
+class RecipeSurface(SurfaceSection):
+    """A surface made by a recipe; each recipe has a class of its own, made from :data:`RECIPES`."""
+
+    generate: str
+
+    def raw(self) -> xr.DataArray:
+        from roughvisc.topography import synthesis
+
+        return getattr(synthesis, self.generate)(**{key: getattr(self, key) for key in RECIPES[self.generate]})
+
+
+GENERATED = {
+    name: create_model(name, __base__=RecipeSurface, generate=(Literal[name], ...), **keys)
+    for name, keys in RECIPES.items()
+}
+
+
+def _pick(data: Any, _: Any, info: Any) -> Any:
+    """The table as the class of the surface that it is."""
+    if isinstance(data, SurfaceSection):
+        return data
+    if not isinstance(data, dict):
+        raise InputError(f"found {shown(data)}: expected a table with a file, or with generate")
+    if ("file" in data) == ("generate" in data):
+        hints = [close(key, ("file", "generate")) for key in data if key not in ("file", "generate")]
+        raise InputError(f"found {shown(data)}: expected either file or generate{next(filter(None, hints), '')}")
+    if "file" in data:
+        return FileSurface.model_validate(data, context=info.context)
+    recipe = data["generate"]
+    if recipe not in GENERATED:
+        raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, GENERATED)}")
+    return GENERATED[recipe].model_validate(data, context=info.context)
+
+
+AnySurface = Annotated[
+    reduce(or_, (FileSurface, *GENERATED.values())),
+    WrapValidator(_pick),
+    Field(description="a [surface] table with a file, or with generate"),
+]

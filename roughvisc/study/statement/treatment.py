@@ -1,0 +1,71 @@
+"""What was done to a surface between its scan and its contact, found out from a result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import Case
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """A surface before and after.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        What the result's history says of the surface, in order.
+    before : xarray.DataArray or None
+        Heights as measured or made; None where they cannot be had again. [m]
+    after : xarray.DataArray
+        Heights as they were pressed. [m]
+    """
+
+    steps: tuple[str, ...]
+    before: xr.DataArray | None
+    after: xr.DataArray
+
+
+def treatment(dataset: xr.Dataset) -> Treatment:
+    """Treatment of the surface of a result.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result, with ``height``. Its scan is opened again if it is where it was, and unchanged.
+    """
+    lines = str(dataset.attrs.get("history", "")).splitlines()
+    steps = tuple(line for line in lines if line and ": run of " not in line)
+    return Treatment(steps, _measured(dataset), dataset["height"].load())
+
+
+def measures(height: xr.DataArray) -> xr.Dataset:
+    """Areal parameters of heights less their mean plane; see :func:`roughvisc.parameters`."""
+    from roughvisc.topography.conditioning import level
+    from roughvisc.topography.parameters import parameters
+
+    return parameters(level(height))
+
+
+def _measured(dataset: xr.Dataset) -> xr.DataArray | None:
+    """Heights before any conditioning, if what they come from still has the checksum of the result."""
+    if "case" not in dataset.attrs:
+        return None
+    try:
+        case = Case.from_json(dataset.attrs["case"])
+        if case.surface_sha256 != dataset.attrs.get("surface_sha256"):
+            return None
+        surface = case.settings.surface
+        path = getattr(surface, "file", None)
+        if path is not None and str(path).lower().endswith(".toml"):
+            from roughvisc.topography.cards import open_card
+
+            return open_card(path, conditioned=False)
+        return surface.raw()
+    except (InputError, OSError):
+        return None

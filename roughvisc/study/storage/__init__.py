@@ -1,0 +1,1 @@
+"""Files: results, the index of a folder, records of runs that are not finished."""

@@ -1,0 +1,235 @@
+"""How far a run has come, in a file: from it the run goes on, and ends with the same numbers to the last bit.
+
+A checkpoint is one record of everything in the stepper's state, all floats exact. Two files take turns, each written
+whole under another name first, so that one whole checkpoint outlives whatever happens to the other.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.hereditary.direct import Block, HistoryState
+from roughvisc.mechanics.hereditary.memory import ModesState
+from roughvisc.mechanics.stepping.energy import Energy
+from roughvisc.mechanics.stepping.scene import Instant, State, Step, Uncertainty
+from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
+from roughvisc.study.storage.store import whole_file
+
+log = logging.getLogger("roughvisc")
+
+#: Writing checkpoints may take this part of the time.
+_SHARE = 0.05
+_TYPES = {kind.__name__: kind for kind in (State, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
+
+
+@dataclass(frozen=True)
+class Reached:
+    """How far a run has come.
+
+    Attributes
+    ----------
+    state : State or None
+        The stepper's; None at the start.
+    converged : bool
+        Whether all steps since the last kept row are.
+    rows, growths : int
+        Rows kept, and how many times the grid has grown.
+    wall_time : float
+        Spent so far. [s]
+    """
+
+    state: State | None = None
+    converged: bool = True
+    rows: int = 0
+    growths: int = 0
+    wall_time: float = 0.0
+
+    @property
+    def time(self) -> float:
+        """Of the program. [s]"""
+        return 0.0 if self.state is None else self.state.now.time
+
+    def after(self, step: Step, growths: int, wall_time: float) -> Reached:
+        """How far it has come with another step, what is bad of it folded in."""
+        converged = self.converged and step.converged
+        return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
+
+    def kept(self) -> Reached:
+        """How far it has come when the step is kept as a row."""
+        return replace(self, converged=True, rows=self.rows + 1)
+
+
+def save_checkpoint(path: Path, reached: Reached, key: str) -> None:
+    """Write how far the case of that key has come, whole or not at all."""
+    arrays: dict[str, Any] = {}
+    seen: dict[int, str] = {}
+    stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
+    plain = {"key": key, "revision": NUMERICS_REVISION, "engine": transform_engine(), "reached": stated}
+    with whole_file(path) as temporary, open(temporary, "wb", buffering=0) as stream:
+        write_record(stream, plain, arrays)
+
+
+def load_checkpoint(path: Path, key: str) -> Reached | None:
+    """How far the case of that key has come; None if the file is absent, damaged, or of something else.
+
+    Raises
+    ------
+    InputError
+        If the other transforms would give other numbers from here on.
+    """
+    try:
+        with open(path, "rb", buffering=0) as stream:
+            plain, arrays = read_record(stream)
+        found = plain["key"], plain["revision"]
+        if found == (key, NUMERICS_REVISION):
+            reached = Reached(**{name: _together(value, arrays) for name, value in plain["reached"].items()})
+    except FileNotFoundError:
+        return None
+    except (Damaged, OSError, KeyError, TypeError, ValueError) as error:
+        log.warning("%s: is damaged and not used: %s", path, error)
+        return None
+    if found != (key, NUMERICS_REVISION):
+        log.warning("%s: belongs to another case or revision and is not used", path)
+        return None
+    if plain["engine"] != transform_engine():
+        raise InputError(
+            f"{path}: was written with {plain['engine']}, this is {transform_engine()}, and the numbers would differ "
+            "in their last digits: expected the same versions; go on with those, or remove the folder to start anew"
+        )
+    return reached
+
+
+def _apart(value: Any, arrays: dict[str, Any], seen: dict[int, str]) -> Any:
+    """A value as JSON knows it, its arrays put aside under names, the same array once."""
+    if isinstance(value, np.ndarray):
+        name = seen.setdefault(id(value), f"a{len(seen)}")
+        arrays[name] = value
+        return {"array": name}
+    if is_dataclass(value):
+        parts = {field.name: _apart(getattr(value, field.name), arrays, seen) for field in fields(value)}
+        return {"type": type(value).__name__, "parts": parts}
+    if isinstance(value, tuple):
+        return {"tuple": [_apart(part, arrays, seen) for part in value]}
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
+
+
+def _together(value: Any, arrays: dict[str, Any]) -> Any:
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        return arrays[value["array"]]
+    if "tuple" in value:
+        return tuple(_together(part, arrays) for part in value["tuple"])
+    return _TYPES[value["type"]](**{name: _together(part, arrays) for name, part in value["parts"].items()})
+
+
+class Keeper:
+    """Keeps what a run has computed: rows in one file, how far it has come in two others, all in one folder.
+
+    Parameters
+    ----------
+    folder : path
+        Of this run alone; made if need be.
+    key : str
+        Of the case.
+    check : callable
+        Called before anything is written: may raise that this run has lost its right to.
+    seconds, steps : float, int or None
+        A checkpoint is written after so long, but not so often that it would take a twentieth of the time; and after
+        so many accepted steps.
+    stop : callable or None
+        Asked after every accepted step.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        key: str,
+        check: Callable[[], None],
+        *,
+        seconds: float = 30.0,
+        steps: int | None = None,
+        stop: Callable[[], bool] | None = None,
+    ) -> None:
+        folder.mkdir(exist_ok=True)
+        self.rows = RowFile(folder / "rows", check)
+        self.saved = Reached()
+        self._folder = folder
+        self._key = key
+        self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
+        self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
+        self._latest = self.saved
+        self._pending, self._last_save = 0, time.monotonic()
+
+    def resume(self) -> None:
+        """Find out where to go on from: the last whole checkpoint whose rows are there; the start if there is none."""
+        for leftover in self._folder.glob(".*"):
+            leftover.unlink()
+        found = [(reached, path) for path in self._paths if (reached := load_checkpoint(path, self._key)) is not None]
+        for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
+            if self.rows.keep_first(reached.rows):
+                log.info("%s: goes on from t = %.6g s", path, reached.time)
+                self.saved = self._latest = reached
+                if path == self._paths[0]:
+                    self._paths.reverse()
+                return
+            log.warning("%s: its rows are damaged; not used", path)
+        for path in self._paths:
+            path.unlink(missing_ok=True)
+        self.rows.keep_first(0)
+
+    def passed(self, reached: Reached) -> None:
+        """Take note of an accepted step; write a checkpoint if it is time to.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If the run is to stop; a checkpoint has then been written.
+        """
+        self._latest = reached
+        self._pending += 1
+        if self._stop is not None and self._stop():
+            self.save()
+            raise KeyboardInterrupt
+        due = time.monotonic() - self._last_save >= self._interval
+        if due or (self._steps is not None and self._pending >= self._steps):
+            self.save()
+
+    def save(self) -> None:
+        """Write a checkpoint, if anything has been computed since the last one."""
+        if self._latest is self.saved or self._latest.state is None:
+            return
+        began = time.monotonic()
+        self.check()
+        self.rows.sync()  # first: a checkpoint counts on its rows
+        save_checkpoint(self._paths[0], self._latest, self._key)
+        self._paths.reverse()
+        self.saved, self._pending, self._last_save = self._latest, 0, time.monotonic()
+        self._interval = max(self._interval, (self._last_save - began) / _SHARE)
+
+    def remove(self) -> None:
+        """Remove all that was kept: the result is written, or cannot be had."""
+        self.check()
+        self.rows.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def close(self) -> None:
+        """Close the files; without a checkpoint nothing in them is of use."""
+        self.rows.close()
+        if not any(path.exists() for path in self._paths):
+            self.remove()

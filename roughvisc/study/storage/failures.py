@@ -1,0 +1,73 @@
+"""Records of cases that failed: what was asked, and what went wrong."""
+
+from __future__ import annotations
+
+import json
+import logging
+from contextlib import suppress
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.storage.store import whole_file
+
+log = logging.getLogger("roughvisc")
+
+
+def record_path(folder: Path, key: str) -> Path:
+    """File of the record of a case."""
+    return folder / f"{key}.failed.json"
+
+
+def record_failure(folder: Path, case: Case, message: str, error: str, trace: str) -> Path:
+    """Write down that a case failed; its record is named by its key.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    case : Case
+        What was asked.
+    message, error, trace : str
+        What went wrong: in words, the class of the exception, and its traceback if nobody raised it on purpose.
+    """
+    record = {
+        "case_key": case.key,
+        "message": message,
+        "error": error,
+        "traceback": trace,
+        "time": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        **_version(),
+        "case": json.loads(case.to_json()),
+    }
+    path = record_path(folder, case.key)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(json.dumps(record, indent=1))
+    except (OSError, InputError) as problem:
+        log.warning("%s cannot be written: %s", path, problem)
+    return path
+
+
+def recorded_failure(folder: Path, key: str) -> dict[str, Any] | None:
+    """Record of a case that failed; None if there is none, or if another version failed, which proves nothing."""
+    try:
+        record = json.loads(record_path(folder, key).read_text())
+    except (OSError, ValueError):
+        return None
+    current = isinstance(record, dict) and {name: record.get(name) for name in _version()} == _version()
+    return record if current else None
+
+
+def forget_failure(folder: Path, key: str) -> None:
+    """Remove the record of a case, if there is one."""
+    with suppress(OSError):
+        record_path(folder, key).unlink(missing_ok=True)
+
+
+def _version() -> dict[str, Any]:
+    return {"source": f"roughvisc {metadata.version('roughvisc')}", "numerics": NUMERICS_REVISION}

@@ -1,0 +1,223 @@
+"""The index of a folder of results: all of them but the fields, in one small file.
+
+It only saves time: it is made anew from the results where it is absent, damaged or older than they are.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.study.storage.store import NETCDF, whole_file
+from roughvisc.variables import VARIABLES
+
+log = logging.getLogger("roughvisc")
+
+INDEX = ".index.npz"
+#: Raised by whoever changes what an index holds.
+_LAYOUT = 1
+#: Histories over time, and the time itself.
+_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims == ("time",))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the index keeps of one result.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file in the folder.
+    stamp : tuple of int
+        Its size [bytes] and its time of change [ns].
+    attributes : dict
+        Of the file.
+    fields : dict
+        dtype of each variable over x and y.
+    histories : dict
+        Everything over time, ``time`` too.
+    x, y : ndarray
+        Positions of the cells. [m]
+    """
+
+    file: str
+    stamp: tuple[int, int]
+    attributes: dict[str, Any]
+    fields: dict[str, str]
+    histories: dict[str, NDArray[Any]] = field(repr=False)
+    x: NDArray[np.float64] = field(repr=False)
+    y: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def key(self) -> str:
+        """Key of the case."""
+        return str(self.attributes.get("case_key", Path(self.file).stem))
+
+    @property
+    def rows(self) -> int:
+        """Number of kept times."""
+        return len(self.histories["time"])
+
+    @cached_property
+    def case(self) -> dict[str, Any]:
+        """The case, as JSON has it."""
+        return json.loads(self.attributes.get("case", "{}"))
+
+
+@dataclass(frozen=True)
+class Index:
+    """Entries by key, and the keys of the sweep that ran last in the folder, in its order."""
+
+    entries: dict[str, Entry]
+    sweep: tuple[str, ...] = ()
+
+
+def read_entry(path: Path) -> Entry:
+    """Entry of one result.
+
+    Raises
+    ------
+    InputError
+        If the file is no result, or is damaged.
+    """
+    import netCDF4
+
+    try:
+        stamp = _stamp(path)
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_mask(False)
+            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+            histories = {name: file[name][:] for name in _HISTORIES if name in file.variables}
+            fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
+            x, y = file["x"][:], file["y"][:]
+    except (OSError, RuntimeError, IndexError, AttributeError) as error:
+        raise InputError(
+            f"{path}: is damaged, or no result of roughvisc ({error}): remove it, and run again"
+        ) from error
+    absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
+    if absent or "case" not in attributes:
+        raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
+    plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
+    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
+    return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float))
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns
+
+
+def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
+    """Index of the results that are in a folder now, read from its file as far as that is up to date.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    known : iterable of Entry
+        Entries that need not be read again.
+
+    Raises
+    ------
+    InputError
+        If the folder is absent or is none. What is no result is left out, and the log says so.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
+    stored = _load(folder / INDEX)
+    before = {entry.file: entry for entry in (*stored.entries.values(), *known)}
+    entries: dict[str, Entry] = {}
+    for path in sorted(folder.glob("*.nc")):
+        if path.name.startswith("."):
+            continue
+        try:
+            entry = before.get(path.name)
+            if entry is None or entry.stamp != _stamp(path):
+                entry = read_entry(path)
+        except InputError as error:
+            log.warning("%s", error)
+        except FileNotFoundError:  # gone meanwhile
+            continue
+        else:
+            entries[entry.key] = entry
+    return Index(entries, stored.sweep)
+
+
+def save_index(folder: Path, index: Index) -> None:
+    """Write the index of a folder; where that cannot be done, results are only slower to open."""
+    entries = list(index.entries.values())
+    grids = _Grids()
+    head = [
+        {
+            "file": entry.file,
+            "stamp": entry.stamp,
+            "attributes": entry.attributes,
+            "fields": entry.fields,
+            "histories": list(entry.histories),
+            "rows": entry.rows,
+            "grid": grids.number(entry),
+        }
+        for entry in entries
+    ]
+    arrays: dict[str, NDArray[Any]] = dict(grids.arrays)
+    for name in _HISTORIES:
+        columns = [entry.histories[name] for entry in entries if name in entry.histories]
+        if columns:
+            arrays[name] = np.concatenate(columns)
+    text = json.dumps({"layout": _LAYOUT, "sweep": index.sweep, "entries": head})
+    with suppress(OSError, InputError), whole_file(folder / INDEX) as temporary:
+        np.savez(temporary, head=np.frombuffer(text.encode(), np.uint8), **arrays)
+
+
+class _Grids:
+    """Distinct grids, numbered: most results of a folder are on one."""
+
+    def __init__(self) -> None:
+        self.arrays: dict[str, NDArray[np.float64]] = {}
+        self._numbers: dict[tuple[bytes, bytes], int] = {}
+
+    def number(self, entry: Entry) -> int:
+        grid = (entry.x.tobytes(), entry.y.tobytes())
+        number = self._numbers.setdefault(grid, len(self._numbers))
+        self.arrays |= {f"x{number}": entry.x, f"y{number}": entry.y}
+        return number
+
+
+def _load(path: Path) -> Index:
+    """The stored index; an empty one where there is none that can be used."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        stored = json.loads(bytes(arrays["head"]))
+        if stored["layout"] != _LAYOUT:
+            return Index({})
+        entries = _entries(stored["entries"], arrays)
+        return Index({entry.key: entry for entry in entries}, tuple(stored["sweep"]))
+    except Exception as error:  # absent, cut short, of another version: whatever it is, the results are all there
+        if not isinstance(error, FileNotFoundError):
+            log.info("%s is made anew: %s", path, error)
+        return Index({})
+
+
+def _entries(heads: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> list[Entry]:
+    at = dict.fromkeys(arrays, 0)
+    entries = []
+    for head in heads:
+        histories = {}
+        for name in head["histories"]:
+            histories[name] = arrays[name][at[name] : at[name] + head["rows"]]
+            at[name] += head["rows"]
+        x, y = arrays[f"x{head['grid']}"], arrays[f"y{head['grid']}"]
+        size, changed = head["stamp"]
+        entries.append(Entry(head["file"], (size, changed), head["attributes"], head["fields"], histories, x, y))
+    return entries

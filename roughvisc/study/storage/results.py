@@ -1,0 +1,229 @@
+"""Many results seen as one: a lazy Dataset over (case, time, x, y), or a tree where they do not fit one grid."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, overload
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.study.storage.index import NETCDF, Entry, index_of, save_index
+from roughvisc.variables import VARIABLES, annotate
+
+#: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
+_BLOCK = 16 << 20
+#: Attributes that all results of a sweep share.
+_SHARED = ("Conventions", "source", "references", "comment", "boundary", "tolerance", "method")
+
+
+@overload
+def open_results(
+    out: str | Path, *, cases: Sequence[Case] | Literal["last", "all"] = "last", ragged: Literal[False] = False
+) -> xr.Dataset: ...
+
+
+@overload
+def open_results(
+    out: str | Path, *, cases: Sequence[Case] | Literal["last", "all"] = "last", ragged: Literal[True]
+) -> xr.DataTree: ...
+
+
+def open_results(out, *, cases="last", ragged=False):
+    """Open all results of a sweep together; fields are read when they are asked for.
+
+    Parameters
+    ----------
+    out : path
+        Folder of the results.
+    cases : "last", "all", or sequence of Case
+        The finished cases of the sweep that ran last in this folder; all results in it; or those of some cases, in
+        their order. A folder that no sweep ran in has no last one, and gives all.
+    ragged : bool
+        Give a tree with one result a node, which need not have their times and grids in common.
+
+    Returns
+    -------
+    xarray.Dataset or xarray.DataTree
+        Variables as in a single result with a dimension ``case`` in front; ``height`` only where it differs. Varied
+        parameters are coordinates on ``case``, named by their dotted keys: numbers in SI, or strings. A tree has
+        the parameters as scalar coordinates of each node, whose name is the case's key.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to open, or the results have not the same times and grid and `ragged` is not set.
+
+    Examples
+    --------
+    >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
+    >>> results.set_index(case=["program.0.load", "surface.seed"]).unstack().contact_area  # doctest: +SKIP
+    """
+    folder = Path(out).absolute()
+    index = index_of(folder)
+    save_index(folder, index)
+    entries = _chosen(index.entries, index.sweep, cases)
+    if not entries:
+        raise InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
+    parameters = parameters_of([entry.case for entry in entries])
+    if ragged:
+        return _tree(folder, entries, parameters)
+    _check_common(folder, entries)
+    return _stacked(folder, entries, parameters)
+
+
+def _chosen(entries: Mapping[str, Entry], last: Sequence[str], cases: Any) -> list[Entry]:
+    if isinstance(cases, str):
+        if cases not in ("last", "all"):
+            raise InputError(f"cases is {cases!r}: expected 'last', 'all', or a list of cases")
+        wanted: Iterable[str] = last if cases == "last" and any(key in entries for key in last) else entries
+    else:
+        wanted = dict.fromkeys(case.key for case in cases)
+    return [entries[key] for key in wanted if key in entries]
+
+
+def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
+    first = entries[0]
+    for entry in entries[1:]:
+        for what, one, other in (
+            ("times", first.histories["time"], entry.histories["time"]),
+            ("grid", first.x, entry.x),
+            ("grid", first.y, entry.y),
+        ):
+            if not np.array_equal(one, other):
+                sizes = f"{len(one)} and {len(other)}" if len(one) != len(other) else f"{len(one)} each, not the same"
+                raise InputError(
+                    f"{folder}: {first.file} and {entry.file} have no common {what} ({sizes}): open them with "
+                    f"ragged=True, which gives a tree{', or keep a list of times' if what == 'times' else ''}"
+                )
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# what was varied
+
+
+def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
+    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
+    for key in dict.fromkeys(key for leaf in leaves for key in leaf):
+        below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
+        if not below and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
+            keys[key] = None
+    values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
+    return {key: _column(found) for key, found in values.items()}
+
+
+_NOT_A_PARAMETER = ("title", "origin", "varied")
+
+
+def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
+    named = stated.items() if isinstance(stated, dict) else enumerate(stated)
+    for key, value in named:
+        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
+            yield from _leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _value(case: Mapping[str, Any], leaf: Mapping[str, Any], key: str) -> Any:
+    varied = case.get("varied", {})
+    return varied[key] if key in varied else leaf.get(key)
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    numbers = [isinstance(v, int | float) and not isinstance(v, bool) for v in values]
+    if all(numbers):
+        return np.array(values)
+    if all(number or v is None for number, v in zip(numbers, values, strict=True)):
+        return np.array([np.nan if v is None else v for v in values], dtype=float)
+    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the views
+
+
+def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    first = entries[0]
+    variables: dict[str, Any] = {
+        name: (("case", "time"), np.stack([entry.histories[name] for entry in entries]))
+        for name in first.histories
+        if name != "time" and all(name in entry.histories for entry in entries)
+    }
+    one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
+    for name, dtype in first.fields.items():
+        if name in VARIABLES and all(name in entry.fields for entry in entries):
+            dims = VARIABLES[name].dims
+            if dims[0] == "time" or not one_surface:
+                dtype = np.result_type(*(entry.fields[name] for entry in entries)).str
+                variables[name] = (("case", *dims), _lazy(folder, entries, name, dtype))
+            else:
+                variables[name] = (dims, _lazy(folder, entries[:1], name, dtype)[0])
+    coords = {"time": first.histories["time"], "x": first.x, "y": first.y}
+    dataset = annotate(xr.Dataset(variables, coords=coords, attrs=_attributes(entries)))
+    on_case: dict[str, Any] = {"case_key": ("case", np.array([entry.key for entry in entries]))}
+    for key, values in parameters.items():
+        unit = unit_of(key, first.case) if values.dtype.kind in "if" else ""
+        on_case[key] = ("case", values, {"long_name": key} | ({"units": unit} if unit else {}))
+    return dataset.assign_coords(on_case)
+
+
+def _attributes(entries: Sequence[Entry]) -> dict[str, Any]:
+    first = entries[0]
+    alike = {
+        name: first.attributes[name]
+        for name in _SHARED
+        if name in first.attributes and all(e.attributes.get(name) == first.attributes[name] for e in entries)
+    }
+    return {"title": first.case.get("title", ""), **alike}
+
+
+def _lazy(folder: Path, entries: Sequence[Entry], name: str, dtype: str) -> Any:
+    """Dask array over (case, ...) of one variable; a block is one case's, some times of it."""
+    import dask.array as da
+
+    first = entries[0]
+    grid = (len(first.x), len(first.y))
+    over_time = VARIABLES[name].dims[0] == "time"
+    frames = max(1, _BLOCK // (grid[0] * grid[1] * np.dtype(dtype).itemsize))
+    starts = range(0, first.rows, frames) if over_time else range(1)
+    counts = (tuple(min(frames, first.rows - start) for start in starts),) if over_time else ()
+    paths = np.array([str(folder / entry.file) for entry in entries])
+    blocks = paths.reshape(-1, *(1,) * (2 + over_time))
+    if over_time:
+        blocks = np.repeat(blocks, len(starts), axis=1)
+    return da.map_blocks(
+        _read,
+        da.from_array(blocks, chunks=1),
+        variable=name,
+        frames=frames if over_time else 0,
+        dtype=np.dtype(dtype),
+        chunks=((1,) * len(entries), *counts, (grid[0],), (grid[1],)),
+        meta=np.empty((0,) * (3 + over_time), dtype),
+    )
+
+
+def _read(path: NDArray[Any], variable: str, frames: int, block_id: tuple[int, ...] = ()) -> NDArray[Any]:
+    """One block, from its file."""
+    import netCDF4
+
+    with NETCDF, netCDF4.Dataset(path.item()) as file:
+        file.set_auto_mask(False)
+        start = block_id[1] * frames if frames else 0
+        found = file[variable][start : start + frames] if frames else file[variable][:]
+        return np.asarray(found)[np.newaxis]
+
+
+def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.DataTree:
+    nodes = {}
+    for number, entry in enumerate(entries):
+        node = _stacked(folder, [entry], {key: values[number : number + 1] for key, values in parameters.items()})
+        nodes[entry.key] = node.isel(case=0)
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=_attributes(entries)), **nodes})

@@ -1,0 +1,1 @@
+"""Speed against accuracy: settings, each timed and held against the truth."""

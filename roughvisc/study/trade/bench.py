@@ -1,0 +1,173 @@
+"""Timed runs of one case under different settings, none longer than there is time for."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from roughvisc.errors import RoughviscError
+from roughvisc.mechanics.hereditary.choice import engine_for
+from roughvisc.study.cost.estimate import March, Stopwatch, march_of, memory, solved_on, windows, work
+from roughvisc.study.execution.run import compute, unconverged
+from roughvisc.study.simulation.scene import Ground, follows, kept_times, shortest_age
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.trade.ladder import Setting, changed, shape_of
+
+Report = Callable[[str, float, float], None]
+
+#: A run that took less is repeated, up to so many times in all; the fastest counts. [s]
+_SHORT, _REPEATS = 1.0, 3
+#: A run that took more corrects what is expected of the others. [s]
+_TELLING = 0.2
+#: What a run takes beside its transforms, whatever the grid: in all, and a step. [s]
+_ONCE, _STEP = 0.02, 1e-3
+#: Tolerance of the coarse marches from which the first times are told.
+_MARCHED = 1e-2
+#: Convolutions a step of the seed paper's solver takes, over those of the preconditioned one; measured: 8 to 15.
+_SEED_SOLVE = 12.0
+
+
+class NotRun(RoughviscError):
+    """A setting that was not measured, and why."""
+
+
+class _OutOfTime(Exception):
+    """A run has taken all the time there is."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run and what it cost.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        The result as its file gives it.
+    seconds : float
+        Wall time of computing and writing it, the fastest of its repetitions. [s]
+    steps : int
+        Accepted time steps.
+    peak_memory, disk_size : float
+        Counted from its arrays, and of its file. [byte]
+    """
+
+    dataset: xr.Dataset
+    seconds: float
+    steps: int
+    peak_memory: float
+    disk_size: float
+
+
+class Bench:
+    """Runs one case under settings, and tells how long they will take.
+
+    Parameters
+    ----------
+    case : Case
+        What to run.
+    height : xarray.DataArray
+        Its surface. [m]
+    folder : Path
+        For temporary files.
+    budget : float
+        Wall time of all runs together. [s]
+    report : callable
+        Called with a setting's name, the time reached and the program's length.
+    """
+
+    def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
+        self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
+        self._path, self._report = folder / "run.nc", report
+        self._until = time.perf_counter() + budget
+        self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
+        solve = case.settings.solve
+        self._convolution = Stopwatch().seconds(height, solve.boundary)
+        ground = Ground(height, "absent", follow=follows(solve.boundary, solve.edge, "fast"), mirror=True)
+        self._part = solved_on(windows(ground), self._found.level)  # of the cells
+        self._calibration = 1.0
+
+    @property
+    def left(self) -> float:
+        """Wall time that is left. [s]"""
+        return max(self._until - time.perf_counter(), 0.0)
+
+    def label(self, setting: Setting) -> str:
+        """A setting in the words of a study file."""
+        return setting.label(shape_of(self.case, self.shape, setting.coarsening))
+
+    def expected(self, setting: Setting) -> float:
+        """Wall time that a setting is expected to take; runs that took a while correct it. [s]"""
+        cells, size = 1 / setting.coarsening**2, math.prod(self.shape)
+        steps = self._found.steps * math.sqrt(_MARCHED / setting.tolerance)
+        if setting.time_step is not None:
+            steps = self.case.program().duration / setting.time_step
+        each = self._found.convolutions / max(self._found.steps, 1.0)
+        if setting.method == "seed":
+            convolutions = steps**2 / 2 + steps * each * _SEED_SOLVE
+        else:
+            convolutions = steps * each * cells**0.15 * work(self._part * size) / work(size)
+        return _ONCE + _STEP * steps + convolutions * self._convolution * cells * self._calibration
+
+    def run(self, setting: Setting) -> Run:
+        """Run the case under a setting.
+
+        Raises
+        ------
+        NotRun
+            If it would take longer than there is time, is refused, or does not converge.
+        """
+        label, expected = self.label(setting), self.expected(setting)
+        if expected > self.left:
+            raise NotRun(f"would take about {expected:.2g} s, {self.left:.0f} s are left of the budget")
+        try:
+            case = changed(self.case, self.shape, setting)
+            took, dataset, steps = self._timed(case, label)
+            if setting.method == "fast" and took > _TELLING:
+                self._calibration *= max(took, 1e-3) / max(expected, 1e-3)
+            for _ in range(_REPEATS - 1):
+                if took < min(_SHORT, self.left / 10):
+                    took = min(took, self._timed(case, label)[0])
+        except _OutOfTime:
+            raise NotRun("stopped when the budget was spent") from None
+        except RoughviscError as error:
+            text = str(error).removeprefix(f"{self.case.origin}: ")
+            raise NotRun(text) from error
+        if complaint := unconverged(dataset):
+            raise NotRun(complaint)
+        with open_result(self._path) as kept:
+            dataset = kept.load()
+        return Run(dataset, took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
+
+    def _timed(self, case: Case, label: str) -> tuple[float, xr.Dataset, int]:
+        steps = 0
+
+        def passed(now: float, end: float) -> None:
+            nonlocal steps
+            steps += 1
+            self._report(label, now, end)
+            if not self.left:
+                raise _OutOfTime
+
+        began = time.perf_counter()
+        dataset = compute(case, progress=passed)
+        write_result(dataset, self._path, precision=case.settings.keep.precision)
+        return time.perf_counter() - began, dataset, steps
+
+    def _memory(self, case: Case, dataset: xr.Dataset, steps: int) -> float:
+        """As a plan counts it, with the steps that were taken. [byte]"""
+        solve, cells = case.settings.solve, dataset.sizes["x"] * dataset.sizes["y"]
+        contact, rows = float(dataset["contact_fraction"].max()), dataset.sizes["time"]
+        program, keep = case.program(), case.settings.keep
+        kept = kept_times(program, None if keep.times == "all" else keep.times)
+        shortest = shortest_age(program, kept, solve.tolerance)
+        engine = engine_for(case.material(), program.duration, solve.tolerance, kind=solve.memory, shortest=shortest)
+        found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
+        increments = 8.0 * cells * steps if solve.method == "seed" else 0.0
+        part = 1.0 if solve.method == "seed" else self._part
+        return memory(case, cells, found, engine, part) + increments

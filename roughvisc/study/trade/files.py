@@ -1,0 +1,106 @@
+"""Where a trade is kept, and what its command is told: folders, files, parts of one, times."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.store import plain_attributes, whole_file
+from roughvisc.units import quantity
+
+
+def trade_folder(case: Case, out: str | Path | None) -> Path:
+    """Folder of a study's trade: beside that of its results, which holds results alone.
+
+    Raises
+    ------
+    InputError
+        If nothing could be written there.
+    """
+    if out is not None:
+        return result_folder(case, out)
+    folder = result_folder(case)
+    return result_folder(case, folder.with_name(f"{folder.name}-trade"))
+
+
+def write_trade(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write a trade to one NetCDF file, whole or not at all."""
+    kept = dataset.copy()
+    kept.attrs = plain_attributes(dataset.attrs)
+    numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
+    with whole_file(path) as temporary:
+        kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
+    return Path(path)
+
+
+def open_trade(path: str | Path) -> xr.Dataset:
+    """Open what :func:`write_trade` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is absent or is something else.
+    """
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+            dataset = file.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(f"{path}: cannot be opened: {error}: expected a trade of roughvisc (.nc)") from error
+    if "run_time" not in dataset or "quantity" not in dataset.dims:
+        raise InputError(f"{path}: is no trade: expected a file that roughvisc trade wrote")
+    return dataset
+
+
+def is_trade(path: str | Path) -> bool:
+    """Whether a file is one that :func:`write_trade` wrote, as far as its variables tell."""
+    try:
+        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+            return "run_time" in file and "quantity" in file.dims
+    except (OSError, ValueError, RuntimeError):
+        return False
+
+
+def part_of_one(text: str, name: str) -> float:
+    """A relative error from ``1%``, ``0.1 %`` or ``0.01``.
+
+    Examples
+    --------
+    >>> part_of_one("1%", "--apply"), part_of_one("0.02", "--apply")
+    (0.01, 0.02)
+    """
+    try:
+        part = quantity(text, "1")
+    except InputError:
+        part = math.nan
+    if not 0 < part < 1:
+        raise InputError(f"{name}: found {text!r}: expected a part such as 1% or 0.01, above 0 and below 1")
+    return part
+
+
+def seconds(text: str, name: str) -> float:
+    """A length of time from ``5 min``, ``90 s`` or a number of seconds. [s]
+
+    Examples
+    --------
+    >>> seconds("5 min", "--budget"), seconds("90", "--budget")
+    (300.0, 90.0)
+    """
+    try:
+        time = quantity(float(text) if text.strip().replace(".", "", 1).isdecimal() else text, "s")
+    except InputError:
+        time = math.nan
+    if not 0 < time < math.inf:
+        raise InputError(f"{name}: found {text!r}: expected a time such as '5 min' or 90 (seconds), above 0")
+    return time
+
+
+def check_writable(path: Path) -> None:
+    """Refuse, before anything is measured, a study that could not be written back."""
+    if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
+        raise InputError(f"{path}: may not be written to: --apply needs write permission for it and its folder")

@@ -1,0 +1,139 @@
+"""What a case is measured against that has no closed form: its own finest run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.study.simulation.coarser import pressure_distance
+from roughvisc.study.simulation.grid_convergence import grid_uncertainty
+from roughvisc.study.trade.bench import Bench, NotRun, Run
+from roughvisc.study.trade.exact import QUANTITIES, relative
+from roughvisc.study.trade.ladder import Setting
+
+#: The reference's tolerance is the sharpest measured one over this.
+_SHARPER = 5.0
+#: Safety factor of a difference between two runs (Roache's, with two grids).
+_SAFETY = 3.0
+
+
+class Finest:
+    """The finest run of a case, on the finest grid that half of the time allows, and how far it may be off.
+
+    Parameters
+    ----------
+    bench : Bench
+        Where it is run.
+    rungs : sequence of Setting
+        What is to be measured against it.
+    data : bool
+        Whether the grid is data: then it is on that one.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    time, grid : dict
+        Quantity -> relative error that steps and grid may have left in it; missing where that is not known.
+
+    Raises
+    ------
+    InputError
+        If it would take longer than half of the time there is, or fails.
+    """
+
+    def __init__(self, bench: Bench, rungs: Sequence[Setting], data: bool) -> None:
+        fast = [setting for setting in rungs if setting.method == "fast"] or list(rungs)
+        self.sharpest = min(setting.tolerance for setting in fast)
+        measured = {setting.coarsening for setting in rungs}
+        grids = [1.0] if data else sorted(c for c in measured if c <= max(1.0, min(measured)))
+        candidates = [Setting(self.sharpest / _SHARPER, coarsening=grid) for grid in grids]
+        allowed = bench.left / 2
+        self._setting = next((one for one in candidates if bench.expected(one) <= allowed), candidates[-1])
+        self._bench = bench
+        self._coarser: dict[float, dict[str, float]] = {}
+        expected = bench.expected(self._setting)
+        if expected > allowed:
+            where = f"{bench.case.origin}: " if bench.case.origin else ""
+            raise InputError(
+                f"{where}surface: the run that all others are measured against would take about {expected:.3g} s, "
+                f"more than half of the {bench.left:.0f} s allowed: give a larger budget, or resample the surface"
+            )
+        try:
+            self.run: Run = bench.run(self._setting)
+        except NotRun as error:
+            where = f"{bench.case.origin}: " if bench.case.origin else ""
+            raise InputError(f"{where}the run that all others are measured against: {error}") from error
+        self.name = f"finest run: {bench.label(self._setting)}"
+        self.time, self.grid = self._uncertainties()
+
+    def check(self, setting: Setting) -> None:
+        """Refuse a setting that is finer than what it would be measured against."""
+        if setting.coarsening < self._setting.coarsening:
+            raise NotRun("finer than the run to measure it against, for which there is no time")
+
+    def errors(self, dataset: xr.Dataset) -> dict[str, float]:
+        """Of a result at the same times."""
+        return differences(dataset, self.run.dataset)
+
+    def of_coarsening(self, factor: float) -> dict[str, float]:
+        """Errors that a grid alone makes: of a run on it that is as sharp as the finest one."""
+        if factor == self._setting.coarsening:
+            return dict.fromkeys(QUANTITIES, 0.0)
+        if factor not in self._coarser:
+            try:
+                run = self._bench.run(replace(self._setting, coarsening=factor))
+                self._coarser[factor] = self.errors(run.dataset)
+            except NotRun:
+                self._coarser[factor] = dict.fromkeys(QUANTITIES, math.nan)
+        return self._coarser[factor]
+
+    def _uncertainties(self) -> tuple[dict[str, float], dict[str, float]]:
+        """What the steps and what the grid leave unknown; missing where the runs for it cannot be had."""
+        bench, setting = self._bench, self._setting
+        unknown = dict.fromkeys(QUANTITIES, math.nan)
+        in_time = unknown
+        try:
+            looser = self.errors(bench.run(replace(setting, tolerance=self.sharpest)).dataset)
+            in_time = {name: time_uncertainty(value, _SHARPER) for name, value in looser.items()}
+            second = bench.run(replace(setting, coarsening=2 * setting.coarsening)).dataset
+        except NotRun:
+            return in_time, unknown
+        near = self._coarser[2 * setting.coarsening] = self.errors(second)
+        try:
+            third = bench.run(replace(setting, coarsening=4 * setting.coarsening)).dataset
+        except NotRun:
+            far = unknown
+        else:
+            far = differences(third, second)
+            self._coarser[4 * setting.coarsening] = self.errors(third)
+        fine = self.run.dataset
+        ratio = math.sqrt(fine.sizes["x"] * fine.sizes["y"] / (second.sizes["x"] * second.sizes["y"]))
+        return in_time, {name: float(grid_uncertainty(name, near[name], far[name], ratio)) for name in QUANTITIES}
+
+
+def differences(found: xr.Dataset, wanted: xr.Dataset) -> dict[str, float]:
+    """Differences between results at the same times: the worst over the times, over the largest value of the second.
+
+    The pressure's is its absolute difference summed (L1) over the largest force.
+    """
+    largest = float(wanted["force"].max())
+    pressure = float(pressure_distance(found, wanted).max()) / largest if largest else math.nan
+    histories = {
+        name: relative(found[name].values - wanted[name].values, wanted[name].values)
+        for name in QUANTITIES
+        if name != "pressure"
+    }
+    return {"pressure": pressure} | histories
+
+
+def time_uncertainty(near: float, sharper: float) -> float:
+    """What the steps leave unknown, from the difference to a run whose tolerance is so many times looser.
+
+    The error follows the tolerance, unevenly: the safety factor is 3.
+    """
+    return _SAFETY * near / (sharper - 1)

@@ -1,0 +1,198 @@
+"""The settings that a trade measures: each trades accuracy for speed, memory or disk in its own way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from roughvisc.errors import InputError
+from roughvisc.study.simulation.coarser import coarser_shape
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.schema.surface import FileSurface
+
+#: Relative precision of a float with 23 bits of fraction.
+FLOAT32 = 2.0**-24
+#: Recipes that give the same surface on any grid: only there is the grid a setting and no data.
+_ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
+#: Fewest cells a side of a coarser grid that is worth a try.
+_FEWEST = 12
+#: Most cells a side of a finer one.
+_MOST = 1024
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to compute a case.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the study's ``[solve]`` table.
+    time_step : float or None
+        Fixed step; None: steps chosen by the tolerance. [s]
+    coarsening : float
+        How many times longer the cells are; below one: shorter, where the surface is known on any grid.
+    method : {"fast", "seed"}
+        As in the ``[solve]`` table.
+    memory : {"auto", "direct"}
+        As in the ``[solve]`` table.
+    precision : float or None
+        Relative precision of the fields in the file; None: that of the study.
+    """
+
+    tolerance: float = 1e-3
+    time_step: float | None = None
+    coarsening: float = 1.0
+    method: str = "fast"
+    memory: str = "auto"
+    precision: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (0 < self.tolerance < 1):
+            raise InputError(f"setting: tolerance is {self.tolerance!r}: expected a number between 0 and 1")
+        if self.time_step is not None and not (0 < self.time_step < math.inf):
+            raise InputError(f"setting: time_step is {self.time_step!r}: expected a positive number [s], or None")
+        if not (0 < self.coarsening < math.inf):
+            raise InputError(f"setting: coarsening is {self.coarsening!r}: expected a positive number")
+
+    @property
+    def family(self) -> str:
+        """What is varied."""
+        if self.method == "seed":
+            return "seed paper's algorithm"
+        if self.memory == "direct":
+            return "direct history"
+        if self.precision is not None:
+            return "rounded fields"
+        if self.coarsening != 1:
+            return "coarser grid" if self.coarsening > 1 else "finer grid"
+        return "tolerance" if self.time_step is None else "fixed steps"
+
+    def label(self, shape: tuple[int, int]) -> str:
+        """The setting in the words of a study file; ``shape`` is that of its grid."""
+        words = []
+        if self.method == "seed":
+            words.append("method = seed")
+        if self.time_step is not None:
+            words.append(f"time_step = {step_text(self.time_step)}")
+        else:
+            words.append(f"tolerance = {short(self.tolerance)}")
+        if self.coarsening != 1:
+            words.append(f"{shape[0]} x {shape[1]} cells")
+        if self.memory == "direct":
+            words.append("memory = direct")
+        if self.precision is not None:
+            words.append(f"precision = {short(self.precision)}")
+        return ", ".join(words)
+
+
+def step_text(step: float) -> str:
+    """A time step as a study file takes it.
+
+    Examples
+    --------
+    >>> step_text(0.02), step_text(1.5), step_text(2.5e-5)
+    ('20 ms', '1.5 s', '25 us')
+    """
+    for factor, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if step >= factor:
+            return f"{step / factor:.6g} {unit}"
+    return f"{step:.6g} s"
+
+
+def short(value: float) -> str:
+    """A tolerance as one writes it.
+
+    Examples
+    --------
+    >>> short(0.03), short(1e-3), short(2.0**-24), short(0.25)
+    ('3e-2', '1e-3', '6e-8', '2.5e-1')
+    """
+    digits, power = f"{value:.1e}".split("e")
+    return f"{digits.removesuffix('.0')}e{int(power)}"
+
+
+def is_data(case: Case) -> bool:
+    """Whether the grid of the surface is data, so that another grid is another surface."""
+    surface = case.settings.surface
+    return isinstance(surface, FileSurface) or getattr(surface, "generate", "") not in _ANY_GRID or _treated(case)
+
+
+def _treated(case: Case) -> bool:
+    """Whether the heights are no longer those of the recipe."""
+    surface = case.settings.surface
+    return any(getattr(surface, step) for step in ("crop", "rotate90", "invert", "filter", "taper", "mirror")) or any(
+        getattr(surface, step) is not False for step in ("level", "outliers", "fill")
+    )
+
+
+def shape_of(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[int, int]:
+    """Cells of the grid of a setting, where the study's grid has ``shape``."""
+    return shape if coarsening == 1 else coarser_shape(shape, coarsening, not is_data(case))
+
+
+def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
+    """The case under a setting.
+
+    Raises
+    ------
+    InputError
+        If the surface is not known on a finer grid, or a value is refused.
+    """
+    changes: dict[str, Any] = {
+        "solve.tolerance": setting.tolerance,
+        "solve.time_step": "auto" if setting.time_step is None else setting.time_step,
+        "solve.method": setting.method,
+        "solve.memory": setting.memory,
+    }
+    if setting.precision is not None:
+        changes["keep.precision"] = setting.precision
+    if setting.coarsening != 1:
+        key, value = grid_change(case, shape, setting.coarsening)
+        changes[key] = value
+    return vary(case, changes)
+
+
+def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[str, list[int]]:
+    """Key of a study and its value that make the surface's cells so many times longer.
+
+    An analytic profile is made anew; anything else is averaged over blocks, which conserves its volume.
+    """
+    cells = shape_of(case, shape, coarsening)
+    if not is_data(case):
+        return "surface.shape", list(cells)
+    if coarsening < 1:
+        raise InputError(f"setting: coarsening is {coarsening!r}: expected at least 1, the scan has no finer grid")
+    mirrored = 2 if case.settings.surface.mirror else 1
+    return "surface.resample", [max(2, n // mirrored) for n in cells]
+
+
+def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
+    """The settings that a trade measures unless it is told others.
+
+    Parameters
+    ----------
+    case : Case
+        What is computed.
+    shape : tuple of int
+        Cells of its grid.
+    """
+    duration = case.program().duration
+    rungs = [Setting(tolerance) for tolerance in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)]
+    for coarsening, tolerance in ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)):
+        if min(shape) / coarsening >= _FEWEST:
+            rungs.append(Setting(tolerance, coarsening=coarsening))
+    if not is_data(case):
+        rungs += [Setting(1e-3, coarsening=c) for c in (0.5, 0.25) if max(shape) / c <= _MOST]
+    rungs.append(Setting(1e-3, precision=FLOAT32))
+    if duration > 0:
+        rungs.append(Setting(1e-2, memory="direct"))
+        rungs += [Setting(time_step=round_to(duration / steps)) for steps in (20, 80)]
+        rungs += [Setting(time_step=round_to(duration / steps), method="seed") for steps in (20, 80)]
+    return rungs
+
+
+def round_to(value: float, digits: int = 3) -> float:
+    """A number with few digits, so that a study file with it reads well."""
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,211 @@
+"""Which setting to take: the cheapest that is accurate enough, in words and as keys of a study."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.study.trade.exact import QUANTITIES
+from roughvisc.study.trade.ladder import step_text
+from roughvisc.units import quantity as quantity_in
+
+#: The accuracies that are advised on unasked.
+TARGETS = (1e-2, 1e-3)
+#: Wall times within this factor are taken to be the same.
+_ALIKE = 1.1
+#: What quantities are called in words; the area meant where none is named is the corrected one.
+WORDS = {
+    "contact_area_corrected": "contact area",
+    "pressure": "pressure",
+    "approach": "approach",
+    "contact_area": "contact area as counted",
+    "mean_gap": "mean gap",
+}
+
+
+def front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
+    """The Pareto front: settings that no other one beats in wall time without being beaten in accuracy.
+
+    Errors count to two digits: what differs by less is no gain.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.trade`.
+    quantity : str
+        Whose error counts.
+    """
+    spent, wrong = dataset["run_time"].values, dataset["error"].sel(quantity=quantity).values
+    known = np.isfinite(spent) & np.isfinite(wrong)
+    wrong = np.array([float(f"{value:.1e}") for value in wrong])
+    best = np.zeros(len(spent), dtype=bool)
+    for i in np.flatnonzero(known):
+        no_worse = known & (spent <= spent[i]) & (wrong <= wrong[i])
+        better = no_worse & ((spent < spent[i]) | (wrong < wrong[i]))
+        best[i] = not better.any()
+    return best
+
+
+def uncertainty(dataset: xr.Dataset, quantity: str) -> float:
+    """How far the reference may be off; where the grid is data, on that grid."""
+    parts = ("time",) if dataset.attrs.get("grid_is_data") else ("time", "grid")
+    return float(sum(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity) for part in parts))
+
+
+def admissible(dataset: xr.Dataset, quantity: str, target: float) -> NDArray[np.bool_]:
+    """Settings that keep a relative error, the reference's own uncertainty counted with it.
+
+    A setting counts only if those that differ by nothing but a sharper tolerance or a shorter step keep it too:
+    what a loose one gets right by chance is no reason to take it. Where the grid is data, none on another grid counts.
+    """
+    errors = dataset["error"].sel(quantity=quantity).values
+    kept = errors + uncertainty(dataset, quantity) <= target
+    missed = np.isfinite(errors) & ~kept
+    step = np.nan_to_num(dataset["time_step"].values, nan=0.0)
+    same = ("family", "coarsening")
+    good = kept.copy()
+    for i in np.flatnonzero(kept):
+        alike = np.all([dataset[name].values == dataset[name].values[i] for name in same], axis=0)
+        sharper = (dataset["tolerance"].values <= dataset["tolerance"].values[i]) & (step <= step[i])
+        good[i] = not (alike & sharper & missed).any()
+    if dataset.attrs.get("grid_is_data"):
+        good &= dataset["coarsening"].values == 1
+    return good
+
+
+def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
+    """Index of the fastest admissible setting; None if there is none.
+
+    Of those that take hardly longer, which another timing might turn round, it is the first.
+    """
+    spent = np.where(admissible(dataset, quantity, target), dataset["run_time"].values, np.inf)
+    if not np.isfinite(spent).any():
+        return None
+    return int(np.flatnonzero(spent <= _ALIKE * np.min(spent))[0])
+
+
+def known_quantity(quantity: str, name: str = "quantity") -> str:
+    """The quantity, if there is one of that name."""
+    if quantity not in QUANTITIES:
+        raise InputError(f"{name}: found {quantity!r}: expected one of {', '.join(QUANTITIES)}")
+    return quantity
+
+
+def recommendation(dataset: xr.Dataset) -> str:
+    """Advice in words, a line for each quantity that something is known of."""
+    advised = [name for name in WORDS if name != "contact_area"]
+    known = [name for name in advised if np.isfinite(dataset["error"].sel(quantity=name)).any()]
+    lines = [_advice(dataset, name) for name in known]
+    return "\n".join(lines + ([_of_the_scan(dataset)] if dataset.attrs.get("grid_is_data") else []))
+
+
+def _of_the_scan(dataset: xr.Dataset) -> str:
+    """What the spacing of the points makes of the contact area, which no setting mends."""
+    name = "contact_area_corrected"
+    found = dict(zip(dataset["coarsening"].values, dataset["coarsening_error"].sel(quantity=name).values, strict=True))
+    parts = [f"{percent(found[k])} on cells {k:g} times as long" for k in sorted(found) if k > 1 and found[k] > 0]
+    unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=name))
+    text = "the grid is data, and no setting"
+    if parts:
+        text += f": the contact area changes by {' and '.join(parts)}"
+    if np.isfinite(unsure):
+        text += f"; the spacing of the points leaves about {percent(unsure)} of it unknown"
+    return text
+
+
+def _advice(dataset: xr.Dataset, quantity: str) -> str:
+    """``for 1 % on contact area use tolerance = 3e-2: 14 s; for 0.1 %: tolerance = 1e-3: 3 min``."""
+    said, last = [], None
+    for target in TARGETS:
+        index = cheapest(dataset, quantity, target)
+        if index is None:
+            said.append(f"for {percent(target)}: {shortfall(dataset, quantity, target)}")
+            continue
+        name, spent = str(dataset["setting"].values[index]), duration(float(dataset["run_time"][index]))
+        lead = f"for {percent(target)} on {WORDS[quantity]} use" if not said else f"for {percent(target)}"
+        said.append(f"{lead} the same" if index == last else f"{lead} {name}: {spent}")
+        last = index
+    if last is None or " on " not in said[0]:  # nothing keeps the first target
+        said[0] = said[0].replace(":", f" on {WORDS[quantity]}:", 1)
+    if last is None and len({text.partition(": ")[2] for text in said}) == 1:
+        targets = " or ".join(percent(target) for target in TARGETS)
+        return f"for {targets} on {WORDS[quantity]}: {said[0].partition(': ')[2]}"
+    return "; ".join(said)
+
+
+def shortfall(dataset: xr.Dataset, quantity: str, target: float) -> str:
+    """Why no setting is accurate enough, in words."""
+    unsure = uncertainty(dataset, quantity)
+    if not np.isfinite(unsure):
+        return "cannot be told, the finest run's own accuracy is not known"
+    if unsure >= target:
+        return f"cannot be told, the finest run itself is known to {percent(unsure)}"
+    errors = dataset["error"].sel(quantity=quantity).values
+    if dataset.attrs.get("grid_is_data"):
+        errors = np.where(dataset["coarsening"].values == 1, errors, np.nan)
+    if not np.isfinite(errors).any():
+        return "cannot be told, no setting was measured"
+    best = int(np.nanargmin(errors))
+    name = dataset["setting"].values[best]
+    return f"no setting measured keeps it, {name} comes nearest with {percent(errors[best] + unsure, 3)}"
+
+
+def percent(part: float, digits: int = 2) -> str:
+    """A part as a percentage.
+
+    Examples
+    --------
+    >>> percent(0.01), percent(1.234e-3), percent(2e-6)
+    ('1 %', '0.12 %', '0.0002 %')
+    """
+    return f"{100 * float(f'{part:.{digits}g}'):.6f}".rstrip("0").rstrip(".") + " %"
+
+
+def duration(seconds: float) -> str:
+    """A wall time as one says it.
+
+    Examples
+    --------
+    >>> duration(0.0123), duration(14.2), duration(190), duration(9000)
+    ('0.012 s', '14 s', '3 min', '2.5 h')
+    """
+    if seconds < 90:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def _step(step: float) -> str | float:
+    """A time step with its unit, where that is no other number."""
+    text = step_text(step)
+    return text if quantity_in(text, "s") == step else step
+
+
+def keys_of(dataset: xr.Dataset, index: int) -> dict[str, dict[str, Any]]:
+    """Tables and keys of a study file that make a setting; None: to be as if it were not there.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.trade`.
+    index : int
+        Of the setting.
+    """
+    row = dataset.isel(setting=index)
+    step, precision = float(row["time_step"]), float(row["precision"])
+    solve: dict[str, Any] = {
+        "tolerance": float(row["tolerance"]),
+        "time_step": _step(step) if np.isfinite(step) else None,
+        "method": None if row["method"] == "fast" else row["method"].item(),
+        "memory": None if row["memory"] == "auto" else row["memory"].item(),
+    }
+    tables: dict[str, dict[str, Any]] = {"solve": solve}
+    if float(row["coarsening"]) != 1:
+        shape = [int(row["cells_x"]), int(row["cells_y"])]
+        tables["surface"] = {"shape": shape if shape[0] != shape[1] else shape[0]}
+    if np.isfinite(precision):
+        tables["keep"] = {"precision": precision}
+    return tables

@@ -1,0 +1,186 @@
+"""Speed against accuracy: one scene under a ladder of settings, each timed and held against what is exact."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.study.simulation.scene import kept_times
+from roughvisc.study.statement.case import Case, read_study, vary
+from roughvisc.study.trade.bench import Bench, NotRun, Report
+from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
+from roughvisc.study.trade.finest import Finest
+from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
+from roughvisc.study.trade.recommend import recommendation
+from roughvisc.study.trade.watch import reporting
+from roughvisc.variables import annotate
+
+#: Kept times where a study keeps all accepted steps, which differ from setting to setting.
+_INSTANTS = 9
+
+
+def trade(
+    case: Case | str | Path,
+    settings: Sequence[Setting] | None = None,
+    *,
+    budget: float = 300.0,
+    reference: Literal["auto", "run"] = "auto",
+    progress: bool | Report = True,
+) -> xr.Dataset:
+    """Compute one case under a ladder of settings, and measure what each costs and how wrong it is.
+
+    Parameters
+    ----------
+    case : Case or path
+        A case, or the study file that states one.
+    settings : sequence of Setting, optional
+        What to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
+        rounded to the precision of a float32, the direct history, fixed steps, and the seed paper's algorithm.
+    budget : float
+        Wall time of all runs together. A setting that would take longer than what is left is not run, and says
+        so. [s]
+    reference : {"auto", "run"}
+        Measure against a closed form where the case has one, or against its own finest run in any case.
+    progress : bool or callable
+        A progress bar, or a function called with a setting's name, the time reached and the program's length [s].
+
+    Returns
+    -------
+    xarray.Dataset
+        Along ``setting``: ``run_time``, ``transforms``, ``steps``, ``peak_memory``, ``disk_size``, and ``error`` and
+        ``coarsening_error`` of each ``quantity``. Along ``quantity``: what the ``reference`` is, and how far it may
+        be off itself, ``reference_time_uncertainty`` and ``reference_grid_uncertainty``. Attribute
+        ``recommendation``: which setting to take for which accuracy, in words. ``rv.plot.trade`` draws it.
+
+    Raises
+    ------
+    InputError
+        If the study is wrong or holds a sweep, or its reference would take longer than half the budget.
+
+    Notes
+    -----
+    The finest run is as fine as the finest grid of the settings, with a fifth of their sharpest tolerance. How far
+    it may be off itself follows from runs with that tolerance, on grids two and four times coarser, by Richardson
+    extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells.
+    """
+    if not isinstance(case, Case):
+        case = read_study(case)
+    if not budget > 0:
+        raise InputError(f"budget is {budget!r}: expected a positive number of seconds")
+    if reference not in ("auto", "run"):
+        raise InputError(f"reference is {reference!r}: expected 'auto' or 'run'")
+    case = _comparable(case)
+    height = case.height()
+    shape = (height.sizes["x"], height.sizes["y"])
+    rungs = list(ladder(case, shape) if settings is None else settings)
+    if not rungs:
+        raise InputError("settings is empty: expected at least one Setting")
+    program = case.program()
+    times = np.array(kept_times(program, case.settings.keep.times))
+    exact = closed_form(case, times) if reference == "auto" else None
+    with tempfile.TemporaryDirectory() as folder, reporting(progress) as report:
+        bench = Bench(case, height, Path(folder), budget, report)
+        known = exact.quantities if exact else ()
+        finest = None if set(QUANTITIES) <= set(known) else Finest(bench, rungs, is_data(case))
+        rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
+    order = [rungs.index(row["rung"]) for row in rows]
+    rows = [rows[i] for i in np.argsort(order, kind="stable")]
+    return _labelled(case, rows, exact, finest)
+
+
+def _comparable(case: Case) -> Case:
+    """The case with times that all settings have in common, and with the pressures that are compared."""
+    keep = case.settings.keep
+    changes: dict[str, Any] = {"solve.grid_error": False}
+    changes["keep.fields"] = [*dict.fromkeys([*keep.fields, "pressure"])]
+    if keep.times == "all":
+        changes["keep.times"] = _INSTANTS
+    return vary(case, changes)
+
+
+def _row(bench: Bench, setting: Setting, exact: ClosedForm | None, finest: Finest | None) -> dict[str, Any]:
+    """What a setting cost and how wrong it was, or why that is not known."""
+    shape = shape_of(bench.case, bench.shape, setting.coarsening)
+    missing = dict.fromkeys(QUANTITIES, math.nan)
+    row: dict[str, Any] = {
+        "rung": setting,
+        "setting": bench.label(setting),
+        "family": setting.family,
+        "method": setting.method,
+        "memory": setting.memory,
+        "tolerance": setting.tolerance,
+        "time_step": math.nan if setting.time_step is None else setting.time_step,
+        "coarsening": setting.coarsening,
+        "precision": math.nan if setting.precision is None else setting.precision,
+        "cells_x": shape[0],
+        "cells_y": shape[1],
+        "error": missing,
+        "coarsening_error": missing,
+        "note": "",
+    }
+    costs = dict.fromkeys(("run_time", "transforms", "steps", "peak_memory", "disk_size"), math.nan)
+    try:
+        if finest and not is_data(bench.case):
+            finest.check(setting)
+        run = bench.run(setting)
+    except NotRun as error:
+        return row | costs | {"note": str(error)}
+    row["error"] = (finest.errors(run.dataset) if finest else {}) | (exact.errors(run.dataset) if exact else {})
+    if finest:
+        alone = finest.of_coarsening(setting.coarsening)
+        row["coarsening_error"] = missing | {
+            name: alone[name] for name in QUANTITIES if not (exact and name in exact.quantities)
+        }
+    return row | {
+        "run_time": run.seconds,
+        "transforms": float(run.dataset["convolutions"].sum()),
+        "steps": float(run.steps),
+        "peak_memory": run.peak_memory,
+        "disk_size": run.disk_size,
+    }
+
+
+_TEXTS = ("setting", "family", "method", "memory", "note")
+_COORDS = ("setting", "family", "method", "memory", "tolerance", "time_step", "coarsening", "precision")
+
+
+def _labelled(
+    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: Finest | None
+) -> xr.Dataset:
+    names = [name for name in rows[0] if name != "rung"]
+    columns: dict[str, Any] = {}
+    for name in names:
+        values = [row[name] for row in rows]
+        if name in ("error", "coarsening_error"):
+            columns[name] = (("setting", "quantity"), np.array([[v[q] for q in QUANTITIES] for v in values], float))
+        else:
+            columns[name] = ("setting", np.array(values, dtype=str if name in _TEXTS else float))
+    closed = dict.fromkeys(exact.quantities, exact.name) if exact else {}
+    run = finest.name if finest else ""
+    columns["reference"] = ("quantity", np.array([closed.get(name, run) for name in QUANTITIES], dtype=str))
+    for part in ("time", "grid"):
+        unsure = [0.0 if name in closed or not finest else getattr(finest, part)[name] for name in QUANTITIES]
+        columns[f"reference_{part}_uncertainty"] = ("quantity", np.array(unsure))
+    coords = {name: columns.pop(name) for name in (*_COORDS, "cells_x", "cells_y")}
+    dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(QUANTITIES)}))
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "title": case.title,
+        "source": f"roughvisc {metadata.version('roughvisc')}",
+        "comment": "One case computed under many settings, each timed and held against 'reference'; attribute 'case' "
+        "states it (JSON, SI units).",
+        "case": case.to_json(),
+        "grid_is_data": int(is_data(case)),
+        "transforms": transform_engine(),
+    }
+    dataset.attrs["recommendation"] = recommendation(dataset)
+    return dataset

@@ -1,0 +1,1 @@
+"""Held against closed forms, on the machine of the user."""

@@ -1,0 +1,308 @@
+"""The cases of :func:`roughvisc.validate`: what is pressed, its closed form, and the error that the method explains.
+
+All in units of their own: lengths in contact radii or wavelengths, moduli and times of order one; the solver is
+neutral to units. Each case yields rows ``(what is compared, error, expected error)``. The expected ones are sums of
+
+* the tolerance, on pressure (L1, over the largest force) and on the approach (over the largest one);
+* the grid, whose cells have side ``h``, on a contact of radius ``a``:
+
+  - a cell stands for ``r^2 / (2 R)`` by its value at the centre, which is ``h^2 / (12 R)`` below its mean, and for a
+    round maximum of pressure likewise: ``(h/a)^2 / 12`` of approach and largest pressure, whether the number of cells
+    is odd or even, since the undeformed gap counts from the apex; with an even number the largest pressure is that
+    of cells ``h / sqrt(2)`` off the apex, for ``(h/a)^2 / 4`` in place of that;
+  - the outline is right to half a cell. Pressure vanishes there as a square root, so a ring of that width holds the
+    part ``(h/a)^(3/2)`` of the force under a sphere, and ``0.42 (h/b)^(3/2)`` under a strip of half-width ``b``;
+  - the area of counted cells is corrected by 0.088 times the outline, known to 0.008: ``0.02 h/a``; what is counted
+    within a circle scatters about its area as the number of lattice points does, by about ``(h/a)^(3/2)``;
+  - a punch of cells has a radius right to half a cell, and all that is singular at its edge: ``h / (2 a)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.materials.models import (
+    Material,
+    PowerLaw,
+    Prony,
+    Tabulated,
+    elastic,
+    kelvin_voigt,
+    maxwell,
+    zener,
+)
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.study.simulation.simulate import simulate
+from roughvisc.topography.synthesis import cone, flat_punch, sphere, wavy
+
+Array = NDArray[np.float64]
+Rows = Iterator[tuple[str, float, float]]
+
+_TOLERANCE = 1e-3
+_UNIT = elastic(0.25)  # contact modulus 1
+_ZENER = zener(0.25, 0.125, 0.125)  # contact modulus 1, relaxes to a third; retardation time 1
+_MAXWELL = maxwell(0.25, 0.25)
+_SIZE = 2.6  # of the grid, in contact radii
+_ROUND, _SLOPE = 10.0, 0.1  # radius of the spheres, in contact radii; slope of the cone
+
+
+def _press(height: xr.DataArray, material: Material, program: Program, **settings: Any) -> xr.Dataset:
+    return simulate(height, material, program, **{"tolerance": _TOLERANCE, "progress": False, **settings})
+
+
+def _distance(dataset: xr.Dataset) -> Array:
+    """Of each cell from the middle of the grid. [m]"""
+    x, y = (dataset[axis] - dataset[axis].mean() for axis in ("x", "y"))
+    return np.asarray(np.hypot(x, y).values)
+
+
+def _radius(dataset: xr.Dataset) -> Array:
+    return np.sqrt(dataset["contact_area_corrected"].values / np.pi)
+
+
+def _pressure_error(dataset: xr.Dataset, exact: Callable[[Array, float], Array], beyond: float = 0.0) -> float:
+    """Largest L1 error over the largest force, outside of a distance from the axis."""
+    distance = _distance(dataset)
+    here = distance > beyond
+    cell = float((dataset.x[1] - dataset.x[0]) * (dataset.y[1] - dataset.y[0]))
+    # many cells are as far from the axis as others, and a closed form may take its time
+    radii, which = np.unique(np.round(distance[here] / np.sqrt(cell), 9), return_inverse=True)
+    errors = [
+        np.sum(np.abs(dataset["pressure"].values[i][here] - exact(radii * np.sqrt(cell), float(t))[which]))
+        for i, t in enumerate(dataset["time"].values)
+    ]
+    return float(np.max(errors)) * cell / float(dataset["force"].max())
+
+
+def _relative(found: Any, exact: Any) -> float:
+    """Largest deviation over the largest exact value."""
+    found, exact = np.asarray(found, dtype=float), np.asarray(exact, dtype=float)
+    return float(np.max(np.abs(found - exact)) / np.max(np.abs(exact)))
+
+
+def _approach_error(cells: int, a: float = 1.0) -> float:
+    """Expected error of the approach of a sphere or a cone to a contact radius of ``a``."""
+    return (_SIZE / cells / a) ** 2 / 12 + _TOLERANCE
+
+
+def _radius_error(h: float, a: float) -> float:
+    """Expected error of a contact radius from the corrected area."""
+    return 0.01 * h / a + 0.5 * (h / a) ** 1.5
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# elastic
+
+
+def _both_parities(rows: Callable[[int], Rows]) -> Callable[[int], Rows]:
+    """The rows of a grid whose apex lies in the middle of a cell, and of one where it lies between four."""
+
+    def both(cells: int) -> Rows:
+        for count in (cells, cells + 1):
+            for what, error, expected in rows(count):
+                yield f"{what}, {'odd' if count % 2 else 'even'} grid", error, expected
+
+    return both
+
+
+def hertz(cells: int) -> Rows:
+    exact, h = closed_forms.hertz(_ROUND, 1.0, 4 / 3 / _ROUND), _SIZE / cells
+    ds = _press(sphere(_ROUND, _SIZE, cells), _UNIT, Program().load(4 / 3 / _ROUND, over=0))
+    yield "approach", _relative(ds.approach[0], exact.approach), _approach_error(cells)
+    yield "contact radius", _relative(_radius(ds), exact.radius), _radius_error(h, 1) + _TOLERANCE
+    peak = h**2 / (12 if cells % 2 else 4) + _TOLERANCE
+    yield "largest pressure", _relative(ds.pressure.max(), exact.peak_pressure), peak
+    yield "pressure (L1)", _pressure_error(ds, lambda r, _: exact.pressure(r)), h**1.5 + _TOLERANCE
+
+
+def sneddon(cells: int) -> Rows:
+    """The pressure is infinite at the apex: the cells about it are left out."""
+    exact, h = closed_forms.sneddon_cone(_SLOPE, 1.0, np.pi / 2 * _SLOPE), _SIZE / cells
+    ds = _press(cone(_SLOPE, _SIZE, cells), _UNIT, Program().load(np.pi / 2 * _SLOPE, over=0))
+    yield "approach", _relative(ds.approach[0], exact.approach), _approach_error(cells)
+    yield "contact radius", _relative(_radius(ds), exact.radius), _radius_error(h, 1) + _TOLERANCE
+    yield "pressure (L1)", _pressure_error(ds, lambda r, _: exact.pressure(r), 2 * h), h**1.5 + _TOLERANCE
+
+
+def punch(cells: int) -> Rows:
+    exact, h = closed_forms.flat_punch(1.0, 1.0, 2.0), _SIZE / cells
+    ds = _press(flat_punch(1.0, _SIZE, cells), _UNIT, Program().load(2.0, over=0))
+    yield "approach", _relative(ds.approach[0], exact.approach), h / 2 + _TOLERANCE
+    middle = _distance(ds) < 0.5
+    inside = exact.pressure(_distance(ds)[middle])
+    yield "pressure within a / 2", _relative(ds.pressure.values[0][middle], inside), h / 2 + _TOLERANCE
+
+
+def westergaard(cells: int) -> Rows:
+    """The profile is even in y: three cells across."""
+    amplitude, across = 1e-3, 3 / cells
+    full = closed_forms.full_contact_pressure(amplitude, 1.0, 1.0, waves=1)
+    surface = wavy(amplitude, 1.0, (1.0, across), (cells, 3), waves=1)
+    for ratio in (0.3, 0.7, 1.5):
+        exact = closed_forms.westergaard(amplitude, 1.0, 1.0, ratio * full)
+        ds = _press(surface, _UNIT, Program().load(ratio * full * across, over=0), boundary="periodic")
+        pressure = exact.pressure(ds.x.values)
+        error = float(np.sum(np.abs(ds.pressure.values[0, :, 1] - pressure)) / np.sum(pressure))
+        edges = 0.42 * (1 / cells / exact.half_width) ** 1.5 if ratio < 1 else 0.0
+        yield f"pressure (L1) at {ratio} p*", error, edges + _TOLERANCE
+        if ratio < 1:  # an edge on either side of the crest
+            at = f"contact fraction at {ratio} p*"
+            yield at, abs(float(ds.contact_fraction[0]) - exact.contact_fraction), 2 / cells
+
+
+def crossed_waves(cells: int) -> Rows:
+    """Limits: the next term in the shape of a crest is ``(k a)^2 / 8`` of the first, on average over directions."""
+    full = closed_forms.full_contact_pressure(1e-3, 1.0, 1.0)
+    surface = wavy(1e-3, 1.0, 1.0, cells)
+    for ratio, limit in ((0.01, "low"), (0.97, "high")):
+        exact = float(closed_forms.johnson_greenwood_higginson(ratio, limit))
+        ds = _press(surface, _UNIT, Program().load(ratio * full, over=0), boundary="periodic")
+        round_area = exact if limit == "low" else 1 - exact  # two in each period
+        radius = np.sqrt(round_area / 2 / np.pi)
+        error = abs(float(ds.contact_area_corrected[0]) - exact) / round_area
+        shape = (2 * np.pi * radius) ** 2 / 8
+        what = "contact area" if limit == "low" else "area of the gaps"
+        yield f"{what} at {ratio} p*", error, shape + 2 * _radius_error(1 / cells, radius) + _TOLERANCE
+    ds = _press(surface, _UNIT, Program().load(1.2 * full, over=0), boundary="periodic")
+    wave = full * np.cos(2 * np.pi * ds.x.values)[:, None] * np.cos(2 * np.pi * ds.y.values)
+    error = float(np.mean(np.abs(ds.pressure.values[0] - 1.2 * full - wave)) / (1.2 * full))
+    yield "pressure (L1) at 1.2 p*", error, _TOLERANCE
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# viscoelastic: contacts that grow, shrink, and stay
+
+
+def _step(cells: int, material: Material) -> tuple[xr.Dataset, closed_forms.StepLoad, float]:
+    """A load applied at once on a sphere and kept, to a contact radius of one; with the cell's side."""
+    load = 4 / 3 / _ROUND / float(material.contact_compliance(4.0))
+    times = [0.5, 1.0, 2.0, 4.0] if material.contact_compliance(0.0) == 0 else [0.0, 0.5, 1.0, 2.0, 4.0]
+    ds = _press(sphere(_ROUND, _SIZE, cells), material, Program().load(load, over=0).hold(4.0), times=times)
+    return ds, closed_forms.lee_radok_step(_ROUND, material, load), _SIZE / cells
+
+
+def _lee_radok(material: Prony) -> Callable[[int], Rows]:
+    def rows(cells: int) -> Rows:
+        ds, exact, h = _step(cells, material)
+        smallest = float(exact.radius(0.0))
+        yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+        yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, smallest) + _TOLERANCE
+        yield "pressure (L1)", _pressure_error(ds, exact.pressure), (h / smallest) ** 1.5 + _TOLERANCE
+
+    return rows
+
+
+def without_jump(cells: int) -> Rows:
+    """The tolerance is kept on the approach."""
+    ds, exact, h = _step(cells, kelvin_voigt(0.25, 0.25))
+    yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+    radius = float(exact.radius(0.5))
+    yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, radius) + _TOLERANCE
+
+
+def power_law(cells: int) -> Rows:
+    exact = closed_forms.power_law_ramp(_ROUND, 2 / _ROUND, 1.0, 0.5)
+    material = PowerLaw(0.0, 4.0, 0.5)  # C = J / 4
+    ds = _press(sphere(_ROUND, _SIZE, cells), material, Program().load(2 / _ROUND, over=1.0), times=[0.25, 0.5, 1.0])
+    yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+
+
+def unloading(cells: int) -> Rows:
+    program = Program().load(0.8 / _ROUND, over=1.0).load(0.0, over=1.0)
+    exact = closed_forms.ting(closed_forms.Paraboloid(_ROUND), _ZENER, program)
+    ds = _press(sphere(_ROUND, _SIZE, cells), _ZENER, program, times=[0.5, 1.0, 1.5, 1.8])
+    h, smallest = _SIZE / cells, float(exact.radius(1.8))
+    yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+    yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, smallest) + _TOLERANCE
+    yield "pressure (L1)", _pressure_error(ds, exact.pressure), (h / smallest) ** 1.5 + _TOLERANCE
+
+
+def relaxation(cells: int) -> Rows:
+    program = Program().load(0.8 / _ROUND, over=0.2).hold(2.0, control="approach")
+    times = [0.1, 0.2, 0.5, 1.0, 2.2]
+    exact = closed_forms.reduced_contact(closed_forms.Paraboloid(_ROUND), _ZENER, program, times)
+    ds = _press(sphere(_ROUND, _SIZE, cells), _ZENER, program, times=times)
+    # under given approach the force takes the approach's error times d(ln W) / d(ln approach) = 3 / 2
+    expected = 1.5 * _approach_error(cells, float(exact.radius[-1]))
+    yield "force", _relative(ds.force, exact.force), expected
+    yield "work", _relative(ds.work, exact.work), expected * 5 / 3  # which is of power 5 / 2
+
+
+def wave(cells: int) -> Rows:
+    across = 3 / cells
+    mean = 2 * closed_forms.full_contact_pressure(1e-3, 1.0, 1.0, waves=1)
+    program, times = Program().load(mean * across, over=0).hold(2.0), [0.0, 0.5, 1.0, 2.0]
+    surface = wavy(1e-3, 1.0, (1.0, across), (cells, 3), waves=1)
+    ds = _press(surface, _ZENER, program, boundary="periodic", times=times)
+    exact = closed_forms.full_contact_wave(1e-3, 2 * np.pi, _ZENER, times)
+    crest = np.cos(2 * np.pi * ds.x.values)
+    error = np.mean(np.abs(ds.pressure.values[:, :, 1] - mean - exact[:, None] * crest), axis=1)
+    yield "pressure (L1)", float(np.max(error)) / mean, _TOLERANCE
+
+
+def loaded_punch(cells: int) -> Rows:
+    program = Program().load(2.0, over=1.0).hold(1.0).load(0.5, over=0.5).hold(1.0)
+    times = [0.5, 1.0, 2.0, 2.5, 3.5]
+    ds = _press(flat_punch(1.0, _SIZE, cells), _ZENER, program, times=times)
+    exact = closed_forms.punch_approach(1.0, _ZENER, program, times)
+    yield "approach", _relative(ds.approach, exact), _SIZE / cells / 2 + _TOLERANCE
+    # whatever the outline of the punch, its approach has one course in time
+    found, expected = ds.approach.values / float(ds.approach[1]), exact / exact[1]
+    yield "course of the approach", _relative(found, expected), 2 * _TOLERANCE
+
+
+def cycled_punch(cells: int) -> Rows:
+    period, amplitude, mean = 3.0, 0.2, 1.0
+    program = Program().approach(mean, over=0.5) + Program.cycle(mean, amplitude, period, 4, control="approach")
+    ends = 0.5 + period * np.arange(5)
+    ds = _press(flat_punch(1.0, _SIZE, cells), _ZENER, program, times=ends, fields=())
+    found = float(np.diff(ds.work.values)[-1])
+    exact = closed_forms.punch_dissipation(1.0, _ZENER, amplitude, period)
+    # the force of the start has relaxed by four cycles; its error, of the largest force, acts over the whole path
+    largest = closed_forms.punch_force(1.0, _ZENER, Program().approach(mean, over=0.5), 0.5)
+    path = 4 * amplitude * float(largest) / exact
+    yield "dissipation in a cycle", _relative(found, exact), _SIZE / cells / 2 + _TOLERANCE * path
+
+
+def histories(cells: int) -> Rows:
+    """One measured material by the direct history and by a series, which is certified, on the same steps."""
+    t = np.geomspace(1e-6, 10.0, 400)
+    measured = Tabulated(tuple(t), tuple(4 * (2 - np.exp(-t))))
+    program = Program().load(0.2 / _ROUND, over=1.0).hold(1.0).load(0.1 / _ROUND, over=0.5)
+    ball, times = sphere(_ROUND, 2.0, cells), [1.0, 2.0, 2.5]
+    steps = {"times": times, "time_step": 0.05}
+    recursive = _press(ball, measured, program, **steps)
+    direct = _press(ball, measured, program, **steps, memory="direct", tolerance=1e-6)
+    certified = "in place of the compliance" in recursive.attrs["memory"]
+    yield "both histories at work", 0.0 if certified and "direct" in direct.attrs["memory"] else np.nan, 0.0
+    error = float(recursive.attrs["series_error"])
+    # what the contact solver leaves of the approach is of the order of its relative gap: far below the series' error
+    yield "approach", _relative(recursive.approach, direct.approach), error
+    pressure = abs(recursive.pressure - direct.pressure).sum(("x", "y")) / direct.pressure.sum(("x", "y"))
+    yield "pressure (L1)", float(pressure.max()), error + _TOLERANCE
+
+
+#: name -> (what is pressed on what, its rows for a number of cells)
+CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
+    "Hertz": ("sphere, elastic (Hertz)", _both_parities(hertz)),
+    "Sneddon": ("cone, elastic (Sneddon)", _both_parities(sneddon)),
+    "Boussinesq": ("flat punch, elastic (Boussinesq)", punch),
+    "Westergaard": ("wave, periodic, elastic (Westergaard)", westergaard),
+    "Johnson": ("crossed waves, periodic, elastic (Johnson, Greenwood, Higginson)", crossed_waves),
+    "Maxwell": ("sphere, step load, Maxwell (Lee, Radok)", _lee_radok(_MAXWELL)),
+    "Zener": ("sphere, step load, Zener (Lee, Radok)", _lee_radok(_ZENER)),
+    "Kelvin-Voigt": ("sphere, step load, Kelvin-Voigt (Lee, Radok)", without_jump),
+    "power law": ("sphere, ramp of load, t^0.5 (Lee, Radok)", power_law),
+    "Ting": ("sphere, triangle of load, Zener (Ting)", unloading),
+    "relaxation": ("sphere, load then fixed approach, Zener (element reduction)", relaxation),
+    "full wave": ("wave in full contact, periodic, Zener", wave),
+    "punch": ("flat punch, loaded and unloaded, Zener", loaded_punch),
+    "cycles": ("flat punch, cycles of approach, Zener", cycled_punch),
+    "histories": ("sphere, measured creep: series against direct history", histories),
+}

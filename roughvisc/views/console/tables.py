@@ -1,0 +1,350 @@
+"""What the command line shows: progress, and tables of what was found and what it cost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from rich.console import Console, Group
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from roughvisc.views.figures.axes import unit_for
+
+if TYPE_CHECKING:
+    from roughvisc.study.execution.profile import Profile
+    from roughvisc.study.execution.task import Outcome
+    from roughvisc.study.validation.validate import Comparison
+
+#: What is stated of accuracy, and its parts, each at its worst.
+_ERRORS = {
+    "stated_error": "worst stated error",
+    "time_error": "time steps, worst",
+    "residual": "contact solver, estimated",
+}
+_PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
+
+
+def readable(value: float, unit: str) -> str:
+    """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
+    return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
+
+
+@contextmanager
+def progress(console: Console, label: str) -> Iterator[Callable[[float, float], None]]:
+    """A function to call with the time reached and the time at the end [s].
+
+    It draws a bar, or writes a line every few seconds where there is no terminal.
+    """
+    if console.is_terminal and not console.quiet:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[at]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=console, transient=True) as bar:
+            task = bar.add_task(label, total=1.0, at="")
+            yield lambda now, end: bar.update(task, completed=now / end if end else 1.0, at=_at(now, end))
+    else:
+        yield _lines(console, label)
+
+
+def _lines(console: Console, label: str) -> Callable[[float, float], None]:
+    began = last = time.monotonic()
+
+    def report(now: float, end: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _PLAIN_EVERY:
+            last = time.monotonic()
+            console.print(f"{label}: {_at(now, end)}, {last - began:.0f} s", highlight=False)
+
+    return report
+
+
+def _at(now: float, end: float) -> str:
+    unit = unit_for(end, "s")
+    return f"t = {unit(now):.3g} of {unit.text(end)}"
+
+
+def result_table(dataset: xr.Dataset) -> Group:
+    """Summary of a result: what came out, how accurate it is, what it cost."""
+    last = dataset.isel(time=-1)
+    end = float(last["time"])
+    steps = dataset.sizes["time"]
+    rows = [
+        ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
+        ("Kept times", f"{steps}, up to t = {readable(end, 's')}"),
+        ("Force at the end", readable(float(last["force"]), "N")),
+        ("Approach at the end", readable(float(last["approach"]), "m")),
+        (
+            "Contact area at the end",
+            f"{readable(float(last['contact_area_corrected']), 'm2')} corrected for the grid, "
+            f"{readable(float(last['contact_area']), 'm2')} counted"
+            f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
+        ),
+        *_accuracy([dataset], dataset.attrs.get("tolerance")),
+        *(
+            (f"Accuracy: worst {label}", _number(dataset[name]))
+            for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
+            if name in dataset
+        ),
+        ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
+        ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
+        ("Cost: wall time", readable(float(last["wall_time"]), "s")),
+    ]
+    return _two_columns(rows, dataset.attrs.get("title"))
+
+
+def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        One a distinct case.
+    asked : int
+        Number of cases, those alike counted each.
+    title : str
+        Of the study.
+    """
+    kinds = [outcome.kind for outcome in outcomes]
+    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
+    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
+    alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
+        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
+    rows += _accuracy([entry.histories for entry in entries])
+    if spent:
+        rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
+    return _two_columns(rows, title)
+
+
+def plan_tables(costs: xr.Dataset) -> Group:
+    """What a study will model and what it will cost.
+
+    Parameters
+    ----------
+    costs : xarray.Dataset
+        Of :func:`roughvisc.plan`.
+    """
+    total, attrs = costs.sizes["case"], costs.attrs
+    varied = [str(name) for name in costs.coords if name != "case_key"]
+    whole = [
+        ("Cases", f"{total}, {attrs['processes']} side by side"),
+        *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
+        ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
+        ("Contact at most", _contact(costs)),
+        ("Steps a case", _span(costs["steps"], "")),
+        ("Convolutions a case", _span(costs["convolutions"], "")),
+        ("Wall time a case", _span(costs["wall_time"], "s")),
+        ("Wall time of all", f"about {readable(attrs['wall_time'], 's')}"),
+        ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
+        ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
+        ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
+    ]
+    parts: list[Any] = [_two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    if total > 1:
+        parts += [Text(), _case_table(costs, varied)]
+    return Group(*parts)
+
+
+def print_validation(console: Console, found: Sequence[Comparison]) -> None:
+    """What was held against closed forms: a table, or plain lines of it where there is no terminal.
+
+    Parameters
+    ----------
+    console : Console
+        Where to.
+    found : sequence of Comparison
+        Of :func:`roughvisc.validate`.
+    """
+    heading = ("case", "compared", "error", "expected", "verdict")
+    rows = [
+        (
+            "" if i and found[i - 1].case == one.case else one.case,
+            one.compared,
+            f"{one.error:.1e}",
+            f"{one.expected:.1e}",
+            "ok" if one.passed else "FAILED",
+        )
+        for i, one in enumerate(found)
+    ]
+    if console.is_terminal:
+        table = Table(box=None, pad_edge=False)
+        for name in heading:
+            table.add_column(name, justify="right" if name in ("error", "expected") else "left")
+        for row in rows:
+            table.add_row(*map(Text, row), style="" if row[-1] == "ok" else "bold red")
+        console.print(table)
+    else:
+        widths = [max(len(row[i]) for row in (heading, *rows)) for i in range(len(heading))]
+        for row in (heading, *rows):
+            line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
+            console.print(Text(line.rstrip()), soft_wrap=True)
+
+
+#: What is modelled, shown once if it is the same in all cases.
+_MODELLED = {
+    "boundary": "Boundary",
+    "memory_model": "Memory of the material",
+    "scheme": "Time",
+    "left_out": "Left out",
+}
+#: Cases that a plan lists one by one.
+_LISTED = 20
+
+
+def profile_table(profile: Profile) -> Group:
+    """Where the time of a run went."""
+    table = Table(box=None, padding=(0, 2), title="Where the time went", title_justify="left", title_style="bold")
+    table.add_column("part")
+    for column in ("time", "share", "calls"):
+        table.add_column(column, justify="right")
+    for part, seconds in profile.seconds.most_common():
+        calls = profile.calls[part]
+        table.add_row(part, readable(seconds, "s"), f"{profile.share(part):.1%}", f"{calls:,}" if calls else "")
+    table.add_row("all", readable(profile.whole, "s"), "100.0%", "", style="bold")
+    return Group(table)
+
+
+def _contact(costs: xr.Dataset) -> str:
+    """How much of the grid comes into contact, as far as coarse grids can tell."""
+    largest = 100 * costs["contact_fraction"]
+    low, high = (float(f(largest)) for f in (np.nanmin, np.nanmax)) if largest.notnull().any() else (np.nan, np.nan)
+    if np.isnan(low):
+        return ""
+    texts = dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (low, high))
+    span = " to ".join(texts)
+    return f"about {span} % of the grid, judged on a coarse one"
+
+
+def _alike(costs: xr.Dataset, name: str) -> str:
+    found = list(dict.fromkeys(str(value) for value in costs[name].values if value))
+    text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
+    if name == "boundary":
+        text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"
+        text += ", the grid may grow" if costs["grows"].any() else ""
+    return text
+
+
+def _range_of(costs: xr.Dataset, text: Callable[[Any], str]) -> str:
+    found = dict.fromkeys(text(costs.isel(case=i)) for i in range(costs.sizes["case"]))
+    return ", ".join([*found][:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
+
+
+def _span(values: xr.DataArray, unit: str) -> str:
+    known = values.values[np.isfinite(values.values)]
+    if not known.size:
+        return "not known"
+    ends = [f"{value:.0f}" if not unit else readable(float(value), unit) for value in (known.min(), known.max())]
+    return f"about {ends[0]}" if ends[0] == ends[1] else f"about {ends[0]} to {ends[1]}"
+
+
+def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in (*varied, "steps", "convolutions", "wall time", "memory", "disk"):
+        table.add_column(heading, justify="right")
+    for i in range(min(costs.sizes["case"], _LISTED)):
+        row = costs.isel(case=i)
+        cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
+        if row["refusal"].item():
+            table.add_row(*cells, Text("refused"))
+            continue
+        counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
+        sizes = [size(float(row[name])) for name in ("memory", "disk")]
+        table.add_row(*cells, *counts, readable(float(row["wall_time"]), "s"), *sizes)
+    if costs.sizes["case"] > _LISTED:
+        table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))
+    return table
+
+
+def size(count: float) -> str:
+    """A number of bytes as one reads it.
+
+    Examples
+    --------
+    >>> size(2131948), size(24.5e9)
+    ('2.13 MB', '24.5 GB')
+    """
+    for factor, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
+        if count >= factor:
+            return f"{count / factor:.3g} {name}"
+    return f"{count / 1e3:.3g} kB"
+
+
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
+    """What is in a scan: its channels, its size, what is missing, how rough it is.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Heights over (x, y). [m]
+    measures : xarray.Dataset
+        Of :func:`roughvisc.parameters`.
+    name : str
+        Of the file.
+    channels : sequence, optional
+        Of :func:`roughvisc.list_channels`; told where there are several.
+    """
+    sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
+    counts = [height.sizes[axis] for axis in ("x", "y")]
+    missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
+    rows = [
+        ("Format", str(height.attrs.get("format", "surface card"))),
+        ("Instrument", str(height.attrs.get("instrument", ""))),
+        ("Channel", str(height.attrs.get("channel", "")) + (", of these:" if len(channels) > 1 else "")),
+        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
+        *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
+        ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
+        ("Shape", f"{counts[0]} x {counts[1]} points"),
+        ("Spacing", " x ".join(readable(d, "m") for d in sides)),
+        ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
+        ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
+        ("Height range", readable(float(height.max() - height.min()), "m")),
+    ]
+    named = {**{parameter: parameter for parameter in ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdr")}, "Sdq": "rms slope"}
+    for parameter, label in named.items():
+        unit = str(measures[parameter].attrs["units"])
+        rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
+    return _two_columns([row for row in rows if row[1]], name)
+
+
+def _channel_row(channel: Any) -> tuple[str, str]:
+    kind = f"height in {channel.unit}" if channel.unit else "height, of no stated unit"
+    shape = " x ".join(map(str, channel.shape))
+    described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
+    return f"Channel {channel.index}", described
+
+
+def _accuracy(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
+    """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
+    rows = []
+    for name, label in _ERRORS.items():
+        values = [np.ravel(one[name]) for one in found if name in one]
+        if values:
+            asked = f", tolerance {tolerance:g}" if tolerance and name == "stated_error" else ""
+            rows.append((f"Accuracy: {label}", _number(np.concatenate(values)) + asked))
+    return rows
+
+
+def _number(values: Any) -> str:
+    found = np.asarray(values)
+    found = found[np.isfinite(found)]
+    return f"{found.max():.2g}" if found.size else "not known"
+
+
+def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, value in rows:
+        table.add_row(label, Text(str(value)))  # names in files may look like markup
+    return Group(Text(title or "untitled", style="bold"), table)

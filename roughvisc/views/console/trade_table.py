@@ -1,0 +1,67 @@
+"""What the command line shows of a trade: a line for each setting, and the advice."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from roughvisc.study.trade.recommend import duration, front
+from roughvisc.views.console.tables import size
+
+#: Errors that are shown, and their headings.
+_ERRORS = {"pressure": "pressure", "approach": "approach", "contact_area_corrected": "area", "mean_gap": "gap"}
+
+
+def trade_table(dataset: xr.Dataset) -> Group:
+    """Cost and errors of every setting; what was not run, and why; the advice.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.trade`.
+    """
+    table = Table(box=None, pad_edge=False, collapse_padding=True)
+    table.add_column()
+    table.add_column("setting", min_width=18)
+    for heading in ("time", "transf.", "memory", *_ERRORS.values()):
+        table.add_column(heading, justify="right", no_wrap=True)
+    best = front(dataset, "contact_area_corrected")
+    for i in range(dataset.sizes["setting"]):
+        row = dataset.isel(setting=i)
+        if not np.isfinite(row["run_time"]):
+            continue
+        errors = [_percent(float(row["error"].sel(quantity=name))) for name in _ERRORS]
+        spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
+        name = Text(str(row["setting"].values).replace(", ", ",\n"))
+        table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
+    parts = [Text(dataset.attrs.get("title") or "untitled", style="bold"), table]
+    text = "Errors in %, the worst over the kept times; * nothing is both faster and nearer in contact area."
+    parts += [Text(text, style="italic"), Text()]
+    parts += [
+        Text(f"Not run: {name}: {why}")
+        for name, why in zip(dataset["setting"].values, dataset["note"].values, strict=True)
+        if why
+    ]
+    parts += [Text(f"Measured against {text}.") for text in _references(dataset)]
+    parts += [Text(), *(Text(line[:1].upper() + line[1:]) for line in dataset.attrs["recommendation"].splitlines())]
+    return Group(*parts)
+
+
+def _percent(part: float) -> str:
+    if not np.isfinite(part):
+        return "-"
+    shown = 100 * part
+    return f"{shown:.2g}" if shown >= 1e-3 or shown == 0 else "<0.001"
+
+
+def _references(dataset: xr.Dataset) -> list[str]:
+    """What errors are measured against, each once, with the quantities that it holds for."""
+    found: dict[str, list[str]] = {}
+    for quantity, name in zip(dataset["quantity"].values, dataset["reference"].values, strict=True):
+        if quantity in _ERRORS:
+            found.setdefault(str(name), []).append(_ERRORS[str(quantity)])
+    one = len(found) == 1
+    return [name if one else f"{name}: {', '.join(quantities)}" for name, quantities in found.items()]

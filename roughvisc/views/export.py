@@ -1,0 +1,96 @@
+"""Results for other tools: histories as CSV, the deformed surface as heights."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.study.storage.store import whole_file
+from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.views.figures.axes import frame_at, require
+from roughvisc.views.figures.sections import deformed_surface
+
+
+def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write everything over time to a CSV file, a row a kept time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    path : path
+        The file to write; one of that name is replaced.
+
+    Returns
+    -------
+    pathlib.Path
+        The file. Its first row names each column with its unit, as in ``force [N]``; ``status`` is a word; what is
+        not known is empty. Numbers have 17 significant digits at most, which give back the same value.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or the folder cannot be written to.
+
+    Examples
+    --------
+    >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
+    """
+    require(dataset, "time")
+    names = ["time", *(str(name) for name, variable in dataset.data_vars.items() if variable.dims == ("time",))]
+    columns = [_column(dataset[name]) for name in names]
+    with whole_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(_heading(dataset[name]) for name in names)
+        writer.writerows(zip(*columns, strict=True))
+    return Path(path)
+
+
+def _heading(variable: xr.DataArray) -> str:
+    unit = variable.attrs.get("units", "")
+    return f"{variable.name} [{unit}]" if unit not in ("", "1") else str(variable.name)
+
+
+def _column(variable: xr.DataArray) -> list[str]:
+    values = variable.values
+    if variable.name == "status":
+        return [STATUS_MEANINGS[int(value)] for value in values]
+    if values.dtype.kind == "f":
+        return [repr(float(value)) if np.isfinite(value) else "" for value in values]
+    return [str(value) for value in values]
+
+
+def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:
+    """Heights of the half-space's deformed surface, as any surface over (x, y).
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``height``, and ``gap`` or ``displacement``.
+    time : float
+        The nearest kept time is taken; a negative whole number counts frames from the end. [s]
+
+    Returns
+    -------
+    xarray.DataArray, dims (x, y)
+        Height of the surface in the frame of the pressed profile: equal to the profile's where they touch, above
+        it elsewhere; missing above absent cells unless ``displacement`` was kept. [m]
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or lacks the variables.
+    """
+    require(dataset, "time", "x", "y", "height")
+    frame = frame_at(dataset["time"], time)
+    surface = deformed_surface(dataset, frame).drop_vars("time", errors="ignore").rename("height")
+    stamp = float(dataset["time"][frame])
+    surface.attrs = {
+        "units": "m",
+        "long_name": "height of the deformed surface of the half-space",
+        "history": f"{dataset.attrs.get('history', '')}\ndeformed surface at t = {stamp:g} s".lstrip("\n"),
+    }
+    return surface

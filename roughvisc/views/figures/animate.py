@@ -1,0 +1,232 @@
+"""Animations: map, section and histories of one case moving together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.variables import VARIABLES
+from roughvisc.views.figures.axes import (
+    BLUE,
+    VERMILION,
+    TimeAxis,
+    edges,
+    fullest_frame,
+    letter_panels,
+    new_figure,
+    require,
+    spread_frames,
+    styled,
+    time_text,
+    unit_for,
+)
+from roughvisc.views.figures.fields import (
+    NAMES,
+    draw_map,
+    draw_outline,
+    outline_colour,
+    plane_ratio,
+    plane_unit,
+    present,
+)
+from roughvisc.views.figures.sections import cut_position, deformed_surface
+from roughvisc.views.observables import contact
+
+_LONG_NAMES = {"force": "Force", "approach": "Approach", "contact_area": "Contact area"}
+
+
+def _writer(path: Path, rate: float):
+    suffix = path.suffix.lower()
+    if suffix in (".gif", ".webp"):
+        return PillowWriter(fps=rate)
+    if suffix in (".mp4", ".m4v", ".mov"):
+        if not FFMpegWriter.isAvailable():
+            raise InputError(f"{path.name}: ffmpeg was not found, which {suffix} needs: install it, or write a .gif")
+        # even numbers of pixels and this pixel format play everywhere
+        return FFMpegWriter(fps=rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
+    raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or .mp4")
+
+
+def animate(
+    dataset: xr.Dataset, path, *, field: str | None = None, frames: int = 100, rate: float = 12.0, dpi: float = 100.0
+) -> Path:
+    """Write an animation: the map, a section and the histories move together.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result; of fields on Dask one frame is in memory at a time.
+    path : path-like
+        File to write: ``.gif`` or ``.webp``, or ``.mp4`` where ffmpeg is installed. It appears only when complete.
+    field : {"pressure", "gap", "displacement"}, optional
+        What the map shows; by default pressure, or gap where that was not kept.
+    frames : int
+        At most so many kept times are shown, even on the time axis that suits them.
+    rate : float
+        Frames per second. [1/s]
+    dpi : float
+        Resolution of the pictures of 7.6 x 4.2 inch. [1/inch]
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        If the file name or the missing ffmpeg does not allow it, or the result holds no such field.
+    """
+    path = Path(path)
+    if frames < 1 or rate <= 0:
+        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
+    writer = _writer(path, rate)
+    unfinished = path.with_name(f".{path.stem}.part{path.suffix}")
+    figure, pictures = _moving(dataset, field, frames)
+    try:
+        with writer.saving(figure, str(unfinished), dpi):
+            for _ in pictures:
+                writer.grab_frame()
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+@styled
+def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure, Iterator[int]]:
+    """Figure, and an iterator that draws the next frame into it each time it is advanced."""
+    require(dataset, "time", "x", "y")
+    field = field or ("pressure" if "pressure" in dataset else "gap")
+    if field not in NAMES or field == "height":
+        raise InputError(f"field is {field!r}: expected 'pressure', 'gap' or 'displacement'")
+    require(dataset, field)
+    chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
+    figure = new_figure(7.6, 4.2)
+    histories = [name for name in _LONG_NAMES if name in dataset]
+    columns = figure.add_gridspec(1, 2 if histories else 1, width_ratios=[1.15, 1] if histories else [1])
+    upper, lower = columns[0].subgridspec(2, 1, height_ratios=[2, 1]).subplots()
+    right = list(columns[1].subgridspec(len(histories), 1).subplots(squeeze=False)[:, 0]) if histories else []
+    movers = [
+        _moving_map(figure, upper, dataset, field, chosen),
+        _moving_section(lower, dataset, chosen),
+        *(_moving_history(ax, dataset, name, ax is right[-1]) for ax, name in zip(right, histories, strict=True)),
+    ]
+    letter_panels((upper, lower, *right))
+    figure.align_ylabels(right)
+    title = figure.suptitle("", fontsize=9)
+
+    def pictures():
+        for frame in chosen:
+            title.set_text(time_text(float(dataset["time"][frame])))
+            for move in movers:
+                move(frame)
+            yield frame
+            figure.set_layout_engine("none")  # the first picture's layout holds for all
+
+    return figure, pictures()
+
+
+def _highest(dataset: xr.Dataset, name: str, chosen: list[int]) -> float:
+    values = [float(present(dataset, name, frame).max()) for frame in chosen]
+    return max((value for value in values if np.isfinite(value)), default=0.0)
+
+
+def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
+    highest = _highest(dataset, field, chosen)
+    unit, plane = unit_for(highest, VARIABLES[field].units), plane_unit(dataset)
+    top = float(unit(highest)) or 1.0
+    low = 1e-12 * top if field == "pressure" else 0.0
+    if field == "displacement":
+        low = min(float(unit(present(dataset, field, frame).min())) for frame in chosen)
+    first = present(dataset, field, chosen[0])
+    image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
+    side = "right" if plane_ratio(dataset) > 0.4 else "top"
+    figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(NAMES[field]))
+    ax.set_xlabel(plane.label("x"))
+    ax.set_ylabel(plane.label("y"))
+    ax.tick_params(direction="out")
+    ax.locator_params(axis="x", nbins=5 if plane_ratio(dataset) < 2 else 1)
+    ax.locator_params(axis="y", nbins=5 if plane_ratio(dataset) > 0.25 else 1)
+    outline = [None]
+
+    def move(frame):
+        image.set_data(np.ma.masked_invalid(unit(present(dataset, field, frame).transpose("y", "x"))))
+        if outline[0] is not None:
+            outline[0].remove()
+        outline[0] = None
+        if "pressure" in dataset or "gap" in dataset:
+            touching = contact(dataset.isel(time=frame)).load()
+            outline[0] = draw_outline(ax, touching, plane, outline_colour(field))
+
+    return move
+
+
+def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
+    """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
+    if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
+        ax.set_axis_off()
+        ax.text(0.5, 0.5, "no height or gap kept: no section", transform=ax.transAxes, ha="center", color="0.4")
+        return lambda frame: None
+    index = cut_position(dataset, fullest_frame(dataset), "y")
+    height = dataset["height"].isel(y=index).values
+    surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
+    known = np.concatenate([height, *surfaces])
+    known = known[np.isfinite(known)]
+    plane, unit = plane_unit(dataset), unit_for(np.ptp(known), "m")
+    x, limits = plane(dataset["x"]), plane(edges(dataset["x"]))
+    low, high = float(unit(known.min())), float(unit(known.max()))
+    margin = 0.1 * ((high - low) or 1.0)
+    top = high + 2 * margin
+    ax.set_xlim(limits[0], limits[-1])
+    ax.set_ylim(low - margin, top)
+    ax.fill_between(x, unit(height), low - margin, color="0.72", lw=0)
+    ax.plot(x, unit(height), color="0.25", lw=0.9)
+    body = ax.fill_between(x, unit(surfaces[0]), top, color=BLUE, alpha=0.16, lw=0)
+    (line,) = ax.plot(x, unit(surfaces[0]), color=BLUE, lw=1)
+    (marked,) = ax.plot(x, np.full(len(x), np.nan), color=VERMILION, lw=2.2, marker="o", ms=2.2, mew=0)
+    ax.set_xlabel(plane.label("x"))
+    ax.set_ylabel(unit.label("Height"))
+    ax.set_title(f"y = {plane.text(float(dataset['y'][index]))}", loc="right")
+    by_frame = dict(zip(chosen, surfaces, strict=True))
+
+    def move(frame):
+        surface = unit(by_frame[frame])
+        line.set_ydata(surface)
+        body.set_data(x, surface, top)
+        touching = contact(dataset.isel(time=frame)).isel(y=index).values
+        marked.set_ydata(np.where(touching, unit(height), np.nan))
+
+    return move
+
+
+def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
+    axis, values = TimeAxis.of(dataset["time"]), dataset[name].values
+    times, unit = axis.unit(dataset["time"]), unit_for(values, VARIABLES[name].units)
+    shown = unit(values)
+    ax.plot(times, shown, color="0.75", lw=1)
+    (run,) = ax.plot([], [], color=BLUE, lw=1.4)
+    (now,) = ax.plot([], [], "o", color=VERMILION, ms=5)
+    axis.apply(ax, dataset["time"])
+    ax.minorticks_off()  # each costs time in every picture
+    if not lowest:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
+    top = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
+    ax.set_ylim(min(float(np.nanmin(shown, initial=0.0)) * 1.1, -0.05 * top), 1.15 * top)
+    ax.set_ylabel(unit.label(_LONG_NAMES[name]))
+    ax.grid(color="0.9", lw=0.5)
+
+    def move(frame):
+        run.set_data(times[: frame + 1], shown[: frame + 1])
+        now.set_data(times[frame : frame + 1], shown[frame : frame + 1])
+
+    return move

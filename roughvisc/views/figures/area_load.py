@@ -1,0 +1,138 @@
+"""The figure of contact area against load, and the lines that it has at low loads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
+from roughvisc.views.figures.histories import leave_room, marker_of
+
+#: Recipes of surfaces without roughness.
+_SMOOTH = ("sphere", "cone", "flat_punch", "wavy")
+
+
+def _as_cases(results) -> dict[str, xr.Dataset]:
+    """Results by the label each has in the legend."""
+    if isinstance(results, xr.Dataset):
+        if "case" in results.dims:
+            return {str(one.values): results.sel(case=one) for one in results["case"]}
+        results = [results]
+    if isinstance(results, Mapping):
+        return {str(label): dataset for label, dataset in results.items()}
+    if not isinstance(results, Iterable):
+        raise InputError(f"expected one result, a list or a mapping of them, found {type(results).__name__}")
+    cases: dict[str, xr.Dataset] = {}
+    for number, dataset in enumerate(results, 1):
+        label = str(getattr(dataset, "attrs", {}).get("title") or f"case {number}")
+        cases[label if label not in cases else f"{label} ({number})"] = dataset
+    if not cases:
+        raise InputError("no result given: nothing to draw")
+    return cases
+
+
+def _root_mean_square_slope(height: xr.DataArray) -> float:
+    """Slope of the surface by differences between neighbouring present cells."""
+    total = 0.0
+    for name in ("x", "y"):
+        if height.sizes[name] > 1:
+            step = float(height[name][1] - height[name][0])
+            total += float(((height.diff(name) / step) ** 2).mean())
+    return math.sqrt(total)
+
+
+@styled
+def area_against_load(results, *, contact_modulus=None) -> Figure:
+    r"""Contact area against force, one line a case.
+
+    Parameters
+    ----------
+    results : xarray.Dataset, list or mapping of them
+        Results; the keys of a mapping, or else their titles, name the lines.
+    contact_modulus : float or mapping, optional
+        Contact modulus, or several by name such as ``{"glassy": 4e6, "rubbery": 1e6}``, for which to draw the line
+        of low loads; ``{}`` for none. By default, where all cases state one material and a rough surface with
+        periodic boundaries: that at once and that after the last kept time. [Pa]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Notes
+    -----
+    The line of low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_, with the root-mean-square
+    slope of the first case's surface.
+
+    References
+    ----------
+    .. [1] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
+    """
+    cases = _as_cases(results)
+    for dataset in cases.values():
+        require(dataset, "time", "force", "contact_area")
+    across = unit_for(np.concatenate([one["force"].values for one in cases.values()]), "N")
+    up = unit_for(np.concatenate([one["contact_area"].values for one in cases.values()]), "m2")
+    figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12))
+    ax = figure.add_subplot()
+    for number, (label, dataset) in enumerate(cases.items()):
+        colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
+        x, y = across(dataset["force"]), up(dataset["contact_area"])
+        style = {"color": colour, "marker": marker_of(len(x)), "ms": 2.5}
+        ax.plot(x, y, label=label if len(cases) <= 12 else "_", **style)
+    moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
+    _draw_low_load_lines(ax, next(iter(cases.values())), moduli, across, up)
+    loads = np.sort(np.concatenate([one["force"].values for one in cases.values()]))
+    if spans_decades(loads):
+        spread_axis(ax.xaxis, across(loads))
+        spread_axis(ax.yaxis, up(np.concatenate([one["contact_area"].values for one in cases.values()])))
+    else:
+        leave_room(ax, *(up(one["contact_area"]) for one in cases.values()))
+        ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
+    ax.set_xlabel(across.label("Force"))
+    ax.set_ylabel(up.label("Contact area"))
+    ax.grid(color="0.9", lw=0.5)
+    if len(ax.get_legend_handles_labels()[1]) > 1:
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(cases) < 6 else 2)
+    return figure
+
+
+def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
+    """Contact moduli that the results tell by themselves, where the line of low loads holds; else none. [Pa]"""
+    stated = [json.loads(one.attrs.get("case", "{}")) for one in cases.values()]
+    first = next(iter(cases.values()))
+    alike = all(one.get("material") == stated[0].get("material") for one in stated)
+    rough = stated[0].get("surface", {}).get("generate") not in _SMOOTH
+    if not (
+        "material" in stated[0] and alike and rough and first.attrs.get("boundary") == "periodic" and "height" in first
+    ):
+        return {}
+    from roughvisc.study.statement.case import Case
+
+    material = Case.from_json(first.attrs["case"]).material()
+    end = max(float(one["time"][-1]) for one in cases.values())
+    named = {"at once": 0.0, f"after {unit_for([end], 's').text(end)}": end}
+    compliances = {name: float(material.contact_compliance(time)) for name, time in named.items()}
+    if len(set(compliances.values())) == 1:
+        return {"": 1 / compliances["at once"]}
+    return {name: 1 / compliance for name, compliance in compliances.items() if compliance > 0}
+
+
+def _draw_low_load_lines(ax: Axes, dataset: xr.Dataset, moduli, across, up) -> None:
+    named = moduli if isinstance(moduli, Mapping) else {"": moduli}
+    if not named:
+        return
+    require(dataset, "height")
+    slope = _root_mean_square_slope(dataset["height"])
+    top = float(dataset["force"].max())
+    for (name, modulus), dash in zip(named.items(), ((4, 2), (1, 1.5), (6, 1, 1, 1)) * len(named), strict=False):
+        loads = np.geomspace(1e-3 * top, top, 50)
+        label = f"low loads, {name}" if name else "low loads"
+        area = math.sqrt(2 * math.pi) * loads / (modulus * slope)
+        ax.plot(across(loads), up(area), color="k", lw=0.9, ls=(0, dash), label=label)

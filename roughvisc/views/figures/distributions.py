@@ -1,0 +1,199 @@
+"""Figures of distributions over the contact: pressure and gap, number and size of contact clusters."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from roughvisc.errors import InputError
+from roughvisc.variables import VARIABLES
+from roughvisc.views.figures.axes import (
+    BLUE,
+    VERMILION,
+    TimeAxis,
+    frame_at,
+    letter_panels,
+    new_figure,
+    require,
+    spread_axis,
+    spread_frames,
+    styled,
+    telling_frames,
+    time_text,
+    unit_for,
+)
+from roughvisc.views.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
+
+_MOST_LINES = 24
+
+
+def _frames(dataset: xr.Dataset, times, count: int) -> list[int]:
+    if times is None:
+        return telling_frames(dataset, count)
+    chosen = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+    if not 0 < chosen.size <= _MOST_LINES:
+        raise InputError(f"{chosen.size} times to draw: choose 1 to {_MOST_LINES}")
+    return [frame_at(dataset["time"], float(time)) for time in chosen]
+
+
+def _colours(count: int) -> np.ndarray:
+    """From early to late: the order of lightness of the viridis map, its faintest end left out."""
+    return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, count) if count > 1 else [0.0])
+
+
+@styled
+def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> Figure:
+    """Probability densities of the contact pressure and of the gap at chosen times.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``pressure`` or ``gap``.
+    times : float or list of float, optional
+        The nearest kept times are drawn; negative whole numbers count frames from the end. By default up to five over
+        the time in contact. [s]
+    bins : int, optional
+        Number of bins from zero to the largest value drawn; by default as the number of cells suits.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Notes
+    -----
+    The density of pressure is over the cells in contact, that of the gap over the present cells out of contact: each
+    has the integral 1.
+    """
+    require(dataset, "time")
+    panels = [
+        (name, label, find)
+        for name, label, find in (
+            ("pressure", "Pressure", pressure_distribution),
+            ("gap", "Gap", gap_distribution),
+        )
+        if name in dataset
+    ]
+    if not panels:
+        require(dataset, "pressure", "gap")
+    frames = _frames(dataset, times, 5)
+    chosen = dataset.isel(time=frames)
+    figure = new_figure(2.9 * len(panels) + 0.2, 2.9)
+    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    for ax, (name, label, find) in zip(axes, panels, strict=True):
+        count = bins or _bin_count(chosen[name])
+        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name, label)
+    by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    ordered = [label for label in map(time_text, chosen["time"].values) if label in by_label]
+    figure.legend(
+        [by_label[label] for label in ordered], ordered, loc="outside upper center", ncols=5, handlelength=1.2
+    )
+    letter_panels(axes)
+    return figure
+
+
+def _bin_count(field: xr.DataArray) -> int:
+    """As many bins as the fullest frame has values to fill."""
+    return int(np.clip(np.sqrt(float((field > 0).sum(("x", "y")).max())) / 2, 6, 50))
+
+
+def _no_contact(ax: Axes, text: str = "no contact") -> None:
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="0.4")
+    ax.set_yticks([])
+
+
+def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str, label: str) -> None:
+    centres = density[f"{name}_bin"].values
+    width = 2 * centres[0]
+    limits = width * np.arange(len(centres) + 1)
+    unit = unit_for(limits, VARIABLES[name].units)
+    for number, colour in enumerate(_colours(dataset.sizes["time"])):
+        values = density.isel(time=number).values * unit.factor
+        if not np.isfinite(values).all():
+            continue
+        text = time_text(float(dataset["time"][number]))
+        ax.stairs(values, unit(limits), color=colour, lw=1.2, label=text, baseline=None)
+    ax.set_xlim(0, float(unit(limits[-1])))
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel(unit.label(label))
+    ax.set_ylabel(f"Density [1/{unit.symbol}]")
+    if not density.notnull().any():
+        _no_contact(ax, "no contact" if name == "pressure" else "full contact")
+    ax.grid(color="0.9", lw=0.5)
+
+
+@styled
+def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
+    """Number of contact clusters and their largest and mean area over time, and the distribution of their areas.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``pressure`` or ``gap``.
+    times : float or list of float, optional
+        Where the distribution is drawn; negative whole numbers count frames from the end. By default up to four over
+        the time in contact. [s]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    require(dataset, "time", "x", "y")
+    followed = dataset.isel(time=spread_frames(dataset["time"], 100))
+    found = clusters(followed).compute()
+    figure = new_figure(7.2, 2.7)
+    count, area, sizes = figure.subplots(1, 3)
+    axis = TimeAxis.of(dataset["time"])
+    times_shown = axis.unit(followed["time"])
+    marker = "o" if len(times_shown) <= 40 else ""
+    count.plot(times_shown, found["cluster_count"], color=BLUE, marker=marker)
+    count.set_ylabel("Contact clusters")
+    most = max(int(found["cluster_count"].max()), 1)
+    count.set_ylim(-0.05 * most, 1.1 * most)
+    count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
+    unit = unit_for(found["cluster_area_largest"], "m2")
+    area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
+    area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
+    area.set_ylabel(unit.label("Cluster area"))
+    if found["cluster_count"].any():
+        spread_axis(area.yaxis, unit([found["cluster_area_largest"], found["cluster_area_mean"]]))
+        area.legend()
+    else:
+        _no_contact(area)
+    for ax in (count, area):
+        axis.apply(ax, dataset["time"], most=4)
+    _draw_sizes(sizes, dataset, _frames(dataset, times, 4))
+    for ax in (count, area, sizes):
+        ax.grid(color="0.9", lw=0.5)
+    letter_panels((count, area, sizes))
+    return figure
+
+
+def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
+    """How many clusters are at least that large: no bins to choose."""
+    chosen = dataset.isel(time=frames)
+    areas = cluster_areas(chosen)["cluster_area"].values
+    unit = unit_for(areas, "m2")
+    for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
+        row = unit(row[np.isfinite(row)])
+        if len(row):
+            ax.plot(row, np.arange(1, len(row) + 1), color=colour, drawstyle="steps-post", label=time_text(float(time)))
+            ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
+    if np.isfinite(areas).any():
+        ax.locator_params(axis="x", nbins=4)
+        spread_axis(ax.xaxis, unit(areas))
+        spread_axis(ax.yaxis, [1, np.isfinite(areas).sum(axis=1).max()])
+        if ax.get_yscale() == "log":
+            ax.set_ylim(bottom=0.8)
+        else:
+            ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
+            ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+        lines = ax.get_legend_handles_labels()
+        ax.figure.legend(*lines, loc="outside upper right", ncols=4, handlelength=1.0)
+    else:
+        _no_contact(ax)
+    ax.set_xlabel(unit.label("Cluster area"))
+    ax.set_ylabel("Clusters at least as large")

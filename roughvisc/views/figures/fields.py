@@ -1,0 +1,214 @@
+"""Maps of pressure, gap and displacement at chosen times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from roughvisc.errors import InputError
+from roughvisc.variables import FIELDS, VARIABLES
+from roughvisc.views.figures.axes import (
+    ABSENT,
+    Unit,
+    edges,
+    frame_at,
+    new_figure,
+    require,
+    styled,
+    telling_frames,
+    time_text,
+    unit_for,
+)
+from roughvisc.views.observables import contact
+
+#: Perceptually even maps, the same order of lightness in grey: pressure darkens as it rises, gap as it closes.
+COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
+NAMES = {"pressure": "Pressure", "gap": "Gap", "displacement": "Displacement", "height": "Height"}
+_MOST_MAPS = 24
+
+
+def colour_map(name: str) -> Colormap:
+    """Colour map of a field: absent cells in light grey, cells without pressure in white."""
+    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT, under="w")
+
+
+def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
+    """Unit for both sides of the map."""
+    sides = [np.ptp(edges(dataset[name])) for name in ("x", "y")]
+    return unit_for(max(sides), "m")
+
+
+def plane_ratio(dataset: xr.Dataset | xr.DataArray) -> float:
+    """Side of the map along y over its side along x."""
+    return float(np.ptp(edges(dataset["y"])) / np.ptp(edges(dataset["x"])))
+
+
+def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -> AxesImage:
+    """One map, x to the right and y upwards, with equal scales along both.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    field : xarray.DataArray, dims (x, y)
+        Missing where the profile is absent. [SI]
+    unit, plane : Unit
+        Of the field and of the coordinates.
+    **limits
+        ``vmin`` and ``vmax`` in the unit of the field.
+
+    Returns
+    -------
+    matplotlib.image.AxesImage
+    """
+    x, y = plane(edges(field["x"])), plane(edges(field["y"]))
+    values = np.ma.masked_invalid(unit(field.transpose("y", "x")))
+    image = ax.imshow(
+        values,
+        origin="lower",
+        extent=(x[0], x[-1], y[0], y[-1]),
+        cmap=colour_map(str(field.name)),
+        aspect="equal",
+        **limits,
+    )
+    image.set_gid(str(field.name))
+    return image
+
+
+def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
+    """Outline of the cells in contact; None where there is nothing to outline."""
+    mask = touching.transpose("y", "x").values
+    if mask.all() or not mask.any() or min(mask.shape) < 2:
+        return None
+    # a rim out of contact closes the outline at the border of the map
+    x, y = (plane(_with_rim(touching[name].values)) for name in ("x", "y"))
+    width = 0.7 if touching.size < 2e4 else 0.3
+    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=width)
+    lines.set_gid("contact outline")
+    return lines
+
+
+def _with_rim(centres: np.ndarray) -> np.ndarray:
+    limits = edges(centres)
+    return np.concatenate([limits[:1], centres, limits[-1:]])
+
+
+def outline_colour(name: str) -> str:
+    """Colour of the outline that shows on a field's map."""
+    return "k" if name == "pressure" else "w"
+
+
+def present(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
+    """One frame of a field in memory, missing where the profile is absent."""
+    field = dataset[name].isel(time=frame).load()
+    return field.where(dataset["height"].notnull()) if "height" in dataset else field
+
+
+def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
+    if times is None:
+        return telling_frames(dataset, 4)
+    chosen = np.atleast_1d(np.asarray(times, dtype=float))
+    if not 0 < chosen.size <= _MOST_MAPS:
+        raise InputError(f"{chosen.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
+    return [frame_at(dataset["time"], float(time)) for time in chosen.ravel()]
+
+
+@styled
+def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
+    """Maps of fields at chosen times, with the outline of the contact; one colour scale a field.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result; with fields on Dask only the frames drawn are loaded.
+    times : float or list of float, optional
+        The nearest kept times are drawn; negative whole numbers count frames from the end, -1 the last.
+        By default up to four over the time in contact, that of the largest contact area among them. [s]
+    fields : sequence of str
+        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the result holds none of the fields, or more than 24 times are asked for.
+    """
+    require(dataset, "time", "x", "y")
+    fields = [fields] if isinstance(fields, str) else list(fields)
+    for name in fields:
+        if name not in FIELDS:
+            raise InputError(f"field {name!r} is unknown: expected some of {', '.join(FIELDS)}")
+    stored = [name for name in fields if name in dataset]
+    if not stored:
+        require(dataset, *fields)
+    frames = _chosen_frames(dataset, times)
+    figure, axes = _map_panels(dataset, len(frames), len(stored))
+    for name, panels in zip(stored, axes, strict=True):
+        _draw_field(figure, panels, dataset, name, frames)
+    _label_maps(axes, dataset, frames)
+    return figure
+
+
+def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
+    """Figure and axes [field, row, column]; frames fill the rows of each field, a long strip of a map alone in its."""
+    ratio = float(np.clip(plane_ratio(dataset), 0.05, 3.0))
+    rows = frames if ratio < 0.4 else -(-frames // (4 if ratio < 2 else 8))
+    columns = -(-frames // rows)
+    width = 4.0 if ratio < 0.4 else 3.0 if columns == 1 and ratio < 1.5 else 1.75 if ratio < 2 else 1.1
+    height = width * ratio + (0.27 if rows > 1 else 0.12)
+    size = (width * columns + 0.17 * (columns - 1) + 1.25, max(height * rows, 1.2) * fields + 0.6)
+    figure = new_figure(*size, layout="compressed")
+    axes = figure.subplots(rows * fields, columns, sharex=True, sharey=True, squeeze=False)
+    return figure, axes.reshape(fields, rows, columns)
+
+
+def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
+    shown = [present(dataset, name, frame) for frame in frames]
+    finite = [float(one.max()) for one in shown if one.notnull().any()]
+    lowest = min((float(one.min()) for one in shown if one.notnull().any()), default=0.0)
+    unit, plane = unit_for(finite, VARIABLES[name].units), plane_unit(dataset)
+    low = 0.0 if name != "displacement" else float(unit(lowest))
+    high = float(unit(max(finite, default=0.0)))
+    limits = {"vmin": low, "vmax": high if high > low else low + 1.0}
+    if name == "pressure":
+        limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
+    for ax, field, frame in zip(axes.ravel(), shown, frames, strict=False):
+        image = draw_map(ax, field, unit, plane, **limits)
+        if "pressure" in dataset or "gap" in dataset:
+            touching = contact(dataset.isel(time=frame)).load()
+            draw_outline(ax, touching, plane, outline_colour(name))
+    bar = figure.colorbar(image, ax=list(axes.ravel()), pad=0.02, aspect=max(15, 15 * len(axes)), fraction=0.06)
+    bar.set_label(unit.label(NAMES[name]))
+    bar.locator = (
+        MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
+    )
+    bar.outline.set_linewidth(0.6)
+
+
+def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> None:
+    """Times above, coordinates on the outer panels only; panels without a frame removed."""
+    plane = plane_unit(dataset)
+    fields, rows, columns = axes.shape
+    for (field, row, column), ax in np.ndenumerate(axes):
+        number = row * columns + column
+        if number >= len(frames):
+            ax.remove()
+            continue
+        lowest = field == fields - 1 and number + columns >= len(frames)
+        ax.xaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) < 2 else 1, steps=[1, 2, 5, 10]))
+        ax.yaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) > 0.25 else 1, steps=[1, 2, 5, 10]))
+        ax.tick_params(labelbottom=lowest, labelleft=column == 0, direction="out")
+        ax.set_xlabel(plane.label("x") if lowest else "")
+        ax.set_ylabel(plane.label("y") if column == 0 else "")
+        if field == 0 or rows > 1:
+            ax.set_title(time_text(float(dataset["time"][frames[number]])), pad=3)

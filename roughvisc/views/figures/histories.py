@@ -1,0 +1,228 @@
+"""Figures of histories: force, approach and area over time, hysteresis loops, area against load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+from roughvisc.errors import InputError
+from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.views.figures.axes import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    TimeAxis,
+    letter_panels,
+    new_figure,
+    require,
+    styled,
+    unit_for,
+)
+
+_PANELS = (
+    ("force", "Force", BLUE),
+    ("approach", "Approach", VERMILION),
+    ("contact_area", "Contact area", GREEN),
+    ("mean_gap", "Mean gap", PURPLE),
+    ("work", "Work", ORANGE),
+)
+#: What else belongs in a panel, with its label, colour and dashes.
+_BESIDE = {
+    "contact_area": (("contact_area_corrected", "corrected for the grid", "k", (0, (4, 2))),),
+    "work": (
+        ("stored_energy", "stored", SKY, (0, (4, 2))),
+        ("dissipated_energy", "dissipated", VERMILION, (0, (1, 1.5))),
+    ),
+}
+#: The line that they stand beside.
+_ITSELF = {"contact_area": "counted", "work": "in all"}
+#: What is stated of accuracy first, then its parts, and what comes on top.
+_ERRORS = (
+    ("stated_error", "stated", "k", 1.6),
+    ("time_error", "time steps", ORANGE, 1.0),
+    ("residual", "contact solver (estimate)", PURPLE, 1.0),
+    ("grid_error", "grid", SKY, 1.0),
+)
+_COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
+#: Errors below this part of the largest are not shown.
+_FAINTEST = 1e-5
+#: Panels up to which they stand in one column.
+_ONE_COLUMN = 3
+_NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
+
+
+def marker_of(count: int) -> str:
+    """Points are marked as long as they can be told apart."""
+    return "o" if count <= 40 else ""
+
+
+def failed_frames(dataset: xr.Dataset) -> np.ndarray:
+    """Frames whose step did not converge."""
+    if "status" not in dataset:
+        return np.zeros(dataset.sizes["time"], dtype=bool)
+    return dataset["status"].values == _NOT_CONVERGED
+
+
+def leave_room(ax: Axes, *values: np.ndarray) -> None:
+    """Linear limits from zero to somewhat above the largest value; a constant history lies in the middle."""
+    shown = np.concatenate([np.ravel(one) for one in values])
+    shown = shown[np.isfinite(shown)]
+    lowest, highest = (min(shown.min(), 0.0), max(shown.max(), 0.0)) if shown.size else (0.0, 1.0)
+    span = (highest - lowest) or 1.0
+    ax.set_ylim(lowest - 0.05 * span, highest + 0.15 * span)
+
+
+def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, label: str, colour: str) -> None:
+    axis = TimeAxis.of(dataset["time"])
+    times, values = axis.unit(dataset["time"]), dataset[name].values
+    unit = unit_for(values, VARIABLES[name].units)
+    marker = marker_of(len(times))
+    beside = [one for one in _BESIDE.get(name, ()) if one[0] in dataset and dataset[one[0]].notnull().any()]
+    ax.plot(times, unit(values), color=colour, marker=marker, label=_ITSELF[name] if beside else "_")
+    failed = failed_frames(dataset)
+    if failed.any():
+        note = "not converged" if name == "force" else "_"
+        ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5, label=note)
+    for other, said, shade, dashes in beside:
+        ax.plot(times, unit(dataset[other]), color=shade, ls=dashes, lw=0.9, label=said)
+    leave_room(ax, *(unit(dataset[one]) for one in (name, *(one[0] for one in beside))))
+    ax.set_ylabel(unit.label(label))
+
+
+def _fraction_axis(ax: Axes, dataset: xr.Dataset) -> None:
+    """Contact fraction on the right of the panel of the area, where the two are proportional."""
+    if "contact_fraction" not in dataset:
+        return
+    area = unit_for(dataset["contact_area"], "m2")(dataset["contact_area"])
+    touching = area > 0
+    if not touching.any():
+        return
+    ratio = float((100 * dataset["contact_fraction"].values[touching] / area[touching]).mean())
+    if math.isfinite(ratio) and ratio > 0:
+        right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
+        right.set_ylabel("of nominal [%]")
+
+
+def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
+    axis = TimeAxis.of(dataset["time"])
+    times = axis.unit(dataset["time"])
+    floor, ceiling = math.inf, 0.0
+    for name, label, colour, width in _ERRORS:
+        if name not in dataset:
+            continue
+        values = dataset[name].values.astype(float)
+        known = np.isfinite(values) & (values > 0)
+        if known.any():
+            ax.plot(
+                times[known], values[known], color=colour, marker=marker_of(len(times)), ms=2.5, lw=width, label=label
+            )
+            floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
+    tolerance = dataset.attrs.get("tolerance")
+    if tolerance:
+        ax.axhline(tolerance, color="0.3", lw=0.8, ls=(0, (1, 1.5)), label="tolerance")
+        floor, ceiling = min(floor, tolerance), max(ceiling, tolerance)
+    if ceiling > 0:
+        floor = max(floor, _FAINTEST * ceiling)
+        ax.set_yscale("log")
+        ax.set_ylim(floor / 3, ceiling * 3)
+        decades = math.log10(ceiling / floor) + 1
+        ax.yaxis.set_major_locator(LogLocator(numticks=5))
+        ax.yaxis.set_minor_locator(LogLocator(subs=range(2, 10) if decades < 5 else (1.0,), numticks=99))
+        ax.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        ax.set_yticks([])
+        ax.text(0.5, 0.5, "no accuracy recorded", transform=ax.transAxes, ha="center", va="center", color="0.4")
+    ax.set_ylabel("Rel. error")
+
+
+def _draw_cost(ax: Axes, dataset: xr.Dataset) -> None:
+    """What every kept time has cost since the one before it."""
+    times = TimeAxis.of(dataset["time"]).unit(dataset["time"])
+    found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
+    for values, label, colour in found:
+        ax.plot(times, values, color=colour, marker=marker_of(len(times)), ms=2.5, lw=1, label=label)
+    shown = np.concatenate([values for values, _, _ in found])
+    if shown.min() > 0 and shown.max() > 100 * shown.min():
+        ax.set_yscale("log")
+    else:
+        leave_room(ax, shown)
+        ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.set_ylabel("Per kept time")
+
+
+@styled
+def history(dataset: xr.Dataset) -> Figure:
+    """Force, approach, contact area, mean gap and work over time; cost and accuracy of every kept time below.
+
+    What the result does not hold is left out. The time axis is linear or logarithmic as the kept times suit. Steps
+    that did not converge are crossed out. Work is that of the force so far, in all and by where it went: stored in the
+    springs of the material, or dissipated. Accuracy is the stated error, its parts, and the tolerance as a line.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or holds none of the histories.
+    """
+    require(dataset, "time")
+    panels = [panel for panel in _PANELS if panel[0] in dataset]
+    if not panels:
+        names = ", ".join(name for name, _, _ in _PANELS)
+        raise InputError(f"the result holds none of {names}: nothing to draw over time")
+    costs = any(name in dataset for name, _, _ in _COSTS)
+    figure, axes = _history_panels(len(panels) + costs)
+    for ax, (name, label, colour) in zip(axes, panels, strict=False):
+        _draw_history(ax, dataset, name, label, colour)
+        if name == "contact_area":
+            _fraction_axis(ax, dataset)
+    if costs:
+        _draw_cost(axes[-2], dataset)
+    _draw_accuracy(axes[-1], dataset)
+    axis = TimeAxis.of(dataset["time"])
+    for ax in axes:
+        axis.apply(ax, dataset["time"])
+        lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)
+        ax.tick_params(labelbottom=lowest)
+        ax.set_xlabel(ax.get_xlabel() if lowest else "")
+        ax.grid(axis="both", color="0.9", lw=0.5)
+        if count := len(ax.get_legend_handles_labels()[1]):
+            across = 5 if len(axes) > _ONE_COLUMN + 1 or count < 4 else 3
+            told = {"ncols": across, "borderaxespad": 0.15, "handlelength": 1.6, "columnspacing": 1.4}
+            ax.legend(loc="lower left", bbox_to_anchor=(0.08, 1.0), **told)
+    letter_panels(axes)
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _history_panels(count: int) -> tuple[Figure, list[Axes]]:
+    """So many panels in one or two columns, and one below them across the whole width."""
+    columns = 1 if count <= _ONE_COLUMN else 2
+    rows = -(-count // columns)
+    figure = new_figure(4.6 if columns == 1 else 7.4, 1.25 * rows + 1.3 + 0.25 * (columns - 1))
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.0] * rows + [0.75])
+    cells = [grid[number // columns, number % columns] for number in range(count)]
+    return figure, [figure.add_subplot(cell) for cell in (*cells, grid[rows, :])]
+
+
+def _nothing_below(ax: Axes, axes: Sequence[Axes]) -> bool:
+    """Whether no panel of the same column has its time axis right below."""
+    place = ax.get_subplotspec()
+    below = [other.get_subplotspec() for other in axes]
+    return not any(one.rowspan.start == place.rowspan.stop and one.colspan == place.colspan for one in below)

@@ -1,0 +1,71 @@
+"""The figure of force against approach."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from roughvisc.views.figures.axes import BLUE, VERMILION, new_figure, require, styled, unit_for
+from roughvisc.views.figures.histories import failed_frames, leave_room, marker_of
+from roughvisc.views.observables.cycles import cycle_energy, has_cycles
+
+
+@styled
+def hysteresis(dataset: xr.Dataset) -> Figure:
+    """Force against approach, the direction of time marked, and the work that the loop encloses.
+
+    Where the program has cycles, what is dissipated in the last one that closes is stated too.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    require(dataset, "time", "force", "approach")
+    force, approach = dataset["force"].values, dataset["approach"].values
+    across, up = unit_for(approach, "m"), unit_for(force, "N")
+    x, y = across(approach), up(force)
+    work = np.concatenate([[0.0], np.cumsum(np.diff(approach) * (force[1:] + force[:-1]) / 2)])
+    energy = unit_for(work, "J")
+    figure = new_figure(3.6, 3.0)
+    ax = figure.add_subplot()
+    ax.plot(x, y, color=BLUE, marker=marker_of(len(x)), ms=2)
+    _draw_arrows(ax, x, y)
+    ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="first kept time")
+    if len(x) > 1:
+        ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=f"last: {energy.text(work[-1])} of work done")
+    lost = cycle_energy(dataset)["dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
+    if len(lost):
+        energy = unit_for([float(lost[-1])], "J")
+        label = f"cycle {int(lost['cycle'][-1])}: {energy.text(float(lost[-1]))} dissipated"
+        ax.plot([], [], ls="", label=label)
+    failed = failed_frames(dataset)
+    if failed.any():
+        ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
+    ax.set_xlabel(across.label("Approach"))
+    ax.set_ylabel(up.label("Force"))
+    leave_room(ax, y)
+    ax.grid(color="0.9", lw=0.5)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2, handlelength=1.2)
+    return figure
+
+
+def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray, count: int = 5) -> None:
+    """Arrows in the direction of time, at even distances along a path."""
+    width, height = (np.ptp(x) or 1.0), (np.ptp(y) or 1.0)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
+    if length[-1] == 0:
+        return
+    for place in (np.arange(count) + 0.5) / count * length[-1]:
+        k = min(max(int(np.searchsorted(length, place)), 1), len(x) - 1)
+        share = (place - length[k - 1]) / (length[k] - length[k - 1])
+        start = np.array([x[k - 1], y[k - 1]])
+        tip = start + share * (np.array([x[k], y[k]]) - start)
+        style = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", tip, start, arrowprops=style)

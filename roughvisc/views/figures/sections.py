@@ -1,0 +1,156 @@
+"""Sections through the contact: the pressure, the profile, and the deformed surface that rests on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.views.figures.axes import (
+    BLUE,
+    VERMILION,
+    Unit,
+    edges,
+    frame_at,
+    letter_panels,
+    new_figure,
+    require,
+    styled,
+    time_text,
+    unit_for,
+)
+from roughvisc.views.figures.fields import plane_unit
+from roughvisc.views.observables import contact
+
+
+def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
+    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak."""
+    along = "x" if across == "y" else "y"
+    if "pressure" in dataset:
+        carried = dataset["pressure"].isel(time=frame).sum(along).values
+        if carried.max() > 0:
+            return int(carried.argmax())
+    peaks = dataset["height"].max(along).values
+    return int(np.nanargmax(peaks)) if np.isfinite(peaks).any() else len(peaks) // 2
+
+
+def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
+    """Height of the half-space's surface over the profile, in the frame of the profile. [m]
+
+    From the displacement where it is stored, which is known above absent cells too; else the height plus the gap.
+    """
+    height = dataset["height"]
+    if "displacement" in dataset:
+        displacement = dataset["displacement"].isel(time=frame).load()
+        if "gap" in dataset:
+            offset = (height + dataset["gap"].isel(time=frame) - displacement).median()
+        else:
+            offset = (height - displacement).max()
+        return displacement + offset
+    require(dataset, "gap")
+    return height + dataset["gap"].isel(time=frame).load()
+
+
+@styled
+def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | None = None) -> Figure:
+    """A cut through the contact: pressure above, below it the profile and the deformed surface that rests on it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``height``, ``pressure`` or ``gap``.
+    time : float
+        The nearest kept time is drawn; a negative whole number counts frames from the end. [s]
+    axis : {"x", "y"}
+        Direction of the cut.
+    at : float, optional
+        Coordinate of the cut along the other axis; by default the line that carries most. [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    require(dataset, "time", "x", "y", "height")
+    if axis not in ("x", "y"):
+        raise InputError(f"axis is {axis!r}: expected 'x' or 'y'")
+    across = "y" if axis == "x" else "x"
+    frame = frame_at(dataset["time"], time)
+    index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
+    figure = new_figure(4.8, 3.6)
+    top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
+    unit = draw_section(top, bottom, dataset, frame, axis, index)
+    place = float(dataset[across][index])
+    where = f"{across} = {plane_unit(dataset).text(place)}"
+    top.set_title(f"{time_text(float(dataset['time'][frame]))},  {where}", loc="right")
+    letter_panels((top, bottom))
+    figure.align_ylabels((top, bottom))
+    figure.legend(*bottom.get_legend_handles_labels(), loc="outside upper center", ncols=4, handlelength=1.4)
+    _note_exaggeration(figure, bottom, unit.factor / plane_unit(dataset).factor)
+    return figure
+
+
+def draw_section(top: Axes, bottom: Axes, dataset: xr.Dataset, frame: int, axis: str, index: int) -> Unit:
+    """Draw the two panels of a section at the ``index`` of the other axis; returns the unit of heights."""
+    across = "y" if axis == "x" else "x"
+    plane = plane_unit(dataset)
+    x = plane(edges(dataset[axis]))
+    _draw_pressure(top, dataset, frame, across, index, x)
+    unit = _draw_surfaces(bottom, dataset, frame, across, index, x)
+    bottom.set_xlabel(plane.label(axis))
+    bottom.set_xlim(x[0], x[-1])
+    return unit
+
+
+def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, x: np.ndarray) -> None:
+    if "pressure" not in dataset:
+        ax.set_yticks([])
+        ax.text(0.5, 0.5, "pressure was not kept", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        return
+    pressure = dataset["pressure"].isel({"time": frame, across: index}).values
+    unit = unit_for(pressure, "Pa")
+    ax.stairs(unit(pressure), x, fill=True, color=VERMILION, alpha=0.3)
+    ax.stairs(unit(pressure), x, color=VERMILION, lw=1)
+    top = float(unit(np.nanmax(pressure, initial=0.0))) or 1.0
+    ax.set_ylim(0, 1.12 * top)
+    ax.set_ylabel(unit.label("Pressure"))
+
+
+def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, limits: np.ndarray) -> Unit:
+    height = dataset["height"].isel({across: index}).values
+    surface = deformed_surface(dataset, frame).isel({across: index}).values
+    x = (limits[1:] + limits[:-1]) / 2
+    highest = float(dataset["height"].attrs.get("highest", dataset["height"].max()))
+    level = highest - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
+    known = np.concatenate([height, surface])
+    known = known[np.isfinite(known)]
+    if np.isfinite(level) and not (known.size and np.ptp(known)):
+        known = np.append(known, level)  # a flat face in full contact
+    unit = unit_for(np.ptp(known) if known.size else 0.0, "m")
+    h, s = unit(height), unit(surface)
+    low, high = (float(unit(known.min())), float(unit(known.max()))) if known.size else (0.0, 1.0)
+    margin = 0.12 * ((high - low) or 1.0)
+    ax.set_ylim(low - margin, high + 2 * margin)
+    wide = np.concatenate([limits[:1], x, limits[-1:]])  # the outer halves of the outermost cells
+    ax.fill_between(wide, np.pad(h, 1, "edge"), low - margin, color="0.72", lw=0, label="profile")
+    ax.fill_between(wide, np.pad(s, 1, "edge"), high + 2 * margin, color=BLUE, alpha=0.16, lw=0, label="half-space")
+    ax.plot(x, h, color="0.25", lw=1)
+    ax.plot(x, s, color=BLUE, lw=1)
+    touching = contact(dataset.isel(time=frame)).isel({across: index}).values
+    marked = np.where(touching, h, np.nan)
+    ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
+    if low - margin < unit(level) < high + 2 * margin:
+        ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
+    ax.set_ylabel(unit.label("Height"))
+    return unit
+
+
+def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
+    """How much larger the vertical scale is than the horizontal one, which a reader cannot guess."""
+    figure.draw_without_rendering()
+    box, limits = ax.get_window_extent(), ax.viewLim
+    ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
+    text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
+    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})

@@ -1,0 +1,58 @@
+"""Quantities derived from a result: what the contact looks like, and what it means mechanically.
+
+Every function takes a result and returns a Dataset of the new variables alone (``xarray.merge`` or
+``Dataset.update`` puts them beside the others). Leading dimensions other than time, such as ``case``, pass through;
+fields on Dask are worked on frame by frame, lazily unless a docstring says otherwise.
+"""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from roughvisc.views.observables.cycles import cycle_energy
+from roughvisc.views.observables.densities import gap_distribution, gap_statistics, pressure_distribution
+from roughvisc.views.observables.derived import OBSERVABLES, describe
+from roughvisc.views.observables.response import area_growth, stiffness, work
+from roughvisc.views.observables.spots import cluster_areas, clusters, contact, percolation
+
+__all__ = [
+    "OBSERVABLES",
+    "area_growth",
+    "cluster_areas",
+    "clusters",
+    "contact",
+    "cycle_energy",
+    "describe",
+    "gap_distribution",
+    "gap_statistics",
+    "observe",
+    "percolation",
+    "pressure_distribution",
+    "stiffness",
+    "work",
+]
+
+
+def observe(dataset: xr.Dataset) -> xr.Dataset:
+    """All derived histories that the variables of a result allow.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result.
+
+    Returns
+    -------
+    xarray.Dataset
+        Clusters, percolation, gap statistics, growth exponent, stiffness and work over time.
+    """
+    found = []
+    if "pressure" in dataset or "gap" in dataset:
+        found += [clusters(dataset), percolation(dataset)]
+    if "gap" in dataset:
+        found.append(gap_statistics(dataset))
+    if "contact_area" in dataset or "contact_area_corrected" in dataset:
+        found.append(area_growth(dataset))
+    if "force" in dataset and "approach" in dataset:
+        found += [stiffness(dataset), work(dataset)]
+    return xr.merge(found, compat="equals", join="exact")

@@ -1,0 +1,107 @@
+"""Distributions of pressure and gap over the cells, and statistics of the gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.views.observables.derived import describe, frame_by_frame, need
+
+
+def _bin_edges(field: xr.DataArray, bins) -> np.ndarray:
+    if not np.isscalar(bins):
+        given = np.asarray(bins, dtype=float)
+        if given.ndim != 1 or len(given) < 2 or not np.all(np.diff(given) > 0):
+            raise InputError("bin edges must increase, and be two or more")
+        return given
+    largest = float(field.max())
+    return np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
+
+
+def _density(field: xr.DataArray, bins, name: str) -> xr.Dataset:
+    """Probability density of the positive values of a field, frame by frame."""
+    limits = _bin_edges(field, bins)
+
+    def measure(values):
+        values = values[values > 0]
+        inside = np.histogram(values, limits)[0]
+        return inside / (max(len(values), 1) * np.diff(limits)) if len(values) else np.full(len(limits) - 1, np.nan)
+
+    dim = f"{name}_bin"
+    density = xr.apply_ufunc(
+        measure,
+        field,
+        input_core_dims=[["x", "y"]],
+        output_core_dims=[[dim]],
+        vectorize=True,
+        dask="parallelized",
+        output_dtypes=[float],
+        dask_gufunc_kwargs={"allow_rechunk": True, "output_sizes": {dim: len(limits) - 1}},
+    )
+    return describe(
+        xr.Dataset({f"{name}_density": density}).assign_coords({dim: (dim, (limits[1:] + limits[:-1]) / 2)})
+    )
+
+
+def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
+    """Probability density of the pressure over the cells in contact.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure``.
+    bins : int or array_like
+        Number of even bins from zero to the largest pressure of all times (which is looked up at once), or their
+        edges. [Pa]
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pressure_density`` over time and ``pressure_bin``; missing while there is no contact. [1/Pa]
+    """
+    need(dataset, "pressure")
+    return _density(dataset["pressure"], bins, "pressure")
+
+
+def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
+    """Probability density of the gap over the present cells out of contact.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``gap``.
+    bins : int or array_like
+        Number of even bins from zero to the largest gap of all times (which is looked up at once), or their
+        edges. [m]
+
+    Returns
+    -------
+    xarray.Dataset
+        ``gap_density`` over time and ``gap_bin``; missing in full contact. [1/m]
+    """
+    need(dataset, "gap")
+    return _density(dataset["gap"], bins, "gap")
+
+
+def gap_statistics(dataset: xr.Dataset) -> xr.Dataset:
+    """Mean and median gap over the present cells, those in contact included.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``gap``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``gap_mean`` and ``gap_median`` over time. [m]
+    """
+    need(dataset, "gap")
+
+    def measure(gap):
+        present = gap[~np.isnan(gap)]
+        return (present.mean(), np.median(present)) if present.size else (np.nan, np.nan)
+
+    mean, median = frame_by_frame(measure, dataset["gap"], outputs=2)
+    return describe(xr.Dataset({"gap_mean": mean, "gap_median": median}))

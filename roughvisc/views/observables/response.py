@@ -1,0 +1,94 @@
+"""The response as histories tell it: growth of the area, stiffness, work."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.views.observables.derived import along_time, describe, need
+
+
+def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:
+    """Derivative along a path: second order where ``over`` runs on, the last secant where it turns or starts."""
+    slope = np.full(len(over), np.nan)
+    if len(over) < 2:
+        return slope
+    step = np.diff(over)
+    moving = np.abs(step) > 1e-12 * np.max(np.abs(over), initial=0.0, where=np.isfinite(over))
+    secant = np.where(moving, np.diff(value) / np.where(moving, step, 1.0), np.nan)
+    slope[1:] = secant
+    slope[0] = secant[0]
+    before, after = step[:-1], step[1:]
+    runs_on = moving[:-1] & moving[1:] & (before * after > 0)
+    total = np.where(runs_on, before + after, 1.0)
+    slope[1:-1] = np.where(runs_on, (secant[:-1] * after + secant[1:] * before) / total, slope[1:-1])
+    return slope
+
+
+def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
+    """Growth exponent of the contact area, ``d ln(area) / d ln(time - since)``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result; the area corrected for the grid is preferred where it is there.
+    since : float
+        The instant from which time is counted, such as the end of a loading ramp. [s]
+
+    Returns
+    -------
+    xarray.Dataset
+        ``area_growth_exponent`` over time; missing up to ``since`` and while there is no contact.
+    """
+    name = "contact_area_corrected" if "contact_area_corrected" in dataset else "contact_area"
+    need(dataset, name)
+
+    def measure(area, time):
+        grown = (time > since) & (area > 0)
+        exponent = np.full(len(time), np.nan)
+        exponent[grown] = _slope(np.log(area[grown]), np.log(time[grown] - since))
+        return exponent
+
+    return describe(xr.Dataset({"area_growth_exponent": along_time(measure, dataset[name], dataset["time"])}))
+
+
+def stiffness(dataset: xr.Dataset) -> xr.Dataset:
+    """Contact stiffness: the slope of force over approach along the history.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``contact_stiffness`` over time: central differences where the approach runs on, the last secant where it
+        turns; missing while it stands still. [N/m]
+    """
+    need(dataset, "force", "approach")
+    return describe(xr.Dataset({"contact_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
+
+
+def work(dataset: xr.Dataset) -> xr.Dataset:
+    """Work done by the force since the first kept time: the trapezoidal integral of force over approach.
+
+    Over a loop that closes in force and approach its change is the energy dissipated.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result. What a jump at its very start did is not in it: one state of it is kept.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``work`` over time. [J]
+    """
+    need(dataset, "force", "approach")
+
+    def measure(force, approach):
+        done = np.diff(approach) * (force[1:] + force[:-1]) / 2
+        return np.concatenate([np.zeros(min(len(force), 1)), np.cumsum(done)])
+
+    return describe(xr.Dataset({"work": along_time(measure, dataset["force"], dataset["approach"])}))

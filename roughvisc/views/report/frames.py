@@ -1,0 +1,349 @@
+"""Pre-rendered pictures of one case for a page: small maps, sections and histories, each as text."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator
+from PIL import Image
+
+from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
+from roughvisc.views.figures.fields import NAMES, colour_map, plane_ratio, plane_unit, present
+from roughvisc.views.figures.sections import cut_position, deformed_surface
+from roughvisc.views.observables import contact
+
+#: Frames a case and cells along the longer side of a map, the richest first.
+_LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64), (2, 48))
+#: Colours of a map, besides those of absent cells and of cells in or out of contact.
+_LEVELS = 62
+_ABSENT, _MARKED = 0, 1
+#: What is stated of accuracy, then its parts.
+_ERRORS = {"stated_error": "stated", "time_error": "time steps", "residual": "solver (estimate)"}
+#: Errors below this part of the largest are not shown.
+_FAINTEST = 1e-5
+_CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
+_SECTION = (1000.0, 240.0)
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Colours and unit of one field, the same for all frames of a case."""
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+
+
+def data_uri(picture: bytes, kind: str = "image/png") -> str:
+    """Bytes as an address that holds them."""
+    return f"data:{kind};base64,{base64.b64encode(picture).decode()}"
+
+
+def figure_uri(figure: Figure, dpi: float = 100.0) -> str:
+    """A matplotlib figure as PNG, without transparency."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi)
+    with Image.open(stream) as picture:
+        return _png(picture.convert("RGB"))
+
+
+def _png(picture: Image.Image) -> str:
+    stream = io.BytesIO()
+    picture.save(stream, format="PNG", optimize=True)
+    return data_uri(stream.getvalue())
+
+
+def colour_bar(name: str) -> str:
+    """Colours of a field from its lowest to its highest value, as a strip of one line."""
+    colours = _palette(name)[2 * 3 :]
+    strip = Image.frombytes("P", (_LEVELS, 1), bytes(range(_LEVELS)))
+    strip.putpalette(colours)
+    return _png(strip)
+
+
+def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
+    """Everything that a page shows of one case over time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    budget : int
+        Size that the maps may have in all; frames and resolution are as high as it allows. [bytes]
+
+    Returns
+    -------
+    dict
+        Of texts and numbers, ready for JSON.
+    """
+    fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
+    scales, maps, chosen, block = [], [], [], 1
+    fullest = fullest_frame(dataset)
+    trial = [_scale(dataset, name, [fullest]) for name in fields]
+    for count, side in _LADDER:
+        chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
+        block = max(1, -(-max(dataset.sizes["x"], dataset.sizes["y"]) // side))
+        one = sum(len(_map(dataset, scale, fullest, block)) for scale in trial)
+        if one * len(chosen) > 1.1 * budget and (count, side) != _LADDER[-1]:
+            continue
+        scales = [_scale(dataset, name, chosen) for name in fields]
+        maps = [[_map(dataset, scale, frame, block) for scale in scales] for frame in chosen]
+        if sum(len(uri) for row in maps for uri in row) <= budget:
+            break
+    return {
+        "kept": dataset.sizes["time"],
+        "block": block,
+        "ratio": plane_ratio(dataset),
+        "plane": _extent(dataset),
+        "fields": [_scale_text(scale) for scale in scales],
+        "section": _sections(dataset, chosen),
+        "charts": _charts(dataset, chosen),
+        "frames": [{"maps": row, **_numbers(dataset, frame)} for row, frame in zip(maps, chosen, strict=True)],
+        "start": int(np.abs(np.array(chosen) - fullest).argmin()),
+    }
+
+
+# -------------------------------------------------------------------------------------------------------- maps
+
+
+def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
+    shown = [present(dataset, name, frame) for frame in chosen]
+    highest = [float(one.max()) for one in shown if one.notnull().any()]
+    lowest = [float(one.min()) for one in shown if one.notnull().any()] if name == "displacement" else [0.0]
+    low, high = min(lowest, default=0.0), max(highest, default=0.0)
+    return _Scale(name, unit_for([low, high], VARIABLES[name].units), low, high if high > low else low + 1.0)
+
+
+def _scale_text(scale: _Scale) -> dict[str, str]:
+    return {
+        "name": scale.name,
+        "label": scale.unit.label(NAMES[scale.name]),
+        "low": f"{float(scale.unit(scale.low)):.3g}",
+        "high": f"{float(scale.unit(scale.high)):.3g}",
+    }
+
+
+def _extent(dataset: xr.Dataset) -> str:
+    unit = plane_unit(dataset)
+    sides = [dataset.sizes[axis] * float(dataset[axis][1] - dataset[axis][0]) for axis in ("x", "y")]
+    return " × ".join(f"{float(unit(side)):.4g}" for side in sides) + f" {unit.symbol}"
+
+
+def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
+    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, red of others."""
+    field = present(dataset, scale.name, frame)
+    touching = contact(dataset.isel(time=frame)) if {"pressure", "gap"} & set(dataset) else field < -np.inf
+    values = _in_blocks(field.transpose("y", "x").values, block)
+    share = _in_blocks(touching.transpose("y", "x").values.astype(float), block)
+    level = np.nan_to_num((values - scale.low) / (scale.high - scale.low))
+    index = 2 + np.clip((level * _LEVELS).astype(int), 0, _LEVELS - 1)
+    index[share == 0 if scale.name == "pressure" else share > 0.5] = _MARKED
+    index[np.isnan(values)] = _ABSENT
+    picture = Image.fromarray(np.ascontiguousarray(index[::-1].astype(np.uint8)))
+    picture.putpalette(_palette(scale.name))
+    return _png(picture)
+
+
+def _in_blocks(values: np.ndarray, block: int) -> np.ndarray:
+    """Means over blocks of cells; missing cells take no part."""
+    if block == 1:
+        return values
+    widths = [(0, -n % block) for n in values.shape]
+    padded = np.pad(values, widths, constant_values=np.nan)
+    cells = padded.reshape(padded.shape[0] // block, block, padded.shape[1] // block, block)
+    known = np.isfinite(cells)
+    count = known.sum(axis=(1, 3))
+    total = np.where(known, cells, 0.0).sum(axis=(1, 3))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _palette(name: str) -> bytes:
+    colours = colour_map(name)(np.linspace(0, 1, _LEVELS))[:, :3]
+    marked = (1.0, 1.0, 1.0) if name == "pressure" else (0.835, 0.369, 0.0)
+    return bytes(np.rint(255 * np.array([(0.82,) * 3, marked, *colours])).astype(np.uint8).ravel())
+
+
+# ---------------------------------------------------------------------------------------------------- sections
+
+
+def _path(x: np.ndarray, y: np.ndarray) -> str:
+    """A line through points as SVG has it, broken where a point is missing."""
+    parts, pen = [], "M"
+    for across, up in zip(x, y, strict=True):
+        if np.isfinite(across) and np.isfinite(up):
+            parts.append(f"{pen}{across:.4g} {up:.4g}")
+            pen = "L"
+        else:
+            pen = "M"
+    return "".join(parts)
+
+
+def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
+    """Profile, and at each frame the deformed surface and the contact, on the line that carries most."""
+    if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
+        return None
+    index = cut_position(dataset, fullest_frame(dataset), "y")
+    height = dataset["height"].isel(y=index).values
+    surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
+    touching = [contact(dataset.isel(time=frame)).isel(y=index).values for frame in chosen]
+    known = np.concatenate([height, *surfaces])
+    known = known[np.isfinite(known)]
+    if not known.size:
+        return None
+    unit, plane = unit_for(np.ptp(known), "m"), plane_unit(dataset)
+    low, high = float(known.min()), float(known.max())
+    margin = 0.1 * ((high - low) or 1e-9)
+    low, high = low - margin, high + margin
+    every = max(1, len(height) // 400)
+    x = _SECTION[0] * (np.arange(len(height)) + 0.5) / len(height)
+
+    def up(values):
+        return _SECTION[1] * (high - np.asarray(values)) / (high - low)
+
+    return {
+        "profile": _path(x[::every], up(height)[::every]),
+        "surfaces": [_path(x[::every], up(one)[::every]) for one in surfaces],
+        "contacts": [_runs(x, up(height), one) for one in touching],
+        "where": f"y = {plane.text(float(dataset['y'][index]))}",
+        "label": f"Height: {unit.text(high - low)} from bottom to top",
+    }
+
+
+def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
+    """Each run of cells in contact as one line; a lone cell as one of its width."""
+    half = (x[1] - x[0]) / 2 if len(x) > 1 else 1.0
+    borders = np.flatnonzero(np.diff(np.pad(touching.astype(int), 1)))
+    parts = []
+    for first, past in borders.reshape(-1, 2):
+        if past - first == 1:
+            parts.append(_path(x[first] + half * np.array([-1, 1]), y[[first, first]]))
+        else:
+            inner = np.unique([*range(first, past, max(1, (past - first) // 60)), past - 1])
+            parts.append(_path(x[inner], y[inner]))
+    return "".join(parts)
+
+
+# --------------------------------------------------------------------------------------------------- histories
+
+
+def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
+    """Histories as lines in a unit of their own, and where each frame lies on them."""
+    charts = []
+    for name, label in (("force", "Force"), ("approach", "Approach"), ("contact_area", "Contact area")):
+        if name in dataset:
+            values = dataset[name].values.astype(float)
+            unit = unit_for(values, VARIABLES[name].units)
+            charts.append(_chart(dataset, unit.label(label), {label: unit(values)}, chosen))
+    errors = {
+        label: dataset[name].values.astype(float)
+        for name, label in _ERRORS.items()
+        if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
+    }
+    if errors:
+        charts.append(_chart(dataset, "Relative error", errors, chosen, dataset.attrs.get("tolerance")))
+    return charts
+
+
+def _chart(dataset, label: str, lines: dict[str, np.ndarray], chosen: list[int], tolerance=None) -> dict[str, Any]:
+    axis = TimeAxis.of(dataset["time"])
+    across, time_ticks = _across(axis, dataset["time"].values)
+    logarithmic = tolerance is not None or label == "Relative error"
+    stacked = np.concatenate(list(lines.values()))
+    if logarithmic:
+        faintest = _FAINTEST * np.nanmax(stacked)
+        lines = {name: np.where(values >= faintest, values, np.nan) for name, values in lines.items()}
+        stacked = np.concatenate(list(lines.values()))
+    stacked = stacked[np.isfinite(stacked) & ((stacked > 0) | (not logarithmic))]
+    if tolerance is not None:
+        stacked = np.append(stacked, float(tolerance))
+    up, ticks = _up(stacked, logarithmic)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        paths = [{"label": name, "d": _path(across, up(values))} for name, values in lines.items()]
+        first = up(next(iter(lines.values())))
+    return {
+        "label": label,
+        "time": axis.unit.label("Time"),
+        "lines": paths,
+        "tolerance": float(up(np.array([float(tolerance)]))[0]) if tolerance is not None else None,
+        "xticks": time_ticks,
+        "yticks": ticks,
+        "marks": [[_pixel(across[frame]), _pixel(first[frame])] for frame in chosen],
+    }
+
+
+def _pixel(value: float) -> float | None:
+    return round(float(value), 1) if np.isfinite(value) else None
+
+
+def _across(axis: TimeAxis, times: np.ndarray) -> tuple[np.ndarray, list[list[Any]]]:
+    """Places of times along the chart, and its ticks."""
+    shown = axis.unit(times)
+    if axis.logarithmic:
+        floor = axis.first / 3 if times[0] <= 0 else axis.first  # zero has its place at the left end
+        place = np.log10(np.maximum(shown, floor))
+        decades = np.arange(np.ceil(np.log10(axis.first) - 1e-9), np.floor(place[-1] + 1e-9) + 1)
+        decades = decades[:: max(1, len(decades) // 4)]
+        ticks = [(d, f"{10**d:g}") for d in decades]
+        if times[0] <= 0:
+            ticks.insert(0, (place[0], "0"))
+    else:
+        place = shown
+        inside = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(shown[0], shown[-1])
+        ticks = [(t, f"{t:g}") for t in inside if shown[0] - 1e-9 <= t <= shown[-1] + 1e-9]
+    span = (place[-1] - place[0]) or 1.0
+    return _CHART[0] * (place - place[0]) / span, [[_pixel(_CHART[0] * (t - place[0]) / span), s] for t, s in ticks]
+
+
+def _up(values: np.ndarray, logarithmic: bool):
+    """Function from values to places up the chart, and the chart's ticks."""
+    if not values.size:
+        values = np.array([1.0])
+    if logarithmic:
+        low, high = np.log10(values.min()) - 0.3, np.log10(values.max()) + 0.3
+        found = LogLocator(numticks=5).tick_values(10**low, 10**high)
+        ticks = [(np.log10(t), f"{t:.0e}".replace("e-0", "e-").replace("e+0", "e+")) for t in found]
+        scale = np.log10
+    else:
+        low, high = min(values.min(), 0.0), max(values.max(), 0.0)
+        high += 0.1 * ((high - low) or 1.0)
+        ticks = [(t, f"{t:g}") for t in MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
+        scale = np.asarray
+
+    def up(shown):
+        return _CHART[1] * (high - scale(shown)) / (high - low)
+
+    kept = [(t, s) for t, s in ticks if low - 1e-12 <= t <= high + 1e-12]
+    return up, [[_pixel(_CHART[1] * (high - t) / (high - low)), s] for t, s in kept]
+
+
+def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
+    """Time of a frame, and its numbers in words."""
+    one = dataset.isel(time=frame)
+    time = float(one["time"])
+    rows = [
+        (label, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
+        for name, label in (
+            ("force", "Force"),
+            ("approach", "Approach"),
+            ("contact_area", "Contact area, counted"),
+            ("contact_area_corrected", "Contact area, corrected"),
+            ("mean_gap", "Mean gap"),
+        )
+        if name in dataset
+    ]
+    if "contact_fraction" in dataset:
+        rows.append(("Of nominal", f"{100 * float(one['contact_fraction']):.3g} %"))
+    for name, label in _ERRORS.items():
+        if name in dataset:
+            rows.append((f"Error, {label}", f"{float(one[name]):.2g}" if np.isfinite(one[name]) else "not known"))
+    if "status" in dataset:
+        rows.append(("Status", STATUS_MEANINGS[int(one["status"])].replace("_", " ")))
+    return {"time": unit_for([time], "s").text(time, 4), "numbers": rows}

@@ -1,0 +1,358 @@
+"""One self-contained page (HTML) of one or many results: nothing is fetched from anywhere when it is looked at."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from jinja2 import Environment, PackageLoader
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.treatment import Treatment, measures, treatment
+from roughvisc.study.storage.store import open_result, whole_file
+from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
+from roughvisc.views.figures.fields import draw_map, plane_unit
+from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
+from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
+from roughvisc.views.sweep_figures.case_text import material_words, program_words, readable_setting, study_text
+from roughvisc.views.sweep_figures.files import results_of, sweep_figures
+
+#: Size that all maps may have together. [bytes]
+_MAPS = 5_000_000
+#: The most that the maps of one case may have. [bytes]
+_MAPS_OF_ONE = 1_500_000
+#: Cases that can be picked; of more, evenly spread ones.
+_PICTURED = 60
+#: Cases up to which every figure is drawn.
+_DRAWN = 3
+#: Surfaces that are described.
+_SURFACES = 4
+#: Attributes in which a result speaks of its limits.
+_NOTES = ("material_note", "accuracy_note", "slope_note")
+#: Parameters shown, with the name of each.
+_PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
+
+
+def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | Path | None = None) -> Path:
+    """Write a page that shows results: what was run, surface, figures, accuracy, cost, and how to have it again.
+
+    Parameters
+    ----------
+    results : path, xarray.Dataset, or sequence of them
+        A result file, a folder of them, one case's result, or several.
+    path : path, optional
+        File to write. Default: ``report.html`` in the folder, or beside the file with its name and ``-report.html``.
+
+    Returns
+    -------
+    pathlib.Path
+        The file, below 10 MB: the more cases, the fewer frames of each and the coarser. Of more than 60 cases evenly
+        spread ones can be looked at; the table has them all.
+
+    Raises
+    ------
+    InputError
+        If there is no result, or no `path` where Datasets are given.
+    """
+    if isinstance(results, xr.Dataset):
+        results = [results]
+    named = isinstance(results, str | Path)
+    if named:
+        source = Path(results)
+        sources: list[Any] = _files(source)
+        failures = _failures(source) if source.is_dir() else []
+        swept = _swept(source) if len(sources) > 1 else []
+        out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)
+    else:
+        sources, failures, swept = list(results), [], []
+        if path is None:
+            raise InputError("path is None: expected the name of the page, where Datasets are given")
+        out = Path(path)
+    if not sources and not failures:
+        raise InputError("found no results: expected at least one")
+    page = _page(sources, failures, swept)
+    with whole_file(out) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return out
+
+
+def _files(source: Path) -> list[Path]:
+    if not source.is_dir():
+        return [source]
+    found = sorted(p for p in source.glob("*.nc") if not p.name.startswith("."))
+    if not found and not list(source.glob("*.failed.json")):
+        raise InputError(f"{source}: holds no results: expected files .nc, as roughvisc run writes them")
+    return found
+
+
+def _beside(source: Path) -> Path:
+    return source.with_name(f"{source.stem}-report.html")
+
+
+def _failures(folder: Path) -> list[dict[str, str]]:
+    """Cases of which only a record says that they failed."""
+    found = []
+    for path in sorted(folder.glob("*.failed.json")):
+        try:
+            record = json.loads(path.read_text())
+            title = record.get("case", {}).get("title", "") + _varied(record.get("case", {}))
+            found.append({"key": path.name.partition(".")[0], "title": title, "message": record["message"]})
+        except (OSError, ValueError, KeyError, AttributeError):
+            found.append({"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"})
+    return found
+
+
+def _varied(case: dict[str, Any]) -> str:
+    return "".join(f", {key} = {readable_setting(key, value)}" for key, value in case.get("varied", {}).items())
+
+
+@contextmanager
+def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
+    if isinstance(source, xr.Dataset):
+        require(source, "time", "x", "y")
+        yield source
+    else:
+        with open_result(source) as dataset:
+            yield dataset
+
+
+def _swept(folder: Path) -> list[dict[str, str]]:
+    """Figures of all cases together."""
+    results = results_of(folder)
+    found = sweep_figures(results) if results is not None else ()
+    return [{"title": title, "src": figure_uri(figure)} for _, title, figure in found]
+
+
+def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
+    sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
+    pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
+    budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
+    rows, views, figures, surfaces, studies, everything = [], [], [], {}, [], {}
+    for number, source in enumerate(sources):
+        with _opened(source) as dataset:
+            row = _row(dataset, source, number)
+            rows.append(row)
+            everything[row["name"]] = _histories(dataset)
+            if number not in pictured:
+                continue
+            row["view"] = len(views)
+            views.append({"title": row["name"], "key": row["key"], **frames_of(dataset, budget)})
+            studies.append(row["study"])
+            if len(sources) <= _DRAWN:
+                figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
+            what = row["surface"]
+            if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
+                surfaces[what] = _surface(dataset)
+    if len(everything) > 1:
+        figures = [_overview(everything), *swept, *figures]
+    environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
+    environment.lstrip_blocks = True
+    return environment.get_template("report.html.jinja").render(
+        title=_common_title(rows),
+        version=metadata.version("roughvisc"),
+        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        rows=rows,
+        varied=list(dict.fromkeys(key for row in rows for key in row["varied"])),
+        failures=failures,
+        views=views,
+        studies=studies,
+        bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
+        figures=figures,
+        surfaces=list(surfaces.values()),
+        more_surfaces=len({row["surface"] for row in rows if row["surface"]}) - len(surfaces),
+    )
+
+
+def _order(source: Path) -> tuple[Any, ...]:
+    """Cases by what was varied in them, numbers by size."""
+    with open_result(source) as dataset:
+        case = json.loads(dataset.attrs.get("case", "{}"))
+    values = (case.get("varied") or {}).values()
+    numbers = ((0, value, "") if isinstance(value, int | float) else (1, 0.0, str(value)) for value in values)
+    return (str(case.get("title", "")), *numbers)
+
+
+def _common_title(rows: list[dict[str, Any]]) -> str:
+    titles = {row["title"] for row in rows}
+    return titles.pop() if len(titles) == 1 else f"{len(rows)} results" if rows else "No result"
+
+
+def _histories(dataset: xr.Dataset) -> xr.Dataset:
+    """What the figure of all cases needs, in memory."""
+    names = [name for name in ("force", "contact_area") if name in dataset]
+    return dataset[names].load()
+
+
+def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:
+    return {
+        "title": "Contact area against force, a line a case" + (" (their names: table)" if len(cases) > 12 else ""),
+        "src": figure_uri(area_against_load(cases)),
+    }
+
+
+def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
+    """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
+    found = []
+    for kind, (draw, needed, wanted) in FIGURES.items():
+        missing = not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted))
+        if kind == "surface" or missing or (kind == "hysteresis" and dataset.sizes["time"] < 3):
+            continue
+        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if kind == "section" else {}
+        title = kind.capitalize() + (f": {name}" if name else "")
+        found.append({"title": title, "src": figure_uri(draw(dataset, **options))})
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------- table
+
+
+def _row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
+    """One case in the table, and what reproduces it."""
+    case = json.loads(dataset.attrs.get("case", "{}"))
+    title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
+    varied = {key: readable_setting(key, value) for key, value in case.get("varied", {}).items()}
+    last = dataset.isel(time=-1)
+    status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
+    bad = int((status == STATUS_MEANINGS.index("not_converged")).sum())
+    return {
+        "title": title,
+        "name": title + _varied(case) if varied or case else str(dataset.attrs.get("title", title)),
+        "file": Path(source).name if isinstance(source, Path) else "",
+        "key": str(dataset.attrs.get("case_key", "")),
+        "varied": varied,
+        "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
+        "times": dataset.sizes["time"],
+        "force": _largest(dataset, "force", "N"),
+        "approach": _last(last, "approach", "m"),
+        "area": _last(last, "contact_area_corrected", "m2"),
+        "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
+        "stated_error": _worst(dataset, "stated_error"),
+        "time_error": _worst(dataset, "time_error"),
+        "residual": _worst(dataset, "residual"),
+        "missed": _missed(dataset),
+        "status": f"{bad} of {len(status)} times not converged" if bad else "converged" if len(status) else "",
+        "bad": bool(bad),
+        "convolutions": f"{int(dataset['convolutions'].sum())}" if "convolutions" in dataset else "",
+        "wall_time": _last(last, "wall_time", "s"),
+        "surface": json.dumps(case.get("surface", {})) + str(dataset.attrs.get("surface_sha256", number)),
+        "study": _study(dataset, case),
+        "view": None,
+    }
+
+
+def _largest(dataset: xr.Dataset, name: str, si: str) -> str:
+    if name not in dataset:
+        return ""
+    value = float(dataset[name].max())
+    return unit_for([value], si).text(value)
+
+
+def _last(last: xr.Dataset, name: str, si: str) -> str:
+    return unit_for([float(last[name])], si).text(float(last[name])) if name in last else ""
+
+
+def _worst(dataset: xr.Dataset, name: str) -> str:
+    if name not in dataset or not np.isfinite(dataset[name]).any():
+        return "not known"
+    return f"{float(dataset[name].max()):.2g}"
+
+
+def _missed(dataset: xr.Dataset) -> bool:
+    """Whether the stated error is above the tolerance asked for."""
+    tolerance = dataset.attrs.get("tolerance")
+    if tolerance is None or "stated_error" not in dataset:
+        return False
+    return bool((dataset["stated_error"] > float(tolerance)).any())
+
+
+def _study(dataset: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
+    """What was run and whence it came, for one case."""
+    told = ("source", "boundary", "tolerance", "method", "memory", "series_error", "transforms", "case_key")
+    files = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
+    return {
+        "material": material_words(case["material"]) if "material" in case else "",
+        "program": program_words(case["program"]) if "program" in case else [],
+        "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
+        "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
+        "notes": [
+            str(dataset.attrs[key]) for key in ("material_note", "accuracy_note", "slope_note") if key in dataset.attrs
+        ],
+        "history": str(dataset.attrs.get("history", "")).splitlines(),
+        "toml": study_text(case) if case else "",
+    }
+
+
+# ----------------------------------------------------------------------------------------------------- surface
+
+
+def _surface(dataset: xr.Dataset) -> dict[str, Any]:
+    """One surface: its figures, what conditioning did, and its parameters before and after."""
+    found = treatment(dataset)
+    unchanged = found.before is not None and _alike(found.before, found.after)
+    after = measures(found.after)
+    before = measures(found.before) if found.before is not None and not unchanged else None
+    rows = []
+    for name in _PARAMETERS:
+        attrs = after[name].attrs
+        text = [_parameter(one[name]) if one is not None else "" for one in (before, after)]
+        rows.append([name.replace("_", " "), attrs["long_name"], *text])
+    filled = int(dataset["filled"].sum()) if "filled" in dataset else 0
+    pictures = [figure_uri(_before_and_after(found, dataset, filled))] if before is not None else []
+    return {
+        "name": str(dataset.attrs.get("source_file") or dataset.attrs.get("title", "surface")),
+        "steps": found.steps,
+        "filled": filled,
+        "method": str(dataset.attrs.get("fill_method", "")),
+        "measured": before is not None,
+        "unchanged": unchanged,
+        "parameters": rows,
+        "pictures": [*pictures, figure_uri(surface(found.after))],
+    }
+
+
+def _alike(before: xr.DataArray, after: xr.DataArray) -> bool:
+    return before.shape == after.shape and bool(np.allclose(before, after, rtol=1e-12, atol=0, equal_nan=True))
+
+
+def _parameter(value: xr.DataArray) -> str:
+    if value.name == "missing_fraction":
+        return f"{100 * float(value):.3g} %"
+    return unit_for([float(value)], value.attrs["units"]).text(float(value))
+
+
+@styled
+def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Figure:
+    """Maps of the heights before conditioning and as pressed, filled points marked.
+
+    Colours end at the quantiles of 0.5 and 99.5 %, so that spikes do not hide the rest.
+    """
+    figure = new_figure(7.0, 3.0)
+    axes = figure.subplots(1, 2)
+    heights = (found.before, found.after)
+    for ax, height, title in zip(axes, heights, ("before", "as pressed"), strict=True):
+        height = (height - height.mean()).rename("height")
+        unit, plane = unit_for(height.quantile([0.005, 0.995]), "m"), plane_unit(height)
+        low, high = unit(height.quantile([0.005, 0.995]).values)
+        image = draw_map(ax, height, unit, plane, vmin=low, vmax=high if high > low else low + 1)
+        figure.colorbar(image, ax=ax, aspect=18, pad=0.02, shrink=0.8, extend="both").set_label(unit.label("Height"))
+        ax.set_xlabel(plane.label("x"))
+        ax.set_ylabel(plane.label("y"))
+        ax.tick_params(direction="out")
+        missing = int(height.isnull().sum())
+        ax.set_title(title + (f": {missing} points missing (grey)" if missing else ""))
+    if filled:
+        places = np.argwhere(dataset["filled"].values)
+        plane = plane_unit(dataset)
+        x, y = plane(dataset["x"].values[places[:, 0]]), plane(dataset["y"].values[places[:, 1]])
+        axes[1].plot(x, y, ".", color="#d55e00", ms=1.5, mew=0)
+        axes[1].set_title(f"as pressed: {filled} points filled in (red)")
+    return figure

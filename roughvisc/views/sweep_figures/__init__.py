@@ -1,0 +1,1 @@
+"""Figures of many results, by what was varied in them."""

@@ -1,0 +1,232 @@
+"""Many results as rows of a table: their histories, and what was varied in them."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.views.figures.axes import Unit
+from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
+
+_NO_PARAMETERS = ("case", "case_key")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Something that was varied: its value in every case.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of the study.
+    values : ndarray, shape (cases,)
+        Numbers in SI, or strings.
+    si : str
+        Unit of numbers as the vocabulary writes it.
+    name : str
+        How it is called on an axis.
+    """
+
+    key: str
+    values: np.ndarray
+    si: str
+    name: str
+
+    @property
+    def numeric(self) -> bool:
+        """Whether it lies on an axis of numbers: every value is one, and no seed."""
+        return (
+            not self.key.endswith("seed") and self.values.dtype.kind in "iuf" and bool(np.isfinite(self.values).all())
+        )
+
+    @property
+    def levels(self) -> np.ndarray:
+        """Its different values: numbers by size, others in the order of the cases."""
+        if self.numeric:
+            return np.unique(self.values)
+        return np.array(list(dict.fromkeys(self.values.tolist())), dtype=self.values.dtype)
+
+    @property
+    def places(self) -> np.ndarray:
+        """Number of each case's value among the levels."""
+        levels = self.levels.tolist()
+        return np.array([_index(levels, value) for value in self.values.tolist()])
+
+    @property
+    def unit(self) -> Unit:
+        """Unit to show numbers in: of numbers over decades, the one that suits their middle."""
+        return setting_unit(middle_of_decades(self.values), self.si) if self.numeric else Unit(1.0, "")
+
+    @property
+    def label(self) -> str:
+        """Axis label: its name and, in brackets, the unit."""
+        return self.unit.label(self.name)
+
+    def texts(self) -> list[str]:
+        """Every level as a reader wants it: numbers with their unit, files without their folders."""
+        if self.numeric:
+            return [self.unit.text(value, 4) for value in self.levels]
+        return [textwrap.shorten(text, 60, placeholder="…") for text in _category_texts(self.levels.tolist(), self.key)]
+
+
+def _index(levels: list, value: Any) -> int:
+    return next(i for i, level in enumerate(levels) if level == value or (level != level and value != value))
+
+
+def _category_texts(levels: list[Any], key: str) -> list[str]:
+    read = [_json(level) for level in levels]
+    if all(isinstance(one, dict) for one in read):
+        differing = [k for k in dict.fromkeys(k for one in read for k in one) if len({str(o.get(k)) for o in read}) > 1]
+        texts = [", ".join(_entry(f"{key}.{k}", one[k]) for k in differing if k in one) for one in read]
+        return texts if len(set(texts)) == len(texts) else [str(level) for level in levels]
+    shown = [str(level) for level in levels]
+    files = [PurePath(text).name for text in shown]
+    named = files if len(set(files)) == len(files) else shown
+    return ["none" if text in ("", "nan") else text for text in named]
+
+
+def _entry(key: str, value: Any) -> str:
+    """A setting as a part of a category: a word alone, a number with its name."""
+    text = readable_setting(key, value).replace("_", " ")
+    return text if isinstance(value, str) else f"{key.rpartition('.')[2].replace('_', ' ')} {text}"
+
+
+def _json(text: Any) -> Any:
+    try:
+        return json.loads(text) if isinstance(text, str) else text
+    except ValueError:
+        return text
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Results side by side.
+
+    Parameters
+    ----------
+    members : list of xarray.Dataset
+        Histories of each case over its own times.
+    parameters : list of Parameter
+        What was varied, but what says the same as one before it.
+    """
+
+    members: list[xr.Dataset]
+    parameters: list[Parameter]
+
+    def parameter(self, key: str) -> Parameter:
+        """Parameter of a dotted key.
+
+        Raises
+        ------
+        InputError
+            If it was not varied.
+        """
+        for one in self.parameters:
+            if one.key == key:
+                return one
+        raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
+
+    def need(self, quantity: str) -> None:
+        """Refuse a quantity that is no history of every case."""
+        for member in self.members:
+            if quantity not in member or member[quantity].dims != ("time",):
+                known = [str(name) for name in member.data_vars if member[name].dims == ("time",)]
+                raise InputError(f"quantity is {quantity!r}: expected a history of every case: {', '.join(known)}")
+
+
+def cases_of(results: Any) -> Cases:
+    """Histories and varied parameters of many results.
+
+    Parameters
+    ----------
+    results : xarray.Dataset or xarray.DataTree
+        As :func:`roughvisc.open_results` gives them.
+
+    Raises
+    ------
+    InputError
+        If they are something else, or one case only.
+    """
+    if isinstance(results, xr.DataTree):
+        members = [_histories(node.to_dataset()) for node in results.children.values()]
+        names = dict.fromkeys(str(name) for member in members for name in member.coords if not member[name].dims)
+        columns = {name: [member[name] for member in members if name in member.coords] for name in names}
+        columns = {name: found for name, found in columns.items() if len(found) == len(members)}
+        parameters = {name: (np.array([one.item() for one in found]), found[0]) for name, found in columns.items()}
+    elif isinstance(results, xr.Dataset) and "case" in results.dims:
+        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time"}]
+        table = results[held].load()
+        members = [table.isel(case=i) for i in range(results.sizes["case"])]
+        on_case = [str(name) for name in results.coords if results[name].dims == ("case",)]
+        parameters = {name: (results[name].values, results[name]) for name in on_case}
+    else:
+        raise InputError(
+            "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
+        )
+    if len(members) < 2:
+        raise InputError("found one case: expected several, as a sweep leaves them")
+    found = [
+        (key, values, str(source.attrs.get("units") or unit_of(key)))
+        for key, (values, source) in parameters.items()
+        if key not in _NO_PARAMETERS
+    ]
+    return Cases(members, list(_independent(found)))
+
+
+def _histories(dataset: xr.Dataset) -> xr.Dataset:
+    """What a case has over time, in memory."""
+    return dataset[[name for name in dataset.data_vars if dataset[name].dims == ("time",)]].load()
+
+
+def middle_of_decades(values: np.ndarray) -> np.ndarray:
+    """Values that tell a unit: as they are or, of positive ones over two decades or more, their geometric middle."""
+    known = values[np.isfinite(values)]
+    if known.size and known.min() > 0 and known.max() >= 100 * known.min():
+        return np.sqrt([known.min()]) * np.sqrt(known.max())
+    return values
+
+
+def _numbers(values: np.ndarray) -> np.ndarray:
+    """Numbers, where every value is a list of one number, as of a material with one relaxation."""
+    if values.dtype.kind not in "OU":
+        return values
+    read = [_json(value) for value in values.tolist()]
+    alone = all(isinstance(one, list) and len(one) == 1 and type(one[0]) in (int, float) for one in read)
+    return np.array([one[0] for one in read], dtype=float) if alone else values
+
+
+def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Parameter]:
+    """Parameters that vary, without those that follow one to one from another before them."""
+    kept: list[Parameter] = []
+    for key, values, si in found:
+        one = Parameter(key, _numbers(values), si, "")
+        pairs = [len(set(zip(one.places, other.places, strict=True))) for other in kept]
+        alike = any(p == len(one.levels) == len(o.levels) for p, o in zip(pairs, kept, strict=True))
+        if len(one.levels) > 1 and not alike:
+            kept.append(one)
+    names = _names([one.key for one in kept])
+    for one in kept:
+        yield Parameter(one.key, one.values, one.si, names[one.key])
+
+
+def _names(keys: Sequence[str]) -> Mapping[str, str]:
+    """What keys are called: their last word; what stands before it too where two would be called alike."""
+    last = {key: _last_word(key) for key in keys}
+    alike = [name for name in last.values() if list(last.values()).count(name) > 1]
+    names = {key: f"{name} ({key.rpartition('.')[0]})" if name in alike else name for key, name in last.items()}
+    return {key: (name[:1].upper() + name[1:]).replace("_", " ") for key, name in names.items()}
+
+
+def _last_word(key: str) -> str:
+    """Last part of a dotted key; a number with what it counts."""
+    parts = key.split(".")
+    return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]

@@ -1,0 +1,108 @@
+"""The figures of a whole sweep: which of them its results allow, and their files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.study.storage.results import open_results
+from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+from roughvisc.views.sweep_figures.cases import Cases, cases_of
+from roughvisc.views.sweep_figures.sweeps import sweep
+
+#: Quantities drawn against what was varied, the first of each row that all cases hold.
+_QUANTITIES = (("contact_area_corrected", "contact_area"), ("approach",), ("force",))
+
+
+def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
+    """Results of the sweep that ran last in a folder, as a tree where times or grids differ; None if below two."""
+    try:
+        tree = open_results(folder, ragged=True)
+        if len(tree.children) < 2:
+            return None
+        with suppress(InputError):
+            return open_results(folder)
+        return tree
+    except InputError:
+        return None
+
+
+def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str, Figure]]:
+    """Name, title and figure of all that results of several cases allow, one at a time.
+
+    What the program prescribes alike in all cases, or a parameter says already, is left out.
+    """
+    cases = cases_of(results)
+    held = [next((name for name in names if _holds(cases, name)), None) for names in _QUANTITIES]
+    for name in filter(None, held):
+        if cases.parameters and not _known_before(cases, name):
+            title = f"{_word(name)} against what was varied"
+            yield _word(name).split()[-1].lower(), title, sweep(results, name)
+    first = next(filter(None, held), None)
+    if first:
+        yield "histories", f"{_word(first)} over time, a line a case", histories_of_cases(results, first)
+
+
+def _word(name: str) -> str:
+    return name.removesuffix("_corrected").replace("_", " ").capitalize()
+
+
+def _holds(cases: Cases, name: str) -> bool:
+    return all(name in member and member[name].dims == ("time",) for member in cases.members)
+
+
+def _known_before(cases: Cases, name: str) -> bool:
+    """Whether the last values are alike, or those of a parameter."""
+    last = np.array([float(member[name][-1]) for member in cases.members])
+    scale = 1e-6 * np.nanmax(np.abs(last), initial=0.0)
+    stated = [one.values for one in cases.parameters if one.numeric]
+    return any(np.allclose(last, values, rtol=0, atol=scale) for values in (last[0], *stated))
+
+
+def save_sweep_figures(
+    results: xr.Dataset | xr.DataTree, folder: Any, *, suffix: str = ".png", dpi: float = 200.0
+) -> list[Path]:
+    """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``.
+
+    Parameters
+    ----------
+    results : xarray.Dataset or xarray.DataTree
+        What :func:`roughvisc.open_results` gives.
+    folder : path-like
+        Where to write; made if absent.
+    suffix : str
+        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+    dpi : float
+        Resolution of pictures made of pixels.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written; none where the results hold neither area, approach nor force.
+
+    Raises
+    ------
+    InputError
+        If there are no several cases.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, _, figure in sweep_figures(results):
+        path = folder / f"sweep-{name}{suffix}"
+        unfinished = path.with_name(f".{path.stem}.part{suffix}")
+        try:
+            figure.savefig(unfinished, dpi=dpi)
+            os.replace(unfinished, path)
+        finally:
+            unfinished.unlink(missing_ok=True)
+        written.append(path)
+    return written

@@ -1,0 +1,244 @@
+"""Figures of sweeps: a quantity against what was varied, as lines or as a map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from roughvisc.errors import InputError
+from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.views.figures.axes import (
+    frame_at,
+    letter_panels,
+    new_figure,
+    spread_frames,
+    styled,
+    time_text,
+)
+from roughvisc.views.sweep_figures.cases import Cases, Parameter, cases_of
+from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
+from roughvisc.views.sweep_figures.maps import draw_maps
+from roughvisc.views.sweep_figures.parameter_axes import positions, set_parameter_axis
+from roughvisc.views.sweep_figures.quantities import label_of, quantity_unit
+
+#: Parameters with so many values or more make a map by default.
+_MAP_FROM = 4
+_MOST_PANELS = 6
+_NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
+
+
+@styled
+def sweep(
+    results: Any,
+    quantity: str = "contact_area",
+    *,
+    times: float | Sequence[float] | None = None,
+    along: str | Sequence[str] | None = None,
+    kind: Literal["auto", "lines", "map"] = "auto",
+) -> Figure:
+    """A quantity against what was varied in a sweep: lines, or a map of two parameters.
+
+    Numbers lie on linear axes, or on logarithmic ones where they span decades; anything else, such as materials,
+    files and seeds, makes categories. Points that did not converge are crossed out.
+
+    Parameters
+    ----------
+    results : xarray.Dataset or xarray.DataTree
+        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
+    quantity : str
+        A history of every case, such as ``"contact_area"``, ``"approach"`` or ``"wall_time"``.
+    times : float or sequence of float, optional
+        The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
+        by default up to four, a line each; else by default the last. Where several were, a panel each. [s]
+    along : str, or two of them, optional
+        Dotted key of the parameter across; of a map, those across and up. By default the parameter with the most
+        numbers.
+    kind : {"auto", "lines", "map"}
+        ``"lines"``: one for every combination of the parameters that do not lie across. ``"map"``: colours over two
+        parameters; the default where there are two of four values or more each.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the results are no sweep, nothing varies in them, or a name is unknown.
+    """
+    if kind not in ("auto", "lines", "map"):
+        raise InputError(f"kind is {kind!r}: expected 'auto', 'lines' or 'map'")
+    cases = cases_of(results)
+    cases.need(quantity)
+    across = _across(cases, along)
+    as_map = kind == "map" or (kind == "auto" and _suits_map(cases, along))
+    if as_map and len(across) < 2:
+        raise InputError(f"a map needs two parameters that vary: found {', '.join(p.key for p in cases.parameters)}")
+    frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
+    values = np.array([[float(m[quantity][f]) for m, f in zip(cases.members, row, strict=True)] for row in frames])
+    titles = [_title(cases, row) for row in frames]
+    if as_map:
+        return draw_maps(cases, across[:2], quantity, values, titles)
+    if len(cases.parameters) == 1:
+        return _lines_by_time(cases, across[0], quantity, values, titles, frames)
+    return _families(cases, across[0], quantity, values, titles, frames)
+
+
+# ------------------------------------------------------------------------------------------------ what is drawn
+
+
+def _across(cases: Cases, along: str | Sequence[str] | None) -> list[Parameter]:
+    """Parameters in the order in which they take the axes."""
+    if not cases.parameters:
+        raise InputError("nothing varies between the cases: nothing to draw against")
+    asked = [along] if isinstance(along, str) else list(along or ())
+    first = [cases.parameter(key) for key in asked]
+    rest = [one for one in cases.parameters if one not in first]
+    return first + sorted(rest, key=lambda one: (not one.numeric, -len(one.levels)))
+
+
+def _suits_map(cases: Cases, along: str | Sequence[str] | None) -> bool:
+    if along is not None and not isinstance(along, str):
+        return len(along) == 2
+    if len(cases.parameters) != 2:
+        return False
+    one, other = (len(parameter.levels) for parameter in cases.parameters)
+    return min(one, other) >= _MAP_FROM and len(cases.members) > one * other / 2
+
+
+def _frames(cases: Cases, quantity: str, times: float | Sequence[float] | None, one: bool) -> list[list[int]]:
+    """Frame of every case, for each time that is drawn."""
+    clocks = [member["time"].values for member in cases.members]
+    if times is not None:
+        asked = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
+        if not 0 < asked.size <= _MOST_PANELS:
+            raise InputError(f"{asked.size} times to draw: choose 1 to {_MOST_PANELS}")
+        return [[frame_at(clock, float(time)) for clock in clocks] for time in asked]
+    shared = all(np.array_equal(clock, clocks[0]) for clock in clocks)
+    if not (one and shared):
+        return [[len(clock) - 1 for clock in clocks]]
+    telling = [i for i in range(len(clocks[0])) if any(abs(float(m[quantity][i])) > 0 for m in cases.members)]
+    telling = telling or [len(clocks[0]) - 1]
+    return [[telling[i]] * len(clocks) for i in spread_frames(clocks[0][telling], 4)]
+
+
+def _title(cases: Cases, frames: list[int]) -> str:
+    """The time, if it is the same in all cases."""
+    found = {float(member["time"][frame]) for member, frame in zip(cases.members, frames, strict=True)}
+    if len(found) == 1:
+        return time_text(found.pop())
+    ends = all(frame == member.sizes["time"] - 1 for member, frame in zip(cases.members, frames, strict=True))
+    return "at the end" if ends else f"t ≈ {time_text(float(np.median(list(found))))[4:]}"
+
+
+def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
+    pairs = zip(cases.members, frames, strict=True)
+    return np.array(["status" in m and int(m["status"][f]) == _NOT_CONVERGED for m, f in pairs])
+
+
+# ------------------------------------------------------------------------------------------------------- lines
+
+
+def _lines_by_time(
+    cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
+) -> Figure:
+    """One parameter: a line for each time."""
+    figure = new_figure(4.2, 3.0)
+    ax = figure.add_subplot()
+    unit = quantity_unit(cases, quantity, values)
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(values)))
+    for row, colour, title, frame in zip(values, shades, titles, frames, strict=True):
+        _draw_line(ax, across, np.arange(len(row)), unit(row), _failed(cases, frame), color=colour, label=title)
+    _finish(ax, cases, across, quantity, values)
+    named = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(named.values()), list(named), loc="outside upper center", ncols=4, handlelength=1.4)
+    return figure
+
+
+def _families(
+    cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
+) -> Figure:
+    """Several parameters: a panel for each time, in it a line for each combination of the others."""
+    family = _combined([one for one in cases.parameters if one.key != across.key])
+    colouring = Colouring(family)
+    figure = new_figure(1.2 + 3.0 * len(values), 3.2 + 0.14 * len(colouring.handles()) / (1 + len(values)))
+    axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
+    unit = quantity_unit(cases, quantity, values)
+    crossed = False
+    for ax, row, title, frame in zip(axes, values, titles, frames, strict=True):
+        failed = _failed(cases, frame)
+        crossed |= bool(failed.any())
+        for level in range(len(family.levels)):
+            members = np.flatnonzero(family.places == level)
+            _draw_line(ax, across, members, unit(row[members]), failed[members], color=colouring.colour(level))
+        _finish(ax, cases, across, quantity, values)
+        ax.set_title(title, loc="right")
+        ax.label_outer(remove_inner_ticks=False)
+        ax.set_xlabel(across.label)
+    handles = colouring.handles() + ([_CROSS] if crossed else [])
+    if handles:
+        longest = max(len(handle.get_label()) for handle in handles)
+        wide, columns = longest > 22, max(1, int(figure.get_figwidth() / (0.5 + 0.065 * longest)))
+        legend = figure.legend(handles=handles, loc="outside upper center", ncols=columns, handlelength=1.4)
+        legend.set_title(family.name if family.key and not wide else None, prop={"size": 7.5})
+    colouring.draw_bar(figure, list(axes))
+    if len(values) > 1:
+        letter_panels(axes)
+    return figure
+
+
+_CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged")
+
+
+def _combined(others: list[Parameter]) -> Parameter:
+    """One parameter that stands for several: every combination a category."""
+    if len(others) == 1:
+        return others[0]
+    texts = [np.array(_named_texts(one))[one.places] for one in others]
+    values = np.array([", ".join(parts) for parts in zip(*texts, strict=True)])
+    return Parameter("", values, "", ", ".join(one.name for one in others))
+
+
+def _named_texts(parameter: Parameter) -> list[str]:
+    """Levels as texts that say what they are: numbers with the name of the parameter."""
+    word = parameter.values.dtype.kind in "OU"
+    return parameter.texts() if word else [f"{parameter.name} {text}" for text in parameter.texts()]
+
+
+def _draw_line(
+    ax: Axes, across: Parameter, members: np.ndarray, shown: np.ndarray, failed: np.ndarray, **style
+) -> None:
+    """A line over the parameter; points of categories are not joined."""
+    place = positions(across)[across.places[members]]
+    order = np.argsort(place, kind="stable")
+    few = len(members) <= 40
+    style |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
+    ax.plot(place[order], shown[order], ms=3.5 if across.numeric else 5, **style)
+    if failed.any():
+        ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
+
+
+def _finish(ax: Axes, cases: Cases, across: Parameter, quantity: str, values: np.ndarray) -> None:
+    """Scales, ticks and labels of a panel of lines."""
+    unit = quantity_unit(cases, quantity, values)
+    shown = unit(values)
+    shown = shown[np.isfinite(shown)]
+    set_parameter_axis(ax.xaxis, across)
+    low, high = (shown.min(), shown.max()) if shown.size else (0.0, 1.0)
+    logarithmic = low > 0 and high >= (10 if ax.get_xscale() == "log" else 100) * low
+    if logarithmic:
+        ax.set_yscale("log")
+        ax.set_ylim(low / 1.4, high * 1.4)
+    else:
+        bottom, top = min(low, 0.0), max(high, 0.0)
+        span = (top - bottom) or 1.0
+        ax.set_ylim(bottom - (0.05 * span if bottom < 0 else 0.0), top + 0.1 * span)
+    readable_ticks(ax.yaxis, *ax.get_ylim(), logarithmic)
+    ax.set_ylabel(label_of(cases, quantity, unit))
+    ax.grid(color="0.9", lw=0.5)

@@ -1,0 +1,58 @@
+"""Influence of one cell: full precision at any distance, positive symbols."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.kernel import free_space_symbol, love_kernel, periodic_symbol
+
+
+def love_exact(x, y, dx, dy):
+    """Love's closed form in 50 digits."""
+    with mpmath.workdps(50):
+        total = mpmath.mpf(0)
+        for sx in (1, -1):
+            for sy in (1, -1):
+                a, b = mpmath.mpf(x) + sx * mpmath.mpf(dx) / 2, mpmath.mpf(y) + sy * mpmath.mpf(dy) / 2
+                total += sx * sy * (a * mpmath.asinh(b / abs(a)) + b * mpmath.asinh(a / abs(b)))
+        return float(total / mpmath.pi)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "error"), [((1.0, 1.0), 1e-14), ((3.0, 0.75), 2e-14), ((1.0, 16.0), 2e-13)], ids=["1", "4", "16"]
+)
+def test_love_kernel__is_exact_at_any_distance(spacing, error):
+    kernel = love_kernel((801, 301), spacing)
+    rng = np.random.default_rng(3)
+    cells = [(0, 0), (0, 1), (1, 0), (4, 0), (0, 5), (17, 1), (41, 3), (200, 1), (800, 300)]
+    cells += [(int(i), int(j)) for i, j in rng.integers(0, (801, 301), (30, 2))]
+    for i, j in cells:
+        exact = love_exact(i * spacing[0], j * spacing[1], *spacing)
+        assert kernel[i, j] == pytest.approx(exact, rel=error)
+
+
+def test_love_kernel__scales_with_length():
+    assert love_kernel((7, 5), (2e-9, 3e-9)) == pytest.approx(1e-9 * love_kernel((7, 5), (2.0, 3.0)), rel=1e-14)
+
+
+@pytest.mark.parametrize("aspect", [1, 4, 16])
+def test_free_space_symbol__is_positive(aspect):
+    symbol = free_space_symbol((64, 48), (1.0, float(aspect)))
+    assert symbol.min() > 0.5  # of the short side; zero at the middle offset would make it negative
+
+
+def test_periodic_symbol__is_two_over_the_wave_number():
+    symbol = periodic_symbol((9, 6), (0.5, 0.25))
+    assert symbol[2, 1] == pytest.approx(2 / math.hypot(2 * 2 * math.pi / 4.5, 2 * math.pi / 1.5), rel=1e-14)
+    assert symbol[0, 0] == 0
+
+
+@pytest.mark.parametrize(("shape", "spacing"), [((0, 3), (1, 1)), ((3, 3), (0, 1)), ((3, 3), (1, math.nan))])
+def test_kernels__refuse_impossible_grids(shape, spacing):
+    with pytest.raises(InputError, match="expected two positive"):
+        love_kernel(shape, spacing)
+    with pytest.raises(InputError, match="expected two positive"):
+        periodic_symbol(shape, spacing)

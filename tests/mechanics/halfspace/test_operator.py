@@ -1,0 +1,100 @@
+"""Displacement by transforms against direct sums and closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import direct
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
+
+
+@pytest.mark.parametrize("shape", GRIDS)
+def test_free_displacement__is_the_sum_over_cells(shape):
+    pressure = np.random.default_rng(1).random(shape)
+    found = HalfSpace(shape, (1.3, 0.7)).displacement(pressure)
+    expected = direct(pressure, (1.3, 0.7))
+    assert np.abs(found - expected).max() < 1e-14 * expected.max()
+
+
+@pytest.mark.parametrize(
+    ("shape", "waves"), [((9, 8), (0, 3)), ((9, 8), (2, 1)), ((12, 15), (3, 2)), ((12, 15), (0, 3)), ((1, 21), (0, 3))]
+)
+def test_periodic_displacement__of_a_wave(shape, waves):
+    spacing = (0.4, 0.9)
+    phase = sum(2 * np.pi * k * index / n for k, index, n in zip(waves, np.indices(shape), shape, strict=True))
+    wave_number = np.hypot(*(2 * np.pi * k / (n * d) for k, n, d in zip(waves, shape, spacing, strict=True)))
+    found = HalfSpace(shape, spacing, "periodic").displacement(np.cos(phase))
+    assert found == pytest.approx(2 / wave_number * np.cos(phase), abs=1e-13)
+
+
+@given(
+    shape=st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    boundary=st.sampled_from(["free", "periodic"]),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=40, deadline=None)
+def test_operators__are_symmetric_and_positive(shape, boundary, seed):
+    halfspace = HalfSpace(shape, (1.0, 0.6), boundary)
+    a, b = np.random.default_rng(seed).standard_normal((2, *shape))
+    for operator, precision in ((halfspace.displacement, 1e-12), (halfspace.approximate_inverse, 1e-5)):
+        scale = np.linalg.norm(operator(a)) * np.linalg.norm(b) + 1e-300
+        assert np.sum(operator(a) * b) == pytest.approx(np.sum(a * operator(b)), abs=precision * scale)
+        assert np.sum(operator(a) * a) >= -precision * scale
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_approximate_inverse__inverts_what_is_far_from_the_border(boundary):
+    x, y = np.indices((45, 64))
+    pressure = np.cos(2 * np.pi * 9 * x / 45) * np.exp(-(((x - 22) / 6.0) ** 2) - ((y - 32) / 6.0) ** 2)
+    halfspace = HalfSpace((45, 64), (1.0, 1.0), boundary)
+    back = halfspace.approximate_inverse(halfspace.displacement(pressure))
+    assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
+
+
+def test_displacement__does_not_depend_on_threads():
+    pressure = np.random.default_rng(4).random((65, 70))
+    one, two = (HalfSpace((65, 70), (1.0, 1.0), workers=w).displacement(pressure) for w in (1, 2))
+    assert np.array_equal(one, two)
+
+
+def test_boundary__is_named_when_unknown():
+    with pytest.raises(InputError, match=r"boundary is 'open': expected 'free' or 'periodic'"):
+        HalfSpace((4, 4), (1.0, 1.0), "open")
+
+
+def unfolded(corner):
+    return np.block([[corner[::-1, ::-1], corner[::-1]], [corner[:, ::-1], corner]])
+
+
+@pytest.mark.parametrize("shape", GRIDS)
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
+    corner = np.random.default_rng(3).random(shape)
+    quarter = HalfSpace(shape, (1.3, 0.7), boundary, mirrored=True)
+    surface = HalfSpace(quarter.surface_shape, (1.3, 0.7), boundary)
+    assert surface.shape == (2 * shape[0], 2 * shape[1])
+    assert quarter.cell_area == 4 * surface.cell_area
+    for operator, precision in (("displacement", 1e-13), ("approximate_inverse", 1e-5)):
+        kind = np.float64 if operator == "displacement" else np.float32
+        expected = getattr(surface, operator)(unfolded(corner).astype(kind))
+        found = getattr(quarter, operator)(corner.astype(kind))
+        assert found.dtype == kind
+        np.testing.assert_allclose(unfolded(found), expected, rtol=0, atol=precision * np.abs(expected).max())
+    if max(shape) > 1:  # of one cell and its images nothing is periodic
+        assert quarter.largest_influence == pytest.approx(surface.largest_influence, rel=1e-12)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_rough_displacement__is_the_displacement_over_the_largest_influence(boundary, mirrored):
+    halfspace = HalfSpace((45, 150), (2e-9, 3e-9), boundary, mirrored=mirrored)
+    pressure = np.random.default_rng(0).random((45, 150))
+    exact = halfspace.displacement(pressure)
+    found = halfspace.rough_displacement(pressure.astype(np.float32))
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found * halfspace.largest_influence, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
+    assert np.array_equal(halfspace.displacement(pressure), exact), "they share their working memory"

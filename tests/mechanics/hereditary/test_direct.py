@@ -1,0 +1,90 @@
+"""The direct history: the recursion's numbers for any series, any steps, jumps, and a larger grid."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.mechanics.hereditary.direct import History
+from roughvisc.mechanics.hereditary.memory import Modes
+
+SHAPE = (3, 4)
+
+
+def run(memory, steps, fields):
+    """Effective pressure after each step."""
+    state = memory.start(SHAPE)
+    found = []
+    for step, field in zip(steps, fields, strict=True):
+        alpha, carried = memory.predict(state, step, "linear")
+        found.append(alpha * field + carried)
+        state = memory.advance(state, step, "linear", field)
+    return found, state
+
+
+@st.composite
+def series(draw):
+    branches = draw(st.lists(st.tuples(st.floats(0.01, 10), st.floats(1e-3, 1e3)), max_size=3))
+    fluidity = draw(st.sampled_from([0.0, 0.2]))
+    return rv.Prony(draw(st.floats(0.01, 1)), fluidity, tuple(c for c, _ in branches), tuple(t for _, t in branches))
+
+
+@given(
+    material=series(),
+    steps=st.lists(st.one_of(st.just(0.0), st.floats(1e-3, 10.0)), min_size=1, max_size=80),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=60, deadline=None)
+def test_direct_and_recursive_memory__agree(material, steps, seed):
+    """The same weights, to rounding: jumps are steps of no length; cells come into contact and leave it."""
+    rng = np.random.default_rng(seed)
+    fields = [rng.random(SHAPE) * (rng.random(SHAPE) < 0.6) for _ in steps]
+    direct, _ = run(History(material), steps, fields)
+    recursive, _ = run(Modes(material), steps, fields)
+    total = sum(steps)
+    shortest = min((s for s in steps if s > 0), default=1.0)
+    scale = float(material.contact_compliance(total))
+    allowed = 50 * np.finfo(float).eps * max(total / shortest, 1) * scale
+    assert np.abs(np.array(direct) - np.array(recursive)).max() <= allowed
+
+
+@pytest.mark.parametrize(
+    "material",
+    [rv.PowerLaw(0.2, 1.0, 0.4), rv.Tabulated((0.0, 1.0, 3.0, 9.0), (1.0, 2.0, 2.5, 2.6))],
+    ids=["power", "table"],
+)
+def test_direct_history__is_exact_for_linear_pressure(material):
+    """A ramp, then a hold: against the antiderivative of the compliance."""
+    times = np.array([0.0, 0.3, 1.0, 1.7, 2.2])
+    pressure = np.minimum(times, 1.0)
+    found, _ = run(History(material), np.diff(times), [np.full(SHAPE, p) for p in pressure[1:]])
+    for t, q in zip(times[1:], found, strict=True):
+        exact = material.contact_integral(t) - material.contact_integral(max(t - 1.0, 0.0))
+        assert q == pytest.approx(np.full(SHAPE, exact), rel=1e-12)
+
+
+def test_state__keeps_cells_in_contact_only():
+    field = np.zeros(SHAPE)
+    field[1, 2] = 3.0
+    _, state = run(History(rv.maxwell(1.0, 1.0)), [0.1] * 100, [field] * 100)
+    assert sum(block.pressures.size for block in state.blocks) <= 101  # one for the state at rest
+
+
+def test_enlarged__is_the_same_history_on_a_larger_grid():
+    rng = np.random.default_rng(2)
+    steps, fields = [0.2] * 40, [rng.random(SHAPE) for _ in range(40)]
+    for memory in (History(rv.zener(1.0, 1.0, 1.0)), Modes(rv.zener(1.0, 1.0, 1.0), "pressure")):
+        _, state = run(memory, steps, fields)
+        alpha, carried = memory.predict(state, 0.1, "linear")
+        moved = memory.enlarged(state, (6, 9), (2, 3), np.cumsum)
+        alpha_moved, carried_moved = memory.predict(moved, 0.1, "linear")
+        assert alpha_moved == alpha
+        assert np.array_equal(carried_moved[2:5, 3:7], carried)
+        assert np.count_nonzero(carried_moved) == carried.size
+
+
+def test_unknown_rule__is_refused():
+    memory = History(rv.maxwell(1.0, 1.0))
+    with pytest.raises(ValueError, match="no rule 'bdf2'"):
+        memory.predict(memory.start(SHAPE), 0.1, "bdf2")

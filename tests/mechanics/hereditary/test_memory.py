@@ -1,0 +1,114 @@
+"""The hereditary integral, one scalar cell: exactness, order, positivity at the extremes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.mechanics.hereditary.memory import Modes, mean_compliance, stiff_ratio
+
+CELL = (1, 1)
+
+
+def remembered(material, times, pressures, rules):
+    """``q`` at the end of each step of a given pressure history."""
+    memory = Modes(material)
+    state = memory.start(CELL)
+    found = []
+    for n, rule in enumerate(rules, start=1):
+        step = times[n] - times[n - 1]
+        if n == 1 and pressures[0]:
+            state = memory.advance(state, 0.0, "linear", np.full(CELL, pressures[0]))
+        alpha, carried = memory.predict(state, step, rule)
+        found.append(float(alpha * pressures[n] + carried[0, 0]))
+        state = memory.advance(state, step, rule, np.full(CELL, pressures[n]))
+    return np.array(found)
+
+
+def direct(material, times, pressures):
+    """Exact hereditary integral of the piecewise-linear pressure, from the antiderivative of the compliance."""
+    found = []
+    for n in range(1, len(times)):
+        total = material.contact_compliance(times[n]) * pressures[0]
+        for k in range(1, n + 1):
+            weight = material.contact_integral(times[n] - times[k - 1]) - material.contact_integral(times[n] - times[k])
+            total += weight / (times[k] - times[k - 1]) * (pressures[k] - pressures[k - 1])
+        found.append(float(total))
+    return np.array(found)
+
+
+@st.composite
+def histories(draw):
+    steps = draw(st.lists(st.floats(1e-2, 10.0), min_size=2, max_size=12))
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    pressures = draw(st.lists(st.floats(0, 1e3), min_size=times.size, max_size=times.size))
+    branches = draw(st.lists(st.tuples(st.floats(0.01, 10), st.floats(1e-2, 1e2)), max_size=3))
+    material = rv.Prony(
+        draw(st.floats(0.01, 10)),
+        draw(st.sampled_from([0.0, 0.3])),
+        tuple(c for c, _ in branches),
+        tuple(t for _, t in branches),
+    )
+    return material, times, np.array(pressures)
+
+
+@given(histories())
+@settings(max_examples=60, deadline=None)
+def test_linear_rule__is_exact_for_piecewise_linear_pressure(history):
+    material, times, pressures = history
+    found = remembered(material, times, pressures, ["linear"] * (times.size - 1))
+    expected = direct(material, times, pressures)
+    scale = float(material.contact_compliance(times[-1])) * (1 + np.max(pressures))
+    steps = np.diff(times)
+    assert np.abs(found - expected).max() <= 50 * np.finfo(float).eps * times[-1] / steps.min() * scale
+
+
+@pytest.mark.parametrize(
+    ("rule", "order"), [("linear", 2), ("bdf2", 2), ("euler", 1), ("right", 1)], ids=lambda v: str(v)
+)
+def test_rules__have_their_order(rule, order):
+    """Smooth pressure; largest error at eight times, against the linear rule on a far finer grid."""
+    material = rv.Prony(1.0, 0.5, (2.0, 1.0), (0.3, 2.0))
+
+    def at_eighths(steps, rules):
+        times = np.linspace(0, 2, steps + 1)
+        return remembered(material, times, 1 - np.cos(times), rules)[steps // 8 - 1 :: steps // 8]
+
+    exact = at_eighths(4000, ["linear"] * 4000)
+    counts = np.array([16, 32, 64, 128, 256])
+    errors = []
+    for n in counts:
+        rules = ["euler" if rule == "bdf2" else rule] + [rule] * (n - 1)
+        errors.append(np.abs(at_eighths(n, rules) - exact).max())
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(order, abs=0.2)
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2", "euler", "right"])
+@pytest.mark.parametrize("x", [1e-15, 1e-6, 0.29, 0.31, 1e3, 1e15])
+def test_coefficients__keep_a_constant_at_any_step(rule, x):
+    """Steady pressure stays steady: the weights of each mode sum to one, and the new one is positive."""
+    memory = Modes(rv.Prony(1.0, compliances=(1.0,), times=(1.0,)))
+    state = memory.start(CELL)
+    state = memory.advance(state, 1e9, "euler", np.ones(CELL))  # relaxed
+    state = memory.advance(state, x, "euler", np.ones(CELL))
+    alpha, carried = memory.predict(state, x, rule)
+    assert alpha > 0.25  # (1 - nu)/2 times the glassy part
+    assert float(alpha + carried[0, 0]) == pytest.approx(0.5, rel=1e-8)
+
+
+def test_two_step_rule__needs_two_states():
+    memory = Modes(rv.maxwell(1.0, 1.0))
+    with pytest.raises(ValueError, match="two states"):
+        memory.predict(memory.restart(memory.start(CELL)), 0.1, "bdf2")
+
+
+def test_elastic_material__keeps_no_field():
+    assert Modes(rv.elastic(1.0)).start((3, 4)).modes.size == 0
+
+
+def test_stiff_ratio__tells_what_a_linear_step_does():
+    assert stiff_ratio(rv.elastic(1.0), 1.0) == pytest.approx(0, abs=1e-15)
+    assert stiff_ratio(rv.kelvin_voigt(1.0, 1.0), 1e-6) == pytest.approx(1, rel=1e-5)
+    assert stiff_ratio(rv.maxwell(1.0, 1.0), 2.0) == pytest.approx(0.5)
+    assert mean_compliance(rv.maxwell(1.0, 1.0), 0.0) == pytest.approx(0.25)

@@ -1,0 +1,310 @@
+"""Creep compliances against closed forms, and exact conversion over many decades."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import integrate
+
+import roughvisc as rv
+from roughvisc.mechanics.materials import models as materials
+from roughvisc.mechanics.materials.models import one_less_mean_decay
+
+positive = st.floats(1e-6, 1e6)
+
+
+def test_zener__creep_from_glassy_to_rubbery():
+    material = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=2e6, poisson=0.3)
+    t = np.array([0.0, 1.0, 1e9])
+    expected = 1 / 3e6 + (1 - np.exp(-t / 2.0)) / 1e6
+    assert material.creep_compliance(t) == pytest.approx(expected, rel=1e-14)
+    assert material.contact_compliance(t) == pytest.approx(0.35 * expected, rel=1e-14)
+
+
+def test_maxwell__flows():
+    material = rv.maxwell(2.0, 4.0)
+    assert material.contact_compliance(3.0) == pytest.approx((1 / 2 + 3 / 4) / 4)
+    assert material.contact_integral(3.0) == pytest.approx((3 / 2 + 9 / 8) / 4)
+
+
+@given(
+    compliances=st.lists(st.tuples(positive, st.floats(1e-3, 1e3)), min_size=1, max_size=4),
+    glassy=positive,
+    fluidity=st.one_of(st.just(0.0), positive),
+    t=st.floats(1e-3, 1e3),
+)
+@settings(max_examples=50, deadline=None)
+def test_contact_integral__is_the_integral(compliances, glassy, fluidity, t):
+    material = rv.Prony(glassy, fluidity, tuple(c for c, _ in compliances), tuple(x for _, x in compliances))
+    breaks = sorted({0.0, t, *(b for _, x in compliances for b in (x / 10, x, 10 * x, 100 * x) if b < t)})
+    parts = [
+        integrate.quad(material.contact_compliance, a, b, epsabs=0, epsrel=1e-12)[0]
+        for a, b in itertools.pairwise(breaks)
+    ]
+    assert material.contact_integral(t) == pytest.approx(sum(parts), rel=1e-10)
+
+
+@pytest.mark.parametrize("x", [1e-16, 1e-8, 0.1, 0.299, 0.301, 1.0, 50.0, 1e12])
+def test_one_less_mean_decay__keeps_its_digits(x):
+    series = sum((-1) ** (k + 1) * x**k / math.factorial(k + 1) for k in range(1, 30)) if x < 2 else None
+    expected = series if series is not None else 1 + math.expm1(-x) / x
+    assert float(one_less_mean_decay(x)) == pytest.approx(expected, rel=4e-15)
+
+
+@pytest.mark.parametrize("equilibrium", [0.0, 1e-9, 5.0])
+def test_from_relaxation__returns_over_24_decades(equilibrium):
+    times = 10.0 ** np.arange(-12, 12, 0.75)
+    moduli = 1 + np.arange(times.size) % 3
+    material = rv.from_relaxation(equilibrium, moduli, times)
+    back, back_moduli, back_times = material.relaxation_spectrum()
+    assert back == pytest.approx(equilibrium, rel=1e-12)
+    assert np.sort(back_times) == pytest.approx(times, rel=1e-12)
+    assert back_moduli[np.argsort(back_times)] == pytest.approx(moduli, rel=1e-10)
+    assert (np.array(material.compliances) > 0).all()
+
+
+def test_from_relaxation__satisfies_the_convolution_identity():
+    """``int G(t - s) J(s) ds = t``."""
+    material = rv.from_relaxation(0.5, (2.0, 1.0), (0.1, 3.0), poisson=0.3)
+
+    def relaxation(s):
+        return 0.5 + 2 * np.exp(-s / 0.1) + np.exp(-s / 3.0)
+
+    for t in (0.01, 0.5, 20.0):
+        value = integrate.quad(
+            lambda s, t=t: relaxation(t - s) * material.creep_compliance(s),
+            0,
+            t,
+            points=[max(t - 0.3, 0)],
+            epsrel=1e-11,
+        )[0]
+        assert value == pytest.approx(t, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rv.elastic(-1.0), r"shear_modulus is -1\.0: expected a positive number \[Pa\]"),
+        (lambda: rv.zener(1.0, 0.0, 1.0), r"kelvin_modulus is 0\.0: expected a positive"),
+        (lambda: rv.maxwell(1.0, math.nan), r"viscosity is nan"),
+        (lambda: rv.elastic(1.0, poisson=0.6), r"poisson is 0\.6: expected a number above -1 and up to 0\.5"),
+        (lambda: rv.elastic(1.0, poisson=-1.0), r"poisson is -1\.0"),
+        (lambda: rv.Prony(1.0, compliances=(1.0,)), r"1 compliances for 0 times"),
+        (lambda: rv.Prony(0.0), r"all compliances are zero"),
+        (lambda: rv.from_relaxation(0.0, (), ()), r"all moduli are zero"),
+        (lambda: rv.kelvin_voigt(1.0, 1.0).relaxation_spectrum(), r"no finite relaxation modulus"),
+    ],
+)
+def test_bad_input__is_named(make, message):
+    with pytest.raises(rv.InputError, match=message):
+        make()
+
+
+# --- elastic bulk modulus -------------------------------------------------------------------------------------------
+
+SHEAR = {
+    "elastic": lambda **volume: materials.elastic(2.0, **volume),
+    "maxwell": lambda **volume: materials.maxwell(2.0, 3.0, **volume),
+    "kelvin_voigt": lambda **volume: materials.kelvin_voigt(2.0, 3.0, **volume),
+    "zener": lambda **volume: materials.zener(2.0, 0.02, 0.3, **volume),
+    "from_relaxation": lambda **volume: materials.from_relaxation(
+        0.1, 0.1 * (1 + np.arange(17) % 4), 10.0 ** np.arange(-12, 12.1, 1.5), **volume
+    ),
+}
+LAPLACE = 10.0 ** np.arange(-14, 14, 0.25)
+
+
+def transformed(material, s):
+    """``s`` times the Laplace transform of the shear compliance."""
+    total = material.glassy + material.fluidity / s
+    return total + sum(c / (1 + s * t) for c, t in zip(material.compliances, material.times, strict=True))
+
+
+@pytest.mark.parametrize("name", SHEAR)
+@pytest.mark.parametrize("ratio", 10.0 ** np.arange(-3, 8.1, 1.0))
+def test_bulk_modulus__satisfies_the_correspondence_principle(name, ratio):
+    """``(1 - nu)/G = 1/2 (1/G + 3/(3K + G))`` with the transformed modulus; twice the contact compliance."""
+    bulk = 2.0 * ratio
+    modulus = 1 / transformed(SHEAR[name](), LAPLACE)
+    material = SHEAR[name](bulk_modulus=bulk)
+    found = (1 - material.poisson) * transformed(material, LAPLACE)
+    expected = 0.5 * (1 / modulus + 3 / (3 * bulk + modulus))
+    assert np.abs(found / expected - 1).max() < 1e-13
+    assert min(material.compliances, default=1.0) > 0
+
+
+@given(shear=positive, ratio=st.floats(1e-6, 1e8))
+def test_bulk_modulus__of_an_elastic_material_is_a_poisson_ratio(shear, ratio):
+    bulk = shear * ratio
+    poisson = (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
+    found = materials.elastic(shear, bulk_modulus=bulk).contact_compliance(1.0)
+    assert found == pytest.approx((1 - poisson) / (2 * shear), rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("name", SHEAR)
+def test_bulk_modulus__large_is_incompressible(name):
+    t = np.geomspace(1e-6, 1e6, 50)
+    near, limit = SHEAR[name](bulk_modulus=1e14), SHEAR[name](poisson=0.5)
+    assert near.contact_compliance(t) == pytest.approx(limit.contact_compliance(t), rel=1e-7, abs=0)
+    assert "bulk modulus of 1e+14 Pa" in near.note
+    assert limit.note == ""
+
+
+@pytest.mark.parametrize("name", SHEAR)
+def test_bulk_modulus__excludes_a_poisson_ratio(name):
+    with pytest.raises(rv.InputError, match=r"poisson is 0\.5 and bulk_modulus is 3\.0: expected one of them"):
+        SHEAR[name](poisson=0.5, bulk_modulus=3.0)
+    with pytest.raises(rv.InputError, match=r"bulk_modulus is 0\.0: expected a positive number \[Pa\]"):
+        SHEAR[name](bulk_modulus=0.0)
+
+
+def test_bulk_modulus__of_kelvin_voigt_over_any_ratio():
+    """A zero at the very end of its bracket is found: one pole, whose offset is known."""
+    for ratio in 10.0 ** np.arange(-12, 12.1, 0.5):
+        material = materials.kelvin_voigt(2.0, 3.0, bulk_modulus=2.0 * ratio)
+        # B belongs to 3K + G + eta d/dt
+        assert material.compliances[1] == pytest.approx(3 / (6 * ratio + 2), rel=2e-15, abs=0)
+        assert material.times[1] == pytest.approx(3 / (6 * ratio + 2), rel=2e-15, abs=0)
+
+
+# --- every material: antiderivative and mean ------------------------------------------------------------------------
+
+OF_EACH_KIND = {
+    "prony": materials.Prony(0.5, 0.1, (2.0, 1.0), (0.3, 20.0), poisson=0.3),
+    "power_law": materials.PowerLaw(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
+    "pure_power_law": materials.PowerLaw(0.0, 1.0, 0.7),
+    "table": materials.Tabulated((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2),
+    "late_table": materials.Tabulated((0.5, 2.0, 30.0, 1e3), (0.0, 0.9, 1.1, 7.0)),
+}
+OF_EACH_KIND["pair"] = materials.pair(OF_EACH_KIND["power_law"], OF_EACH_KIND["table"])
+
+
+@pytest.mark.parametrize("name", OF_EACH_KIND)
+@given(s=st.floats(0, 400), h=st.floats(1e-3, 400))
+@settings(max_examples=40, deadline=None)
+def test_mean_contact_compliance__is_the_mean(name, s, h):
+    material = OF_EACH_KIND[name]
+    corners = {0.5, 2.0, 30.0, *(s + h * 10.0**k for k in range(-12, 0))}
+    breaks = [s, *sorted(t for t in corners if s < t < s + h), s + h]
+    pieces = [integrate.fixed_quad(material.contact_compliance, a, b, n=30)[0] for a, b in itertools.pairwise(breaks)]
+    assert material.mean_contact_compliance(s, h) == pytest.approx(sum(pieces) / h, rel=1e-9, abs=0)
+    difference = material.contact_integral(s + h) - material.contact_integral(s)
+    lost = 50 * np.finfo(float).eps * float(material.contact_integral(s + h))
+    assert material.mean_contact_compliance(s, h) * h == pytest.approx(float(difference), rel=1e-13, abs=lost)
+
+
+@pytest.mark.parametrize("name", OF_EACH_KIND)
+@given(s=st.floats(1e-3, 900), exponent=st.floats(-300, -9))
+@settings(max_examples=40, deadline=None)
+def test_mean_contact_compliance__loses_nothing_over_a_short_step(name, s, exponent):
+    """The mean lies between the compliances at both ends, whatever the step; an antiderivative would lose it all."""
+    material = OF_EACH_KIND[name]
+    h = s * 10.0**exponent
+    low, high = material.contact_compliance(s), material.contact_compliance(s + h)
+    mean = float(material.mean_contact_compliance(s, h))
+    assert low * (1 - 1e-14) <= mean <= high * (1 + 1e-14)
+    assert material.mean_contact_compliance(s, 0.0) == pytest.approx(float(low), rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("name", OF_EACH_KIND)
+def test_materials__take_arrays(name):
+    material = OF_EACH_KIND[name]
+    s, h = np.array([[0.0, 0.1], [3.0, 400.0]]), np.array([0.0, 1e-3])
+    found = material.mean_contact_compliance(s, h)
+    assert found.shape == (2, 2)
+    for i, j in itertools.product(range(2), range(2)):
+        assert found[i, j] == pytest.approx(float(material.mean_contact_compliance(s[i, j], h[j])), rel=1e-15, abs=0)
+    assert material.contact_integral(s) == pytest.approx(s * material.mean_contact_compliance(0.0, s), rel=1e-14, abs=0)
+
+
+# --- power law ------------------------------------------------------------------------------------------------------
+
+
+def test_power_law__known_values():
+    material = materials.PowerLaw(1.0, 2.0, 0.5, time_scale=4.0, poisson=0.0)
+    assert material.creep_compliance(16.0) == 5.0  # 1 + 2 sqrt(16/4)
+    assert material.contact_compliance(16.0) == 2.5
+    assert material.contact_integral(16.0) == pytest.approx(0.5 * (16 + 2 * 2 * 16 / 1.5))
+    assert material.mean_contact_compliance(4.0, 12.0) == pytest.approx(0.5 * (1 + (16**1.5 - 4**1.5) / 1.5 / 12))
+
+
+def test_power_law__mean_spans_24_decades():
+    material = materials.PowerLaw(0.0, 1.0, 0.5)
+    h = np.geomspace(1e-12, 1e12, 49)
+    assert material.mean_contact_compliance(0.0, h) == pytest.approx(0.25 * np.sqrt(h) / 1.5, rel=1e-14, abs=0)
+    assert material.mean_contact_compliance(1.0, h[h < 1e-8]) == pytest.approx(
+        0.25 * (1 + h[h < 1e-8] / 4), rel=1e-15, abs=0
+    )
+
+
+# --- pairs ----------------------------------------------------------------------------------------------------------
+
+series = st.builds(
+    materials.Prony,
+    st.floats(0.01, 10),
+    st.sampled_from([0.0, 0.3]),
+    st.just((1.0, 2.0)),
+    st.tuples(st.sampled_from([0.1, 1.0]), st.floats(2, 10)),
+    st.floats(-0.9, 0.5),
+)
+
+
+@given(series, series, st.floats(0, 100))
+def test_pair__of_series_is_a_series(a, b, t):
+    both = materials.pair(a, b)
+    assert isinstance(both, materials.Prony)
+    assert both.contact_compliance(t) == pytest.approx(float(a.contact_compliance(t) + b.contact_compliance(t)))
+    assert len(both.times) == len(set(a.times) | set(b.times))
+
+
+def test_pair__adds_whatever_the_bodies_are():
+    a, b = materials.PowerLaw(0.1, 1.0, 0.5, poisson=0.3), materials.zener(1.0, 2.0, 3.0, poisson=0.1)
+    both, t = materials.pair(a, b), np.array([0.0, 0.5, 40.0])
+    for method in ("contact_compliance", "contact_integral"):
+        assert getattr(both, method)(t) == pytest.approx(getattr(a, method)(t) + getattr(b, method)(t))
+    mean = a.mean_contact_compliance(t, 2.0) + b.mean_contact_compliance(t, 2.0)
+    assert both.mean_contact_compliance(t, 2.0) == pytest.approx(mean)
+    # read as the shear compliance of one body at the pair's Poisson ratio, like every other material
+    assert 0.5 * (1 - both.poisson) * both.creep_compliance(t) == pytest.approx(both.contact_compliance(t))
+    assert both == materials.pair(a, b)
+    assert hash(both) == hash(materials.pair(a, b))
+
+
+def test_pair__keeps_both_notes():
+    table = materials.Tabulated((1.0, 2.0), (1.0, 2.0))
+    both = materials.pair(materials.elastic(1.0, bulk_modulus=2.0), table)
+    assert both.note.startswith("a: effective compliance")
+    assert both.note.endswith(f"b: {table.note}")
+    joined = materials.pair(materials.elastic(1.0), materials.elastic(1.0, bulk_modulus=2.0))
+    assert joined.note.startswith("b: effective compliance")
+
+
+def test_note__is_no_part_of_a_comparison():
+    assert materials.Prony(1.0, note="fitted") == materials.Prony(1.0)
+    assert materials.PowerLaw(0.0, 1.0, 0.5, note="fitted") == materials.PowerLaw(0.0, 1.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: materials.PowerLaw(0.0, 1.0, 1.0), r"exponent is 1\.0: expected a number above 0 and below 1"),
+        (lambda: materials.PowerLaw(0.0, 1.0, 0.0), r"exponent is 0\.0"),
+        (lambda: materials.PowerLaw(0.0, 1.0, math.nan), r"exponent is nan"),
+        (lambda: materials.PowerLaw(-1.0, 1.0, 0.5), r"glassy is -1\.0: expected a non-negative"),
+        (lambda: materials.PowerLaw(0.0, 0.0, 0.5), r"coefficient is 0\.0: expected a positive number \[1/Pa\]"),
+        (lambda: materials.PowerLaw(0.0, 1.0, 0.5, time_scale=0.0), r"time_scale is 0\.0"),
+        (lambda: materials.PowerLaw(0.0, 1.0, 0.5, poisson=0.51), r"poisson is 0\.51"),
+    ],
+)
+def test_bad_power_law__is_named(make, message):
+    with pytest.raises(rv.InputError, match=message):
+        make()
+
+
+def test_contact_compliance__of_a_solid_has_its_rubbery_limit():
+    rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
+    assert float(rubber.contact_compliance(np.inf)) == pytest.approx((1 / 3e6 + 1 / 1e6) / 4, rel=1e-14)
+    assert float(rv.maxwell(1e6, 1e6).contact_compliance(np.inf)) == np.inf

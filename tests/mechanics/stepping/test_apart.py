@@ -1,0 +1,211 @@
+"""Surfaces that are apart: the first time at which they touch again, however late and however brief."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.stepping import apart
+from roughvisc.mechanics.stepping import march as stepper
+from roughvisc.mechanics.stepping.apart import _first_crossing, closing_time
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.scene import Scene
+
+MATERIAL = rv.zener(1.0, 1.0, 0.05)
+
+
+def sphere(program, material=MATERIAL, **settings):
+    shape, spacing = (9, 7), (0.1, 0.12)
+    x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
+    gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
+    return Scene(HalfSpace(shape, spacing), gap, material, Modes(material), program, **settings)
+
+
+def contacts(steps):
+    """How often contact begins."""
+    touching = [False] + [step.shown.force > 0 for step in steps]
+    return sum(now and not before for before, now in pairwise(touching))
+
+
+AMPLITUDE, PERIOD, CYCLES = 0.03, 1.0, 20
+
+
+def tapping(cycles):
+    """About half an amplitude outside: contact in a third of each cycle."""
+    return rv.Program.cycle(-0.5 * AMPLITUDE, AMPLITUDE, PERIOD, cycles, control="approach")
+
+
+@pytest.fixture(scope="module")
+def one_by_one():
+    """Work of the same cycles, each a program of its own upon the last."""
+    program = rv.Program()
+    for _ in range(CYCLES):
+        program += tapping(1)
+    steps = list(march(sphere(program, times=(program.duration,), tolerance=1e-3)))
+    assert contacts(steps) == CYCLES
+    return steps[-1].work
+
+
+@pytest.mark.parametrize("kept", [0, 50, 8])
+def test_taps__are_all_found_and_work_as_in_single_cycles(kept, one_by_one):
+    times = tuple((PERIOD / kept * np.arange(kept * CYCLES + 1)).tolist()) if kept else (CYCLES * PERIOD,)
+    steps = list(march(sphere(tapping(CYCLES), times=times, tolerance=1e-3)))
+    assert contacts(steps) == CYCLES
+    assert steps[-1].work == pytest.approx(one_by_one, rel=5e-3)
+
+
+def test_taps__work_as_in_steps_eight_times_as_short():
+    cycles = 3
+    found, finer = (
+        list(march(sphere(tapping(cycles), times=(cycles * PERIOD,), **how)))
+        for how in ({"tolerance": 1e-3}, {"time_step": PERIOD / 512, "tolerance": 1e-6})
+    )
+    assert contacts(found) == contacts(finer) == cycles
+    assert found[-1].work == pytest.approx(finer[-1].work, rel=5e-3)
+    assert found[-1].dissipated == pytest.approx(finer[-1].dissipated, rel=1e-2)
+
+
+def found_again(steps, after):
+    """Time up to which surfaces that were apart stayed apart."""
+    apart_since = next(i for i, step in enumerate(steps) if step.shown.time >= after and step.shown.force == 0)
+    return next(step.state.contact_since for step in steps[apart_since:] if step.shown.force > 0)
+
+
+def test_dent_of_a_punch__is_touched_again_when_it_has_recovered_so_far():
+    """One retarded mode is left in it, which decays as a whole: the time is known."""
+    program = rv.Program().load(1.0, over=0).hold(0.5).load(0.0, over=0).hold(0.3)
+    shape = (9, 7)
+    x, y = (np.arange(n) - n // 2 for n in shape)
+    present = x[:, None] ** 2 + y[None, :] ** 2 < 6
+    half_space, material = HalfSpace(shape, (1.0, 1.0)), rv.zener(1.0, 0.5, 0.5)  # retarded in 1 s
+    first = Scene(half_space, np.zeros(shape), material, Modes(material), program, present=present)
+    left = list(march(first))[-1].shown.approach  # where it would be touched
+    assert left > 0
+    second = replace(first, program=program.approach(0.6 * left, over=0).hold(2.0))
+    assert found_again(list(march(second)), 0.8) == pytest.approx(0.8 + math.log(1 / 0.6), abs=1e-7)
+
+
+@pytest.mark.parametrize("end", [-0.02, 0.012, 0.02], ids=["falling_fast", "falling", "held"])
+def test_recovery__overtakes_an_approach(end):
+    """A sphere pulled off its dent: the surface comes up faster than the approach goes down, or not at all."""
+    pulled, over, height = 1.0, 4.0, 0.02
+    program = rv.Program().approach(0.05, over=0).hold(pulled).approach(height, over=0).approach(end, over=over)
+    scene = sphere(program, rv.zener(1.0, 0.2, 0.2), tolerance=1e-3, times=(pulled, pulled + over))
+    steps = list(march(scene))
+    dent = next(step.displacement for step in steps if step.shown.time == pulled)
+    assert next(step.shown.force for step in steps if step.shown.time == pulled) == 0
+    times = np.linspace(0, over, 4001)
+    limit = np.array([np.min(scene.gap + dent * np.exp(-t)) for t in times])  # retarded in 1 s
+    above = height + (end - height) * times / over > limit
+    if end < 0:
+        assert not above.any()
+        assert steps[-1].shown.force == 0
+    else:
+        assert found_again(steps, pulled) - pulled == pytest.approx(times[np.argmax(above)], abs=over / 4000)
+
+
+def test_what_never_touches__is_seen_at_a_glance(monkeypatch):
+    """A hundred thousand cycles: no look at each of them where no one of them can reach the surface."""
+    calls = []
+    counted = stepper._touched
+    monkeypatch.setattr(stepper, "_touched", lambda *given: calls.append(1) or counted(*given))
+    outside = rv.Program.cycle(-2.0, 1.0, 1.0, 1e5, control="approach")
+    steps = list(march(sphere(outside, times=(outside.duration,))))
+    assert contacts(steps) == 0
+    assert len(steps) < 5
+    assert len(calls) < 10
+
+
+def test_load_that_is_zero_for_an_instant__is_no_gap_in_the_contact():
+    program = rv.Program.cycle(0.01, 0.01, 1.0, 3)
+    scene = sphere(program, times=(0.75, 1.75, 2.75, 3.0), tolerance=1e-2)
+    steps = list(march(scene))
+    forces = {step.shown.time: step.shown.force for step in steps}
+    assert all(forces[t] <= 1e-12 for t in (0.75, 1.75, 2.75))
+    assert forces[3.0] == pytest.approx(0.01)
+    assert len([s for s in steps if s.shown.force > 0]) > 30
+    segment = program.segments[1]
+    state = next(step.state for step in steps if step.shown.time == 0.75)
+    assert closing_time(scene, state, segment, 1.75, lambda _: math.inf) == state.now.time
+    ramp = rv.Program().load(0.01, over=1.0).load(0.0, over=1.0).load(0.01, over=1.0)
+    at = {step.shown.time: step.shown.force for step in march(sphere(ramp, times=(1.0, 2.0, 2.001, 3.0)))}
+    assert at[2.0] == 0
+    assert at[2.001] == pytest.approx(1e-5)
+
+
+def test_no_load_throughout__stays_apart():
+    program = rv.Program().load(0.01, over=0).hold(1.0).load(0.0, over=0).hold(5.0).load(0.01, over=1.0)
+    steps = list(march(sphere(program, times=(6.0, 7.0))))
+    assert [s.shown.force for s in steps if 1 <= s.shown.time <= 6] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("lead", [0.0, 0.4])
+def test_contact_at_the_very_first_instant__is_not_put_off(lead):
+    """From rest at first touch, or on the dot of an event: whatever goes in touches at once."""
+    program = rv.Program().approach(0.0, over=lead) if lead else rv.Program()
+    scene = sphere(program.approach(0.02, over=1.0), times=(lead + 0.25, lead + 1.0), tolerance=1e-2)
+    steps = list(march(scene))
+    assert all(step.shown.force > 0 for step in steps if step.shown.time > lead)
+    state = next(step.state for step in steps if step.shown.time == lead)
+    ramp = scene.program.segments[-1]
+    assert closing_time(scene, state, ramp, lead + 1.0, lambda _: 0.0) == lead
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the search alone
+
+heights = st.floats(-1.0, 1.0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    values=st.lists(heights, min_size=2, max_size=6),
+    rates=st.lists(st.floats(0.01, 20.0), min_size=1, max_size=3),
+    scales=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
+    floor=heights,
+)
+def test_first_crossing__is_that_of_dense_samples(values, rates, scales, floor):
+    """Linear between corners, against a floor to which exponentials decay."""
+    corners = np.arange(len(values), dtype=float)
+
+    def prescribed(time):
+        return np.interp(time, corners, values)
+
+    def limit(time):
+        return floor + sum(a * np.exp(-r * time) for a, r in zip(scales, rates, strict=False))
+
+    shortest = 1e-9 * corners[-1]
+    found = None
+    for begin, end in pairwise(corners.tolist()):
+        found = _first_crossing(prescribed, limit, begin, end, shortest)
+        if found is not None:
+            break
+    samples = np.linspace(0.0, corners[-1], 200 * (len(values) - 1) + 1)
+    above = prescribed(samples) > limit(samples) + 100 * shortest  # no slope is steeper
+    if found is None:
+        assert not above.any()
+        return
+    assert prescribed(found) <= limit(found) + 100 * shortest or found == 0
+    assert not above[samples < found].any()
+    ahead = np.linspace(found, found + 2 * shortest, 50)
+    assert np.any(prescribed(ahead) > limit(ahead) - 100 * shortest)
+
+
+def test_turns_of_a_cycle__bound_the_search():
+    """Peaks far narrower than the way to the event: the first that reaches the surface is the one that counts."""
+    program = rv.Program.cycle(-0.9999, 1.0, 1.0, 500, control="approach")
+    scene = sphere(program)
+    state = next(iter(march(scene))).state
+    segment, peak = program.segments[1], 0.25
+    half = math.acos(0.9999) / (2 * math.pi)
+    lifted = 40  # periods until the surface has come down to the peaks
+    found = closing_time(scene, state, segment, 500.0, lambda time: 0.0 if time > lifted else 1.0)
+    assert found == pytest.approx(lifted + peak - half, abs=1e-5)
+    assert apart.closing_time(scene, state, segment, 500.0, lambda _: 1.0) == 500.0

@@ -1,0 +1,180 @@
+"""What is stated of the accuracy of each row, against marches at a fraction of the tolerance."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.stepping import march as stepper
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.simulation.rows import keeps_its_word, stated
+
+TOLERANCE, SHARPER = 1e-2, 30
+MATERIALS = {
+    "maxwell": rv.maxwell(1.0, 1.0),
+    "zener": rv.zener(1.0, 1.0, 0.5),
+    "two_branches": rv.Prony(1.0, 0.0, (1.0, 2.0), (0.1, 3.0)),
+}
+PROGRAMS = {
+    "held_load": rv.Program().load(0.03, over=0).hold(2.0),
+    "triangle": rv.Program().load(0.03, over=1.0).load(0.006, over=1.0),
+    "held_approach": rv.Program().approach(0.06, over=0.5).hold(1.5),
+    "pulled": rv.Program().approach(0.06, over=0.7).approach(0.02, over=1.3),
+    "cycles": rv.Program.cycle(0.02, 0.01, 1.0, 2.0),
+}
+TIMES = (0.05, 0.2, 0.33, 0.5, 0.7, 0.77, 1.0, 1.1, 1.4, 1.7, 2.0)
+
+
+def sphere(material, program, **settings):
+    shape, spacing = (19, 16), (0.08, 0.09)
+    x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
+    gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
+    return Scene(HalfSpace(shape, spacing), gap, material, Modes(material), program, **settings)
+
+
+def rough(material, program, **settings):
+    """Waves with random phases, pressed with periodic boundaries."""
+    shape, spacing = (18, 15), (0.06, 0.07)
+    rng = np.random.default_rng(5)
+    x, y = (2 * np.pi * np.arange(n) / n for n in shape)
+    height = np.zeros(shape)
+    for i in range(4):
+        for j in range(-3, 4):
+            if i or j > 0:
+                phase = i * x[:, None] + j * y[None, :] + 2 * np.pi * rng.random()
+                height += 0.02 * (i**2 + j**2) ** -0.9 * np.cos(phase)
+    gap = height.max() - height
+    return Scene(HalfSpace(shape, spacing, "periodic"), gap, material, Modes(material), program, **settings)
+
+
+SURFACES = {"sphere": sphere, "rough": rough}
+
+
+def kept(scene):
+    return {step.shown.time: step for step in march(scene) if scene.keeps(step.shown.time)}
+
+
+def true_errors(found, exact):
+    """Of each row: the largest of pressure, force and approach, over the largest of them so far."""
+    return np.array([_true_error(step, exact[time]) for time, step in found.items()])
+
+
+def _true_error(step, exact):
+    one, other, force = step.shown, exact.shown, exact.state.largest_force
+    pressure = step.scene.halfspace.cell_area * float(np.abs(one.pressure - other.pressure).sum())
+    by_approach = abs(one.approach - other.approach) / exact.state.largest_approach
+    return max(pressure / force, abs(one.force - other.force) / force, by_approach)
+
+
+@pytest.fixture(scope="module")
+def matrix():
+    """Rows of all cases, and those of the same at a thirtieth of the tolerance; only the steps leave an error."""
+    cases = {}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(stepper, "_ALGEBRAIC", 1e-6)
+        for name in ("maxwell", "two_branches"):
+            for what, program in PROGRAMS.items():
+                for surface, scene in SURFACES.items():
+                    settings = MATERIALS[name], program
+                    both = (kept(scene(*settings, times=TIMES, tolerance=t)) for t in (TOLERANCE, TOLERANCE / SHARPER))
+                    cases[name, what, surface] = tuple(both)
+    return cases
+
+
+def counted(step):
+    return float(np.count_nonzero(step.shown.pressure)) * step.scene.halfspace.cell_area
+
+
+def test_time_error__covers_the_true_one_and_not_by_far(matrix):
+    true = np.concatenate([true_errors(*rows) for rows in matrix.values()])
+    said = np.array([step.time_error for found, _ in matrix.values() for step in found.values()])
+    seen = true > 1e-3 * TOLERANCE
+    assert np.count_nonzero(seen) > 150
+    assert np.mean(said[seen] >= 0.8 * true[seen]) >= 0.98, np.sort(said[seen] / true[seen])[:10]
+    assert np.median(said[seen] / true[seen]) <= 5
+    assert np.mean(true <= TOLERANCE) >= 0.98
+
+
+def test_force_error__is_nothing_where_the_load_is_given(matrix):
+    for (_, what, _), (found, _) in matrix.items():
+        rows = [stated(step, 0.0, counted(step)) for step in found.values() if step.shown.force > 0]
+        given, sought = ("approach", "force") if what in ("held_approach", "pulled") else ("force", "approach")
+        assert all(row[f"{given}_error"] == 0 for row in rows)
+        assert all(row[f"{sought}_error"] > 0 for row in rows)
+
+
+def test_force_error__is_not_nothing_where_a_hold_keeps_what_was_found():
+    program = rv.Program().approach(0.06, over=0.5).hold(1.0, control="load")
+    found = kept(sphere(MATERIALS["zener"], program, times=(0.25, 1.0, 1.5), tolerance=TOLERANCE))
+    rows = [stated(step, 0.0, counted(step)) for step in found.values()]
+    assert [row["force_error"] > 0 for row in rows] == [True, True, True]
+    assert [row["approach_error"] > 0 for row in rows] == [False, True, True]
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize("what", PROGRAMS)
+def test_every_step_that_is_a_row__keeps_the_tolerance(what, surface):
+    scene = SURFACES[surface](MATERIALS["zener"], PROGRAMS[what], tolerance=TOLERANCE)
+    found = {step.shown.time: step for step in march(scene) if keeps_its_word(step, 0.0)}
+    exact = kept(replace(scene, times=tuple(found), tolerance=TOLERANCE / SHARPER))
+    later = {time: step for time, step in found.items() if step.shown.force > 0}
+    assert len(later) > 5
+    assert true_errors(later, exact).max() <= TOLERANCE
+
+
+def same(one, other):
+    """Whether two steps show the same and state the same, to the last bit."""
+    pairs = [(getattr(one.uncertainty, f.name), getattr(other.uncertainty, f.name)) for f in fields(one.uncertainty)]
+    pairs += [(getattr(one, name), getattr(other, name)) for name in ("stored", "dissipated", "work", "bound")]
+    pairs += zip(*(stated(step, 0.0, counted(step)).values() for step in (one, other)), strict=True)
+    pairs += [(getattr(one.shown, name), getattr(other.shown, name)) for name in ("pressure", "force", "approach")]
+    assert all(np.array_equal(*pair, equal_nan=True) for pair in pairs)
+    assert np.array_equal(one.displacement, other.displacement)
+
+
+def test_going_on_from_any_state__states_the_same():
+    program = rv.Program().load(0.03, over=0.5).load(0.01, over=0).hold(0.5).hold(0.4, control="approach")
+    scene = sphere(MATERIALS["two_branches"], program, times=(0.2, 0.8, 1.3), tolerance=3e-2)
+    whole = list(march(scene))
+    assert len(whole) > 8
+    for cut in range(len(whole) - 1):
+        resumed = list(march(scene, whole[cut].state))
+        assert len(resumed) == len(whole) - cut - 1
+        for one, other in zip(resumed, whole[cut + 1 :], strict=True):
+            same(one, other)
+
+
+def test_elastic__has_no_companion_and_nothing_unknown():
+    steps = list(march(sphere(rv.elastic(1.0), PROGRAMS["triangle"], times=TIMES)))
+    assert all(step.state.companion is None for step in steps)
+    assert all(step.time_error == 0 for step in steps)
+
+
+def test_row_right_after_a_corner__is_judged():
+    """The program of docs/howto/indentation.md: pulled back from a hold, and asked a fifth of the way."""
+    times = (0.1, 0.3, 0.5, 0.6)
+    program = rv.Program.table([0.0, 0.1, 0.5, 1.0], [0.0, 40e-6, 40e-6, 10e-6], control="approach")
+    ball, rubber = rv.sphere(10e-3, 2.4e-3, 31), rv.zener(3e6, 1e6, 1e5)
+    coarse, fine = (
+        rv.simulate(ball, rubber, program, times=times, tolerance=t, progress=False, fields=()) for t in (1e-2, 1e-4)
+    )
+    off = np.abs(coarse.force - fine.force).values
+    assert off[-1] < 1e-2 * float(fine.force.max())
+    assert np.all(off <= coarse.force_error.values / 0.8)
+
+
+@pytest.mark.parametrize("what", ["triangle", "pulled"])
+def test_material_that_relaxes_at_once__takes_the_steps_of_an_elastic_one(what):
+    """A Kelvin element 1e8 times faster than the program is a spring."""
+    settings = {"times": TIMES, "tolerance": 1e-3}
+    quick = list(march(sphere(rv.zener(1.0, 1.0, 1e-8), PROGRAMS[what], **settings)))
+    limit = list(march(sphere(rv.elastic(0.5), PROGRAMS[what], **settings)))
+    assert len(quick) <= 3 * len(limit)
+    found, exact = ({step.shown.time: step.shown for step in steps} for steps in (quick, limit))
+    for name in ("force", "approach"):
+        one, other = (np.array([getattr(rows[t], name) for t in TIMES]) for rows in (found, exact))
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-3 * other.max())

@@ -1,0 +1,218 @@
+"""The march through time: order, tolerance, events, contact lost and found, going on from a state."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, scene
+
+import roughvisc as rv
+from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.stepping.march import march
+
+
+def final(steps):
+    for step in steps:
+        assert step.converged
+    return step
+
+
+TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
+
+
+@pytest.mark.parametrize("program", [STEP_LOAD, TRIANGLE], ids=["step", "triangle"])
+@pytest.mark.parametrize("name", ["maxwell", "zener", "two_branches"])
+def test_fixed_steps__converge_at_second_order(name, program):
+    def result(step):
+        shown = final(march(scene(MATERIALS[name], program, time_step=step, tolerance=1e-10))).shown
+        return shown.pressure / shown.pressure.sum(), shown.approach
+
+    counts = np.array([10, 20, 40])
+    exact_pressure, exact_approach = result(1 / 320)
+    found = [result(1 / n) for n in counts]
+    errors = {"pressure": [np.abs(p - exact_pressure).sum() for p, _ in found]}
+    if program is TRIANGLE:  # while contact grows under constant load the approach is exact for any steps
+        errors["approach"] = [abs(a - exact_approach) for _, a in found]
+    for quantity, sizes in errors.items():
+        order = -np.polyfit(np.log(counts), np.log(sizes), 1)[0]
+        assert 1.7 < order < 2.6, f"{quantity}: order {order:.2f}, errors {sizes}"
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_chosen_steps__keep_the_tolerance(name, tolerance):
+    """The grid's error drops out: the reference runs on the same grid at a fiftieth of the tolerance."""
+    times = (0.2, 1.0, 2.0)
+    program = rv.Program().load(5e-4 if name == "zener_soft" else 0.05, over=0).hold(2.0)
+
+    def kept(tolerance):
+        steps = march(scene(MATERIALS[name], program, times=times, tolerance=tolerance))
+        return [s.shown for s in steps if s.shown.time in times]
+
+    for found, exact in zip(kept(tolerance), kept(tolerance / 50), strict=True):
+        assert found.time == exact.time
+        assert abs(found.approach / exact.approach - 1) < tolerance
+        assert np.abs(found.pressure - exact.pressure).sum() < tolerance * exact.pressure.sum()
+
+
+def test_forms_of_memory__give_the_same_numbers():
+    forms = ("displacement", "pressure", "both")
+    found = [
+        list(march(scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, acts_on=form, tolerance=1e-8)))
+        for form in forms
+    ]
+    for one, *others in zip(*found, strict=True):
+        for other in others:
+            assert other.shown.approach == pytest.approx(one.shown.approach, rel=1e-7, abs=1e-12)
+            assert np.abs(other.displacement - one.displacement).max() <= 1e-7 * np.abs(one.displacement).max()
+    spent = {form: steps[-1].state.convolutions for form, steps in zip(forms, found, strict=True)}
+    steps = len(found[0]) - 1
+    assert spent["displacement"] == spent["both"] == spent["pressure"] - (steps + steps // 2)  # and the companion's
+    for pressures, both in zip(found[1], found[2], strict=True):
+        assert np.abs(both.effective - pressures.effective).max() <= 1e-6 * pressures.effective.max()
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2"])
+def test_memory_of_both__outlives_a_change_of_the_grid(rule):
+    """On the larger grid, what is carried displaces it as the carried pressure does."""
+    small, large, offset = HalfSpace((9, 7), (0.1, 0.1)), HalfSpace((14, 11), (0.1, 0.1)), (3, 2)
+    memory = Modes(MATERIALS["two_branches"], "both")
+    state, rng = memory.start(small.shape), np.random.default_rng(1)
+    for _ in range(3):
+        pressure = rng.random(small.shape)
+        state = memory.advance(state, 0.3, "linear", np.stack([pressure, small.displacement(pressure)]))
+    moved = memory.enlarged(state, large.shape, offset, large.displacement)
+    before, after = memory.predict(state, 0.2, rule)[1], memory.predict(moved, 0.2, rule)[1]
+    assert np.array_equal(after[0][3:12, 2:9], before[0])
+    assert np.count_nonzero(after[0]) == before[0].size
+    assert after[1] == pytest.approx(large.displacement(after[0]), rel=1e-12)
+
+
+def test_extrapolated_start__costs_no_convolution_while_contact_grows():
+    """A step, and its companion's, takes two convolutions an iteration, and one more where contact recedes."""
+    unasked = {"time_step": 0.1, "tolerance": 1e-6, "times": ()}  # a kept row takes one more, to estimate its error
+    held = list(march(scene(MATERIALS["maxwell"], STEP_LOAD, **unasked)))[3:]
+    cost = [(b.state.convolutions - a.state.convolutions) for a, b in pairwise(held)]
+    solved = [(b.state.iterations - a.state.iterations) for a, b in pairwise(held)]
+    assert all(solved)
+    assert cost == [2 * n for n in solved]
+    unloading = rv.Program().load(0.05, over=0.1).load(0.01, over=1.0)
+    steps = list(march(scene(MATERIALS["maxwell"], unloading, **unasked)))[4:]
+    more = [
+        b.state.convolutions - a.state.convolutions - 2 * (b.state.iterations - a.state.iterations)
+        for a, b in pairwise(steps)
+    ]
+    assert set(more) == {0, 1}  # one where a cell lifts off
+
+
+def test_march__goes_on_from_any_state_bit_for_bit():
+    program = rv.Program().load(5e-4, over=1.0).load(1e-4, over=1.0).hold(0.5, control="approach")
+    settings = scene(MATERIALS["zener_soft"], program, tolerance=3e-2, times=(0.7, 2.4))
+    whole = list(march(settings))
+    assert len(whole) > 30
+    for cut in (0, 1, 2, len(whole) // 2, len(whole) - 2):
+        resumed = list(march(settings, whole[cut].state))
+        assert len(resumed) == len(whole) - cut - 1
+        assert np.array_equal(resumed[-1].shown.pressure, whole[-1].shown.pressure)
+        assert [s.shown.force for s in resumed] == [s.shown.force for s in whole[cut + 1 :]]
+        assert resumed[-1].state.convolutions == whole[-1].state.convolutions
+
+
+def test_times__are_landed_on_exactly():
+    times = (0.1, 1 / 3, 0.99999, 2.0)
+    found = [s.shown.time for s in march(scene(MATERIALS["zener"], STEP_LOAD, times=times, tolerance=1e-2))]
+    assert set(times) <= set(found)
+    assert found == sorted(found)
+
+
+def test_jump__shows_the_right_hand_state():
+    program = rv.Program().load(0.01, over=0.5).load(0.04, over=0).hold(0.5).load(0.02, over=0)
+    steps = list(march(scene(MATERIALS["zener"], program, tolerance=1e-2)))
+    at_jump = [s for s in steps if s.shown.time == 0.5]
+    assert len(at_jump) == 1
+    assert at_jump[0].shown.force == 0.04
+    assert steps[-1].shown.force == 0.02
+    assert steps[-1].shown.time == 1.0
+
+
+def test_elastic__remembers_nothing_and_steps_to_events_only():
+    program = rv.Program().load(0.03, over=1.0).hold(1.0).load(0.01, over=1.0)
+    material = rv.elastic(1.0)
+    steps = list(march(scene(material, program, times=(0.5, 2.5))))
+    assert [s.shown.time for s in steps] == [0.0, 0.5, 1.0, 2.0, 2.5, 3.0]
+    exact = closed_forms.hertz(UNIT_RADIUS, 4.0, 0.02)
+    assert steps[4].shown.approach == pytest.approx(exact.approach, rel=2e-3)
+    assert steps[1].state.memory.modes.size == 0
+
+
+def test_zero_load__opens_the_contact_and_the_dent_recovers():
+    material = MATERIALS["zener"]
+    program = rv.Program().load(0.05, over=0).hold(2.0).load(0.0, over=0).hold(3.0).load(0.05, over=0)
+    steps = list(march(scene(material, program, times=(2.0, 3.0, 5.0), tolerance=1e-3)))
+    at = {s.shown.time: s for s in steps}
+    assert at[2.0].shown.force == 0
+    assert not at[2.0].shown.pressure.any()
+    dent = [at[t].displacement.max() for t in (2.0, 3.0)]
+    # nothing but one retarded mode is left: it decays by exactly its retardation time
+    assert dent[1] / dent[0] == pytest.approx(np.exp(-1.0), rel=1e-9)
+    assert at[3.0].shown.approach == pytest.approx(
+        np.min(scene(material, program).gap + at[3.0].displacement), abs=1e-15
+    )
+    assert at[5.0].shown.force == 0.05
+    assert at[5.0].shown.approach > 0
+
+
+def test_approach__opens_and_closes_when_the_dent_has_recovered():
+    """Pressed, pulled off below the dent, held there: the recovering surface comes back into contact."""
+    material = rv.zener(1.0, 0.2, 0.2)
+    pressed = rv.Program().approach(0.05, over=0.1).hold(3.0)
+    program = pressed.approach(0.03, over=0.05).hold(8.0)
+    steps = list(march(scene(material, program, tolerance=3e-3, times=(3.1, 3.15, 4.0, 11.15))))
+    at = {s.shown.time: s for s in steps}
+    assert at[3.1].shown.force > 0
+    assert at[3.15].shown.force == 0
+    assert at[11.15].shown.force > 0
+    level = scene(material, program).gap
+    for time in (3.15, 11.15):
+        assert np.min(level + at[time].displacement) - at[time].level > -1e-5 * at[time].level
+
+
+def test_hold_of_approach__relaxes_the_load():
+    """Load then constant approach: at constant contact area force relaxes with the relaxation modulus."""
+    material = MATERIALS["zener"]
+    program = rv.Program().load(0.05, over=0).hold(40.0, control="approach")
+    steps = list(march(scene(material, program, tolerance=1e-3, times=(0.0, 40.0))))
+    first, last = steps[0].shown, steps[-1].shown
+    assert last.approach == first.approach
+    assert last.force / first.force == pytest.approx(0.5, rel=1e-3)  # both moduli alike
+
+
+@pytest.mark.parametrize("material", [rv.kelvin_voigt(1.0, 1.0)], ids=["kelvin_voigt"])
+def test_no_instantaneous_compliance__refuses_a_jump_of_approach_only(material):
+    with pytest.raises(rv.InputError, match=r"the approach jumps to 0\.01 m"):
+        list(march(scene(material, rv.Program().approach(0.01, over=0).hold(1.0))))
+    steps = list(march(scene(material, STEP_LOAD, tolerance=1e-2, times=(0.0, 2.0))))
+    assert steps[0].shown.force == 0  # the left-hand state
+    exact = closed_forms.kelvin_voigt_step(UNIT_RADIUS, material, 0.05)
+    assert steps[-1].shown.approach == pytest.approx(float(exact.approach(2.0)), rel=1e-2)
+
+
+def test_contact_at_the_border__is_an_error_unless_accepted():
+    program = rv.Program().load(5.0, over=0)
+    with pytest.raises(rv.EdgeContactError, match=r"at 0 s contact reaches the border .*edge='accept'"):
+        list(march(scene(rv.elastic(1.0), program)))
+    assert final(march(scene(rv.elastic(1.0), program, accept_edge=True))).shown.force == 5.0
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e8])
+def test_held_approach__relaxes_and_does_not_open(ratio):
+    """The force falls to the ratio of the moduli within a millionth of the retardation time, and stays there."""
+    material = rv.zener(1.0, 1 / ratio, 1 / ratio)
+    relaxation = 1 / (1 + ratio)
+    program = rv.Program().approach(0.05, over=0).hold(100 * relaxation)
+    steps = list(march(scene(material, program, times=(0.0, 50 * relaxation, 100 * relaxation), tolerance=1e-3)))
+    at = {s.shown.time: s.shown.force for s in steps}
+    assert at[100 * relaxation] / at[0.0] == pytest.approx(relaxation, rel=0.02)
+    assert all(s.shown.force > 0 for s in steps)

@@ -1,0 +1,121 @@
+"""One case to one file: what the file says of itself, and what happens when something goes wrong."""
+
+import json
+import logging
+
+import pytest
+import xarray as xr
+from support import BALL
+
+import roughvisc as rv
+from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
+from roughvisc.study.execution import run as run_module
+from roughvisc.study.execution.run import result_folder, run
+from roughvisc.study.statement.case import Case, read_cases, read_study, vary
+from roughvisc.study.storage.store import open_result
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text(BALL)
+    return path
+
+
+def test_run__keeps_a_file_that_is_whole_in_itself(study):
+    ds = run(study, progress=False)
+    case = read_study(study)
+    path = study.parent / "results" / "ball" / f"{case.key}.nc"
+    assert ds.encoding["source"] == str(path)
+    with open_result(path) as read:
+        xr.testing.assert_identical(read.load().drop_encoding(), ds.drop_encoding())
+        assert read.sizes == {"time": 3, "x": 24, "y": 21}
+        assert read.attrs["title"] == "A ball"
+        assert read.attrs["source"] == f"roughvisc {rv.__version__}"
+        assert "generated: sphere\n" in read.attrs["history"]
+        assert read.attrs["history"].endswith("run of ball.toml")
+        assert read.attrs["case_key"] == case.key
+        assert read.attrs["surface_sha256"] == case.surface_sha256
+        assert (read.attrs["boundary"], read.attrs["tolerance"]) == ("free", 1e-3)
+        again = Case.from_json(read.attrs["case"])
+    assert again == case
+    xr.testing.assert_equal(
+        run(again, study.parent / "other", progress=False).drop_vars("wall_time"), ds.drop_vars("wall_time")
+    )
+
+
+def test_run__equals_simulate(study):
+    ds = run(study, progress=False)
+    direct = rv.simulate(
+        rv.level(rv.sphere(10e-3, 1e-3, (24, 21)), 0),
+        rv.zener(3e6, 1e6, 1e5),
+        rv.Program().load(5e-3, over=0).hold(0.2),
+        fields=("pressure", "displacement"),
+        times=[0, 0.1, 0.2],
+        progress=False,
+    )
+    xr.testing.assert_equal(ds.drop_vars("wall_time"), direct.drop_vars("wall_time"))
+
+
+def test_run__reports_progress(study):
+    reached = []
+    run(study, progress=lambda now, end: reached.append((now, end)))
+    assert reached == sorted(reached)
+    assert reached[-1] == (0.2, 0.2)
+
+
+def test_run__says_what_was_varied(study):
+    study.write_text(BALL + '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]')
+    ds = run(read_cases(study)[1], progress=False)
+    assert ds.attrs["title"] == "A ball, program.0.load = 0.006"
+    assert json.loads(ds.attrs["case"])["varied"] == {"program.0.load": 0.006}
+    assert float(ds.force[-1]) == pytest.approx(6e-3, rel=1e-8)
+
+
+def test_run__writes_nothing_where_the_input_is_wrong(study):
+    case = vary(read_study(study), {"program.0.load": 50.0})
+    with pytest.raises(EdgeContactError, match=r"ball\.toml: .*periodic"):
+        run(case, progress=False)
+    assert [p.name for p in study.parent.iterdir()] == ["ball.toml"]
+
+
+def test_run__keeps_what_did_not_converge_and_says_so(study, monkeypatch, caplog):
+    press = run_module.press
+
+    def stubborn(*args, **settings):
+        ds = press(*args, **settings)
+        ds["status"][1] = 1
+        return ds
+
+    monkeypatch.setattr(run_module, "press", stubborn)
+    with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
+        run(study, progress=False)
+    (path,) = (study.parent / "results" / "ball").iterdir()
+    assert "1 of 3 kept times did not converge, first at t = 0.1 s" in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "did not converge" in caplog.text
+    with open_result(path) as ds:
+        assert list(ds.status.values) == [0, 1, 0]
+
+
+def test_run__rounds_the_fields_as_the_study_says(study):
+    exact = run(study, progress=False)
+    study.write_text(BALL + "precision = 1e-3\n")
+    rounded = run(study, progress=False)
+    assert rounded.attrs["case_key"] != exact.attrs["case_key"]
+    assert rounded.pressure.attrs["relative_precision"] == 1e-3
+    assert not rounded.pressure.equals(exact.pressure)
+    xr.testing.assert_allclose(rounded.pressure, exact.pressure, rtol=1e-3, atol=0)
+    xr.testing.assert_equal(rounded.approach, exact.approach)
+    study.write_text(BALL + "precision = 1\n")
+    with pytest.raises(InputError, match=r"keep\.precision: found 1: expected a number"):
+        read_study(study)
+
+
+def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):
+    case = read_study(study)
+    assert result_folder(case) == tmp_path / "results" / "ball"
+    assert result_folder(case, "here") == run_module.Path("here")
+    assert result_folder(Case(case.settings)) == run_module.Path("results/a-ball")
+    with pytest.raises(InputError, match=r"ball\.toml: is a file: expected a folder"):
+        result_folder(case, study / "below")

@@ -1,0 +1,607 @@
+"""Many cases: the same numbers wherever they are computed, nothing lost, and all of them seen as one."""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import psutil
+import pytest
+import xarray as xr
+from rich.console import Console
+from support import BALL
+
+import roughvisc as rv
+from roughvisc.errors import InputError, InUseError, RoughviscError
+from roughvisc.study.execution import task as task_module
+from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.cluster import connect
+from roughvisc.study.execution.sweep import run_cases, sweep
+from roughvisc.study.execution.watch import Silence, Watch
+from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.storage.failures import record_path
+from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.store import open_result, write_result
+
+LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
+#: Takes some seconds a case, in steps of milliseconds.
+LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
+RUN = [sys.executable, "-m", "roughvisc.cli", "run"]
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*Sending large graph.*:UserWarning",
+    # as the interpreter collects what distributed leaves behind
+    "ignore::pytest.PytestUnraisableExceptionWarning",
+)
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study into a folder of its own and reads its cases."""
+
+    def write(text=BALL + LOADS, name="ball"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        return read_cases(path)
+
+    return write
+
+
+@pytest.fixture(scope="module")
+def by_hand(tmp_path_factory):
+    """Scheduler and two workers, each started by hand as a process of its own; gives the scheduler's file."""
+    folder = tmp_path_factory.mktemp("cluster")
+    file = folder / "scheduler.json"
+    environment = os.environ | {
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
+    }
+    dask = [sys.executable, "-m", "dask"]
+    commands = [
+        [*dask, "scheduler", "--scheduler-file", file, "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
+        *[[*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"]] * 2,
+    ]
+    log = (folder / "log").open("w")
+    started = [
+        subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
+        for command in commands
+    ]
+    until = time.monotonic() + 60
+    while not file.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    with connect(file=file) as client:
+        client.wait_for_workers(2, timeout=60)
+    yield file
+    for process in reversed(started):
+        process.terminate()
+    for process in started:
+        process.wait(30)
+    log.close()
+
+
+def numbers(folder):
+    """Every variable but the wall time of every result in a folder."""
+    found = {}
+    for path in sorted(folder.glob("*.nc")):
+        with open_result(path) as ds:
+            found[path.name] = ds.drop_vars("wall_time").load()
+    return found
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, ds in one.items():
+        xr.testing.assert_equal(ds, other[name])
+
+
+def leftovers(folder):
+    """What is in a folder besides results, records, log and index."""
+    return [p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", INDEX, "inputs")]
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# where it is computed
+
+
+def test_sweep__same_bits_here_and_on_workers_and_on_a_cluster(study, tmp_path, by_hand):
+    cases = study()
+    here = sweep(cases, tmp_path / "here", workers=0, progress=False)
+    one = sweep(cases, tmp_path / "one", workers=1, progress=False)
+    several = sweep(cases, tmp_path / "several", workers=2, progress=False)
+    with connect(file=by_hand) as client:
+        remote = sweep(cases, tmp_path / "remote", client, progress=False)
+    wanted = numbers(tmp_path / "here")
+    assert len(wanted) == 4
+    for name, ds in (("one", one), ("several", several), ("remote", remote)):
+        assert_same(numbers(tmp_path / name), wanted)
+        xr.testing.assert_equal(ds.drop_vars("wall_time").load(), here.drop_vars("wall_time").load())
+        assert leftovers(tmp_path / name) == []
+
+
+def test_sweep__on_two_threads_gives_the_bits_of_one(study, tmp_path):
+    (case,) = study(BALL.replace("[24, 21]", "[96, 90]"))
+    found = []
+    for threads in (1, 2):
+        outcome = task_module.bring(
+            case, tmp_path / str(threads), progress=lambda now, end: None, stop=None, threads=threads
+        )
+        assert outcome.kind == "done"
+        found.append(numbers(tmp_path / str(threads)))
+    assert_same(*found)
+
+
+def test_sweep__on_a_cluster_takes_the_scan_along(study, tmp_path, by_hand):
+    scans = tmp_path / "scans" / "data"
+    scans.mkdir(parents=True)
+    height = rv.self_affine((1e-3, 1e-3), (24, 20), hurst=0.8, rms_height=1e-6, seed=1)
+    height.rename("height").to_netcdf(scans / "rough.nc")
+    (tmp_path / "scans" / "cards").mkdir()
+    checksum = hashlib.sha256((scans / "rough.nc").read_bytes()).hexdigest()
+    card = f'file = "../data/rough.nc"\nsha256 = "{checksum}"\n[conditioning]\nlevel = 1\n'
+    (tmp_path / "scans" / "cards" / "rough.toml").write_text(card)
+    surface = BALL[BALL.index("generate") : BALL.index("[material]")]
+    text = BALL.replace(surface, 'file = "scans/cards/rough.toml"\n')
+    cases = study(text + '[solve]\nboundary = "periodic"\n[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
+    wanted = sweep(cases, tmp_path / "here", workers=0, progress=False)
+    packed = Case.from_json(pack(cases[0], tmp_path / "inputs"))
+    assert packed.key == cases[0].key
+    assert packed.settings.surface.file.startswith(str(tmp_path / "inputs"))
+    xr.testing.assert_equal(packed.height(), cases[0].height())
+    with connect(file=by_hand) as client:
+        found = sweep(cases, tmp_path / "there", client, progress=False)
+    xr.testing.assert_equal(found.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
+    with open_result(tmp_path / "there" / f"{cases[0].key}.nc") as ds:
+        assert str(tmp_path / "there" / "inputs") in ds.attrs["case"]
+
+
+def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
+    study()
+    command = [*RUN, "ball.toml", "--scheduler-file", by_hand]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "4, 0 of them before" in done.stdout
+    assert "4 of 4 cases done" in done.stdout
+    address = json.loads(by_hand.read_text())["address"]
+    done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "4, 4 of them before" in done.stdout
+
+
+def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
+    cases = study(LONG + LOADS)
+    wanted = {}
+    with connect(file=by_hand) as client:
+        killed = kill_working(client, times=1)
+        ds = sweep(cases[:2], tmp_path / "killed", client, progress=False)
+        killed.join()
+        assert killed.victims
+        wanted = sweep(cases[:2], tmp_path / "calm", client, progress=False)
+    assert ds.sizes["case"] == 2
+    xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
+
+
+def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand):
+    (case,) = study(LONG)
+    with connect(file=by_hand) as client:
+        killed = kill_working(client, times=2)
+        with pytest.raises(RoughviscError, match=r"none of 1 cases .* died 2 times"):
+            sweep([case], tmp_path / "out", client, progress=False)
+        killed.join()
+        client.wait_for_workers(2, timeout=60)
+
+
+def kill_working(client, times):
+    """A thread that kills so many workers in the midst of a case."""
+
+    def kill():
+        until = time.monotonic() + 60
+        while len(killer.victims) < times and time.monotonic() < until:
+            busy = [worker for worker, keys in client.processing().items() if keys]
+            for worker in busy[:1]:
+                pid = client.run(os.getpid, workers=[worker], on_error="ignore").get(worker)
+                time.sleep(0.5)
+                if pid and pid not in killer.victims and client.processing().get(worker):
+                    os.kill(pid, signal.SIGKILL)
+                    killer.victims.append(pid)
+            time.sleep(0.1)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.victims = []
+    killer.start()
+    return killer
+
+
+def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"none\.json: does not exist"), connect(file=tmp_path / "none.json"):
+        pass
+    with pytest.raises(InputError, match="expected one of them"), connect():
+        pass
+    with pytest.raises(InputError, match=r"tpc:.*no Dask scheduler answers"), connect("tpc://127.0.0.1:1"):
+        pass
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# what fails, what is interrupted, what is done again
+
+
+POISON = '[sweep]\n"program.0.load" = ["4 mN", "50 N", "5 mN", 5e-3]\n'
+
+
+def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_path, monkeypatch, caplog):
+    cases = study(BALL + POISON)
+    computed = []
+    bring = task_module.run_case
+
+    def counted(case, folder, **settings):
+        computed.append(case.varied["program.0.load"])
+        return bring(case, folder, **settings)
+
+    monkeypatch.setattr(task_module, "run_case", counted)
+    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert computed == [4e-3, 50.0, 5e-3], "those alike are computed once"
+    assert list(ds["program.0.load"]) == [4e-3, 5e-3]
+    assert "boundary" in caplog.text
+    record = json.loads(record_path(tmp_path / "out", cases[1].key).read_text())
+    assert record["error"] == "EdgeContactError"
+    assert record["case"]["varied"] == {"program.0.load": 50.0}
+    assert "failed" in (tmp_path / "out" / "sweep.log").read_text()
+
+    outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
+    assert computed == [4e-3, 50.0, 5e-3], "nothing is computed again"
+    assert [o.kind for o in outcomes.values()] == ["done", "failed", "done"]
+    assert all(o.reused for o in outcomes.values())
+    run_cases(cases, tmp_path / "out", watch=Silence(), workers=0, retry_failed=True)
+    assert computed == [4e-3, 50.0, 5e-3, 50.0]
+
+
+def test_sweep__what_another_version_failed_at_is_tried_again(study, tmp_path):
+    cases = study(BALL + POISON)
+    run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
+    path = record_path(tmp_path / "out", cases[1].key)
+    path.write_text(path.read_text().replace('"source": "roughvisc', '"source": "roughvisc 0'))
+    assert not run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)[cases[1].key].reused
+
+
+def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_path, monkeypatch):
+    cases = study()
+
+    def broken(case, folder, **settings):
+        return 1 / 0
+
+    monkeypatch.setattr(task_module, "run_case", broken)
+    with pytest.raises(RoughviscError, match="none of 4 cases could be finished; the first: ZeroDivisionError"):
+        sweep(cases, tmp_path / "out", workers=0, progress=False)
+    record = json.loads(record_path(tmp_path / "out", cases[0].key).read_text())
+    assert "return 1 / 0" in record["traceback"]
+    monkeypatch.undo()
+    assert sweep(cases, tmp_path / "out", workers=0, progress=False, retry_failed=True).sizes["case"] == 4
+    assert leftovers(tmp_path / "out") == [], "the records go when the cases are done"
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "x.nc"), InUseError("in use")])
+def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
+    cases = study()
+
+    def hindered(case, folder, **settings):
+        raise error
+
+    monkeypatch.setattr(task_module, "run_case", hindered)
+    outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
+    assert {o.kind for o in outcomes.values()} == {"hindered"}
+    monkeypatch.undo()
+    assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, monkeypatch):
+    from roughvisc.study.execution import run as run_module
+
+    press = run_module.press
+
+    def stubborn(*args, **settings):
+        ds = press(*args, **settings)
+        ds["status"][1] = 1
+        return ds
+
+    monkeypatch.setattr(run_module, "press", stubborn)
+    for _ in range(2):
+        outcomes = run_cases(study()[:1], tmp_path / "out", watch=Silence(), workers=0)
+        (outcome,) = outcomes.values()
+        assert outcome.kind == "unconverged"
+        assert "1 of 3 kept times did not converge, first at t = 0.1 s" in outcome.message
+
+
+def alive(group):
+    """Processes of a group that are not zombies."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, ProcessLookupError):
+            if os.getpgid(process.pid) == group and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process.cmdline())
+    return found
+
+
+def test_run__ctrl_c_is_status_130(study, tmp_path):
+    text = LONG.replace('times = [0, "0.1 s", "200 ms"]', "times = 2")
+    study(text + '[sweep]\n"program.1.hold" = ["1 ms", "20 s", "21 s", "22 s"]\n')
+    command = [*RUN, "ball.toml", "--workers", "2"]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    folder = tmp_path / "results" / "ball"
+    until = time.monotonic() + 60
+    while not list(folder.glob("*.nc")) and time.monotonic() < until:
+        time.sleep(0.1)
+    time.sleep(1.0)
+    began = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: all processes get it
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err == "roughvisc: interrupted; what was finished is kept\n"
+    assert time.monotonic() - began < 20
+    until = time.monotonic() + 10
+    while (left := alive(process.pid)) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not left, "no worker outlives the sweep"
+    assert len([p for p in folder.glob("*.nc") if not p.name.startswith(".")]) == 1
+    assert "interrupted" in (folder / "sweep.log").read_text()
+
+
+def test_run__two_sweeps_on_one_folder(study, tmp_path):
+    cases = study()
+    command = [*RUN, "ball.toml", "--workers", "1", "--out", "shared"]
+    both = [subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=120) for process in both]
+    for process, (_, err) in zip(both, said, strict=True):
+        assert process.returncode in (0, 1)
+        assert process.returncode == 0 or "at work" in err
+    sweep(cases, tmp_path / "calm", workers=0, progress=False)
+    assert_same(numbers(tmp_path / "shared"), numbers(tmp_path / "calm"))
+    assert rv.open_results(tmp_path / "shared").sizes["case"] == 4
+
+
+def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
+    with pytest.raises(InputError, match="cases is empty"):
+        sweep([], tmp_path)
+    with pytest.raises(InputError, match="workers is -1: expected 0 or more"):
+        sweep(study(), tmp_path, workers=-1)
+    bad = BALL + '[sweep]\n"program.0.load" = ["50 N", "60 N"]\n'
+    with pytest.raises(InputError, match="none of 2 cases"):
+        sweep(study(bad), tmp_path / "bad", workers=0, progress=False)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# what a user sees
+
+
+def outcome(key, kind="done", **more):
+    return task_module.Outcome(key, kind, **more)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, monkeypatch):
+    cases = study()
+    stream = io.StringIO()
+    watch = Watch(Console(file=stream, force_terminal=terminal, width=160))
+    monkeypatch.setattr("roughvisc.study.execution.watch._LINE_EVERY", 0.0)
+    monkeypatch.setattr("roughvisc.study.execution.watch._PICTURE_EVERY", 0.0)
+    watch.begin(cases, "http://127.0.0.1:8787/status")
+    watch.ended(outcome(cases[0].key))
+    watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))
+    watch.reached(cases[2].key, 0.05, 0.2)
+    time.sleep(0.01)
+    watch.tick()
+    if not terminal:
+        lines = stream.getvalue().splitlines()
+        assert lines[0] == "Dashboard: http://127.0.0.1:8787/status"
+        assert lines[1].startswith("case 2 of 4 (program.0.load = 0.004, ")
+        assert lines[1].endswith("failed: too [much] load")
+        assert lines[2].startswith("1 of 4 cases done, 1 failed, 1 running, about ")
+        assert "left" in lines[2]
+    else:
+        assert "t = 0.05 of 0.2 s" in stream.getvalue()
+    watch.stopping()
+    watch.close()
+    assert "stopping" in stream.getvalue()
+
+
+def test_watch__hears_from_workers(study, tmp_path):
+    heard = {}
+
+    class Ear(Silence):
+        def reached(self, key, now, end):
+            heard.setdefault(key, []).append(now)
+
+        def begin(self, cases, link):
+            heard["cases"] = len(cases)
+
+    cases = study(LONG)
+    run_cases(cases, tmp_path / "out", watch=Ear(), workers=1)
+    assert heard["cases"] == 1
+    times = heard[cases[0].key]
+    assert times == sorted(times)
+    assert times[-1] > 0
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# all results as one
+
+
+def synthetic(folder, loads=10, seeds=6, template=None, shape=(8, 6), times=4):
+    """Results of a sweep over loads and seeds, made up: fast to write, in the form that a run writes."""
+    rng = np.random.default_rng(1)
+    series = {
+        name: ("time", rng.random(times)) for name in ("force", "approach", "residual", "time_error", "wall_time")
+    }
+    ds = xr.Dataset(
+        {
+            **series,
+            "status": ("time", np.zeros(times, "int8")),
+            "height": (("x", "y"), rng.random(shape)),
+            "pressure": (("time", "x", "y"), rng.random((times, *shape))),
+        },
+        coords={"time": np.arange(times) * 0.1, "x": np.arange(shape[0]) * 1e-6, "y": np.arange(shape[1]) * 1e-6},
+    )
+    surface = {"generate": "self_affine", "size": [1e-3, 1e-3], "hurst": 0.8, "seed": 0}
+    for i in range(loads):
+        for j in range(seeds):
+            case = {
+                "title": "made up",
+                "surface": {**surface, "seed": j},
+                "program": [{"load": 0.5 * (i + 1), "over": 0.1}, {"hold": 1.0}],
+                "varied": {"program.0.load": 0.5 * (i + 1), "surface.seed": j},
+            }
+            ds.attrs = {"case": json.dumps(case), "case_key": f"{i:08x}{j:08x}", "boundary": "periodic"}
+            ds["force"][:] = 0.5 * (i + 1)
+            ds["pressure"][:] = i + 100 * j
+            write_result(ds, folder / f"{i:08x}{j:08x}.nc")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sixty(tmp_path_factory):
+    folder = synthetic(tmp_path_factory.mktemp("sixty"))
+    rv.open_results(folder)
+    return folder
+
+
+def test_open_results__varied_parameters_are_coordinates(sixty):
+    ds = rv.open_results(sixty)
+    assert ds.sizes == {"case": 60, "time": 4, "x": 8, "y": 6}
+    assert ds.pressure.dims == ("case", "time", "x", "y")
+    assert ds.pressure.chunks is not None
+    assert ds.height.dims == ("case", "x", "y"), "the seed changes the surface"
+    assert ds.attrs["title"] == "made up"
+    assert ds.pressure.attrs["units"] == "Pa"
+    grid = ds.set_index(case=["program.0.load", "surface.seed"]).unstack("case")
+    assert grid.sizes["program.0.load"], grid.sizes["surface.seed"] == (10, 6)
+    picked = grid.pressure.sel({"program.0.load": 2.0, "surface.seed": 4}).isel(time=-1)
+    assert (picked.values == 403).all()
+    loads = ds.set_xindex("program.0.load").sel({"program.0.load": 1.5})
+    assert loads.sizes["case"] == 6
+    assert (loads.force == 1.5).all()
+    assert ds.sel(time=0.2).pressure.max("case").compute().shape == (8, 6)
+
+
+def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
+    import netCDF4
+
+    def forbidden(*args, **settings):
+        raise AssertionError("a result was opened")
+
+    monkeypatch.setattr(netCDF4, "Dataset", forbidden)
+    ds = rv.open_results(sixty)
+    assert float(ds.force.sum()) == pytest.approx(0.5 * 55 * 6 * 4)
+    with pytest.raises(AssertionError, match="a result was opened"):
+        ds.pressure.compute(scheduler="sync")
+
+
+def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    paths = sorted(folder.glob("*.nc"))
+    paths[0].unlink()
+    paths[1].write_bytes(b"cut short")
+    assert rv.open_results(folder).sizes["case"] == 58
+    assert f"{paths[1]}: is damaged" in caplog.text
+    (folder / INDEX).write_bytes(b"nonsense")
+    assert rv.open_results(folder).sizes["case"] == 58
+    with open_result(paths[2]) as ds:
+        changed = ds.load()
+    changed["force"][:] = 77.0
+    write_result(changed, paths[2])
+    assert (rv.open_results(folder).force == 77.0).any()
+    folder.chmod(0o500)
+    (folder / INDEX).chmod(0o400)
+    assert rv.open_results(folder).sizes["case"] == 58
+    folder.chmod(0o700)
+
+
+def test_open_results__in_threads(sixty):
+    ds = rv.open_results(sixty)
+    for _ in range(3):
+        assert ds.pressure.isel(time=0, x=0, y=0).compute(scheduler="threads", num_workers=8).shape == (60,)
+
+
+def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
+    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
+    ds = rv.open_results(synthetic(tmp_path, loads=2, seeds=1, times=7))
+    assert ds.pressure.chunks[1] == (3, 3, 1)
+    assert ds.height.dims == ("x", "y"), "one surface"
+    for case in range(2):
+        with open_result(tmp_path / f"{case:08x}{0:08x}.nc") as one:
+            np.testing.assert_array_equal(ds.pressure[case].values, one.pressure.values)
+            np.testing.assert_array_equal(ds.height.values, one.height.values)
+
+
+def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
+    synthetic(tmp_path, loads=1, seeds=1, times=3)
+    (tmp_path / f"{0:08x}{0:08x}.nc").rename(tmp_path / "a.nc")
+    synthetic(tmp_path, loads=1, seeds=1, times=5)
+    (tmp_path / "a.nc").rename(tmp_path / "other.nc")
+    with open_result(tmp_path / "other.nc") as ds:
+        ds = ds.load()
+    ds.attrs["case_key"] = "f" * 16
+    write_result(ds, tmp_path / "other.nc")
+    with pytest.raises(InputError, match=r"no common times \(5 and 3\): open them with ragged=True"):
+        rv.open_results(tmp_path)
+    tree = rv.open_results(tmp_path, ragged=True)
+    assert isinstance(tree, xr.DataTree)
+    assert tree["f" * 16].sizes["time"] == 3
+    assert tree[f"{0:08x}{0:08x}"].ds.pressure.values.shape == (5, 8, 6)
+    assert float(tree["f" * 16]["program.0.load"]) == 0.5
+
+
+def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):
+    out = tmp_path / "out"
+    cases = study()
+    sweep(cases, out, workers=0, progress=False)
+    tighter = [vary(case, {"solve.tolerance": 2e-3}) for case in cases[:2]]
+    assert sweep(tighter, out, workers=0, progress=False).sizes["case"] == 2
+    assert list(rv.open_results(out)["solve.tolerance"]) == [2e-3, 2e-3]
+    ds = rv.open_results(out, cases="all")
+    assert sorted(ds["solve.tolerance"].values) == [1e-3] * 4 + [2e-3] * 2
+    reversed_ = rv.open_results(out, cases=cases[::-1])
+    assert list(reversed_.case_key) == [case.key for case in cases[::-1]]
+    with pytest.raises(InputError, match="cases is 'first'"):
+        rv.open_results(out, cases="first")
+
+
+def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path):
+    text = (
+        BALL
+        + '[[sweep]]\n"surface.radius" = ["10 mm", "12 mm"]\n'
+        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n'
+    )
+    ds = sweep(study(text), tmp_path / "out", workers=0, progress=False)
+    assert list(ds["surface.radius"].values) == [10e-3, 12e-3, 10e-3]
+    assert list(ds["solve.edge"].values) == ["error", "error", "accept"]
+    np.testing.assert_array_equal(ds["material.poisson"], [np.nan, np.nan, 0.4], "the others do not state it")
+    assert ds.height.dims == ("case", "x", "y")
+
+
+def test_open_results__nothing_there(tmp_path):
+    with pytest.raises(InputError, match="holds no results"):
+        rv.open_results(tmp_path)
+    with pytest.raises(InputError, match="does not exist: expected a results folder"):
+        rv.open_results(tmp_path / "gone")
+
+
+@pytest.mark.long
+def test_open_results__a_thousand_files(tmp_path, capsys):
+    synthetic(tmp_path, loads=50, seeds=20, shape=(64, 64), times=10)
+    for what in ("without an index", "with an index"):
+        began = time.perf_counter()
+        ds = rv.open_results(tmp_path)
+        seconds = time.perf_counter() - began
+        with capsys.disabled():
+            print(f"\n1,000 results opened {what}: {seconds:.2f} s")
+        assert ds.sizes["case"] == 1000
+        assert seconds < 5

@@ -1,0 +1,675 @@
+"""Study files: what they state, what is refused and in which words, and what a case is known by."""
+
+import json
+import math
+import pickle
+import textwrap
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials import models as materials
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.study.statement.case import Case, read_cases, read_study, study_schema, vary
+from roughvisc.study.statement.schema.material import MODELS
+from roughvisc.study.statement.schema.surface import RECIPES
+
+BALL = """
+title = "A ball"
+[surface]
+generate = "sphere"
+radius = "10 mm"
+size = ["1 mm", 1e-3]
+shape = [32, 24]
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "2 N"
+over = "50 ms"
+[[program]]
+hold = "5 s"
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study file, with replacements, and gives its path."""
+
+    def write(text=BALL, *replacements, name="ball.toml"):
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / name
+        path.write_text(textwrap.dedent(text))
+        return path
+
+    return write
+
+
+def refusal(path):
+    with pytest.raises(InputError) as caught:
+        read_cases(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert "Traceback" not in message
+    return message.removeprefix(f"{path}: ")
+
+
+def test_read_study__units_become_si(study):
+    case = read_study(study())
+    assert case.title == "A ball"
+    assert case.settings.surface.radius == 0.01
+    assert case.settings.surface.size == (1e-3, 1e-3)
+    assert case.material() == materials.zener(3e6, 1e6, 1e5)
+    assert case.program() == Program().load(2.0, over=0.05).hold(5.0)
+    assert case.settings.solve.boundary == "free"
+    assert case.settings.keep.fields == ("pressure", "gap")
+    assert case.settings.keep.times == "all"
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [
+        ('model = "elastic"\nshear_modulus = 1e6', materials.elastic(1e6)),
+        (
+            'model = "maxwell"\nshear_modulus = 1e6\nviscosity = "2 kPa s"\npoisson = 0.3',
+            materials.maxwell(1e6, 2e3, 0.3),
+        ),
+        ('model = "kelvin_voigt"\nshear_modulus = 1e6\nviscosity = 1', materials.kelvin_voigt(1e6, 1.0)),
+        (
+            'model = "from_relaxation"\nequilibrium = 0\nmoduli = ["1 MPa", 2e6]\ntimes = ["1 ms", 1]',
+            materials.from_relaxation(0.0, [1e6, 2e6], [1e-3, 1.0]),
+        ),
+        (
+            'model = "prony"\nglassy = "1 GPa^-1"\ncompliances = [1e-6]\ntimes = [1]',
+            materials.Prony(1e-9, 0.0, (1e-6,), (1.0,)),
+        ),
+        ('model = "prony"\nglassy = 1e-9', materials.Prony(1e-9)),
+        (
+            'model = "zener"\nshear_modulus = 3\nkelvin_modulus = 2\nkelvin_viscosity = 1\nbulk_modulus = "2 kPa"',
+            materials.zener(3.0, 2.0, 1.0, bulk_modulus=2e3),
+        ),
+        (
+            'model = "power_law"\nglassy = 0\ncoefficient = "1 MPa^-1"\nexponent = 0.4\ntime_scale = "2 h"',
+            materials.PowerLaw(0.0, 1e-6, 0.4, 7200.0),
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, "2 min"]\ncompliances = [1, 2]\nnoise = 0.01\nkind = "tensile"',
+            materials.from_creep_table((0, 120), (1, 2), "tensile", 0.01),
+        ),
+        (
+            'model = "relaxation_table"\ntimes = [0, 1, 2]\nmoduli = ["3 MPa", 2e6, 1.5e6]\npoisson = 0.3',
+            materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), poisson=0.3),
+        ),
+        (
+            'model = "dynamic"\nfrequency_unit = "Hz"\nfrequencies = [1, 10]\nstorage = [2, 3]\nloss = [1, "1 Pa"]',
+            materials.from_dynamic((1, 10), (2, 3), (1, 1), frequency_unit="Hz"),
+        ),
+        (
+            'model = "pair"\na = { model = "elastic", shear_modulus = "80 GPa", poisson = 0.3 }\n'
+            '[material.b]\nmodel = "power_law"\nglassy = 1e-9\ncoefficient = 1e-6\nexponent = 0.5',
+            materials.pair(materials.elastic(8e10, 0.3), materials.PowerLaw(1e-9, 1e-6, 0.5)),
+        ),
+    ],
+)
+def test_material__every_model(study, table, expected):
+    head, rest = BALL.split("[material]")
+    case = read_study(study(f"{head}[material]\n{table}\n[[program]]" + rest.split("[[program]]", 1)[1]))
+    assert case.material() == expected
+
+
+def with_material(table):
+    """BALL of another material."""
+    return f"{BALL.split('[material]')[0]}[material]\n{table}\n[[program]]{BALL.split('[[program]]', 1)[1]}"
+
+
+CREEP = materials.from_creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7))
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("0, 1e-7\n60, 2e-7\n3600, 5e-7\n", ""),
+        ("0, 0.1\n1, 0.2\n60, 0.5", 'time_unit = "min"\ncompliance_unit = "1/MPa"'),
+        ("time (s); compliance (MPa^-1)\n0; 0.1\n60; 0.2\n3600; 0.5", ""),
+        ("# rheometer\ncompliance [1/MPa],time\n0.1,0\n0.2,1\n0.5,60", 'time_unit = "min"'),
+        ("time [min], compliance [1/MPa]\n0, 0.1\n1, 0.2\n60, 0.5", 'time_unit = "min"'),
+    ],
+)
+def test_material__table_from_csv(study, tmp_path, rows, keys):
+    (tmp_path / "creep.csv").write_text(rows)
+    case = read_study(study(with_material(f'model = "tabulated"\nfile = "creep.csv"\n{keys}')))
+    assert case.material() == CREEP
+    listed = 'model = "tabulated"\ntimes = [0, 60, 3600]\ncompliances = [1e-7, 2e-7, 5e-7]'
+    assert case.key == read_study(study(with_material(listed))).key, "the content counts, not the path or the units"
+    (tmp_path / "creep.csv").unlink()
+    again = Case.from_json(case.to_json())
+    assert again == case, "a stored case needs its CSV file no longer"
+    assert again.material() == CREEP
+    assert vary(again, {"material.noise": 0.1}).material().noise == 0.1
+
+
+def test_key__knows_a_creep_table_by_its_content(study, tmp_path):
+    rows = {"a.csv": "0, 1\n1, 2", "b.csv": "0, 1\n1, 2", "c.csv": "0, 1\n1, 3"}
+    for name, text in rows.items():
+        (tmp_path / name).write_text(text)
+    sweep = '\n[sweep]\n"material.file" = ["a.csv", "b.csv", "c.csv"]'
+    a, b, c = read_cases(study(with_material('model = "tabulated"\nfile = "a.csv"') + sweep))
+    assert a.key == b.key != c.key
+    assert c.varied == {"material.file": "c.csv"}
+    assert c.material().compliances == (1.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("1, 3e6, 1e6\n10, 5e6, 2e6", ""),
+        ("frequency [Hz], storage [MPa], loss [MPa]\n1, 3, 1\n10, 5, 2", ""),
+        ("storage, frequency, loss\n3, 1, 1\n5, 10, 2", 'modulus_unit = "MPa"'),
+        ("frequency, storage, loss, shift_factor\n2, 3, 1, 0.5\n2, 5, 2, 5", 'modulus_unit = "MPa"'),
+    ],
+)
+def test_material__dynamic_from_csv(study, tmp_path, rows, keys):
+    (tmp_path / "dma.csv").write_text(rows)
+    table = f'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "Hz"\n{keys}'
+    material = read_study(study(with_material(table))).material()
+    assert material == materials.from_dynamic((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
+    other = read_study(study(with_material(table.replace('"Hz"', '"rad/s"')))) if "[Hz]" not in rows else None
+    assert other is None or other.material() != material
+
+
+def test_material__relaxation_from_csv(study, tmp_path):
+    (tmp_path / "relaxation.csv").write_text("time [ms], modulus\n0, 3\n1000, 2\n2000, 1.5")
+    table = 'model = "relaxation_table"\nfile = "relaxation.csv"\nmodulus_unit = "MPa"\nkind = "tensile"'
+    material = read_study(study(with_material(table))).material()
+    assert material == materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), "tensile")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            'model = "tabulated"\nfile = "gone.csv"',
+            "material.file: found 'gone.csv', which does not exist: expected a file ({folder}/gone.csv)",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntimes = [0, 1]',
+            "material.file: found beside times: expected one of them",
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, 1]',
+            "material.compliances: missing: expected file, or times and compliances",
+        ),
+        (
+            'model = "tabulated"\ntimes = [0, 1]\ncompliances = [1, 2]\ntime_unit = "s"',
+            "material.time_unit: found without a file: expected units where the values are",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = 3',
+            "material.time_unit: found 3: expected a unit",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = "mm"',
+            "material.file: {folder}/creep.csv: unit of time is '1 mm', which is in millimeter: expected a number in "
+            "s, or a string with a unit of its kind",
+        ),
+        (
+            'model = "tabulated"\nfile = "dma.csv"\ntime_unit = "s"',
+            "material.file: {folder}/dma.csv: has columns frequency, storage, loss: expected time, compliance",
+        ),
+        (
+            'model = "tabulated"\nfile = "headed.csv"\ntime_unit = "s"',
+            "material.file: {folder}/headed.csv: unit of time: the heading says 'h' and the study 's': expected "
+            "one of them",
+        ),
+        (
+            'model = "tabulated"\nfile = "creep.csv"\nfiel = 1',
+            "material.fiel: unknown key; did you mean 'file'?",
+        ),
+        (
+            'model = "tabulated"\nfile = "falling.csv"\nnoise = "1 %"',
+            "material: table row 1: compliance 1 1/Pa at 1 s is 50.00% below an earlier row, noise is 0.01: expected "
+            "an ascending compliance, or a larger noise",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"',
+            "material.frequency_unit: missing: expected 'rad/s' or 'Hz'",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "kHz"',
+            "material.frequency_unit: found 'kHz': expected 'rad/s' or 'Hz'",
+        ),
+        (
+            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "rad/s"',
+            "material.file: {folder}/dma.csv: unit of frequency: the heading says 'Hz' and the study 'rad/s': expected "
+            "one of them",
+        ),
+        (
+            'model = "elastic"\nshear_modulus = 1\npoisson = 0.3\nbulk_modulus = 3',
+            "material: poisson is 0.3 and bulk_modulus is 3.0: expected one of them",
+        ),
+        (
+            'model = "power_law"\nglassy = 0\ncoefficient = 1\nexponent = 1',
+            "material.exponent: found 1: expected a number above 0 and below 1",
+        ),
+        (
+            'model = "pair"\na = { model = "elastic", shear_modulus = -1 }\nb = { model = "pair" }',
+            "2 problems\n"
+            "  material.a.shear_modulus: found -1: expected a number in Pa, or a string with a unit of its kind, above "
+            "0\n  material.b.model: found 'pair', which is no known model: expected one of elastic, maxwell, "
+            "kelvin_voigt, zener, from_relaxation, prony, power_law, tabulated, relaxation_table, dynamic",
+        ),
+        ('model = ["pair"]', "material.model: found ['pair'], which is no known model; did you mean 'pair'?"),
+    ],
+)
+def test_material__refused_in_plain_words(study, tmp_path, table, message):
+    (tmp_path / "creep.csv").write_text("0, 1\n1, 2")
+    (tmp_path / "headed.csv").write_text("time [h], compliance\n0, 1\n1, 2")
+    (tmp_path / "falling.csv").write_text("0, 2\n1, 1")
+    (tmp_path / "dma.csv").write_text("frequency [Hz], storage, loss\n1, 3, 1\n10, 5, 2")
+    assert refusal(study(with_material(table))) == message.format(folder=tmp_path)
+
+
+def test_pair__is_varied_within(study):
+    bodies = 'a = { model = "elastic", shear_modulus = 1 }\nb = { model = "tabulated", file = "creep.csv" }'
+    path = study(with_material(f'model = "pair"\n{bodies}'))
+    (path.parent / "creep.csv").write_text("0, 1\n1, 2")
+    case = read_study(path)
+    assert Case.from_json(case.to_json()).key == case.key
+    changed = vary(case, {"material.a.shear_modulus": "2 Pa"})
+    assert changed.key != case.key
+    assert changed.material() == materials.pair(materials.elastic(2.0), materials.Tabulated((0, 1), (1, 2)))
+
+
+def test_program__every_segment(study):
+    text = (
+        BALL.split("[[program]]")[0]
+        + """
+        [[program]]
+        load = "2 N"
+        over = 0
+        [[program]]
+        hold = 1
+        control = "approach"
+        [[program]]
+        approach = "3 um"
+        over = 1
+        [[program]]
+        cycle = { mean = 1, amplitude = 0.5, period = 2, cycles = 3 }
+        [[program]]
+        cycle = { mean = "3 um", amplitude = "1 um", period = 2, cycles = 3 }
+        control = "approach"
+        [[program]]
+        table = { times = [0, 1, "2 s"], values = [0, 1, "500 mN"] }
+        [[program]]
+        table = { times = [0, 1], values = ["1 um", "2 um"] }
+        control = "approach"
+    """
+    )
+    expected = (
+        Program().load(2.0, over=0.0).hold(1.0, control="approach").approach(3e-6, over=1.0)
+        + Program.cycle(1.0, 0.5, 2.0, 3)
+        + Program.cycle(3e-6, 1e-6, 2.0, 3, control="approach")
+        + Program().load(0.0, over=0.0)  # a table that begins at zero begins there
+        + Program.table([0, 1, 2], [0, 1, 0.5])
+        + Program.table([0, 1], [1e-6, 2e-6], control="approach")
+    )
+    assert read_study(study(textwrap.dedent(text))).program() == expected
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "0, 0\n1.5, 2\n2, 1\n",
+        "# by hand\ntime [ms]; load (mN)\n0; 0\n1500; 2000\n2000; 1000\n",
+        "load,time\n0,0\n2,1.5\n1,2",
+    ],
+)
+def test_program__table_from_csv(study, tmp_path, rows):
+    (tmp_path / "history.csv").write_text(rows)
+    case = read_study(study(BALL.split("[[program]]")[0] + '[[program]]\ntable = "history.csv"'))
+    assert case.program() == Program.table([0, 1.5, 2], [0, 2, 1])
+    (tmp_path / "history.csv").unlink()
+    assert Case.from_json(case.to_json()).program() == case.program(), "a stored case needs its CSV file no longer"
+
+
+@pytest.mark.parametrize(
+    ("rows", "found"),
+    [
+        ("time [ms], load [mm]\n0, 0", "unit of load is '1 mm', which is in millimeter: expected a number in N"),
+        ("time, force\n0, 0", "has columns time, force: expected time, load"),
+        ("0, 0\n1, nan", "line 2: found 'nan': expected a number for load"),
+        ("0, 0\n1", "line 2: found 1 columns: expected a number for load"),
+        ("", "holds no rows: expected columns time, load"),
+    ],
+)
+def test_program__table_from_bad_csv(study, tmp_path, rows, found):
+    (tmp_path / "history.csv").write_text(rows)
+    message = refusal(study(BALL.split("[[program]]")[0] + '[[program]]\ntable = "history.csv"'))
+    assert message.startswith(f"program.0.table: {tmp_path / 'history.csv'}")
+    assert found in message
+
+
+#: what is changed in BALL  =>  into what, and the message: ``|`` begins a line of it, ``| -`` one of several problems
+REFUSED = r"""
+"3 MPa"  =>  "3 MN"
+| material.shear_modulus: found '3 MN', which is in meganewton: expected a number in Pa, or a string with a unit
+    of its kind
+
+kelvin_modulus  =>  kelvin_modlus
+| 2 problems
+| - material.kelvin_modulus: missing: expected a number in Pa, or a string with a unit of its kind, above 0
+| - material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?
+
+over = "50 ms"  =>  # gone
+| program.0.over: missing: expected a number in s, or a string with a unit of its kind, at least 0
+
+"3 MPa"  =>  "-3 MPa"
+| material.shear_modulus: found '-3 MPa': expected a number in Pa, or a string with a unit of its kind, above 0
+
+[[program]]\nload  =>  poisson = 0.6\n[[program]]\nload
+| material.poisson: found 0.6: expected a number above -1 and up to 0.5
+
+[[program]]\nload  =>  poisson = -1\n[[program]]\nload
+| material.poisson: found -1: expected a number above -1 and up to 0.5
+
+[32, 24]  =>  [0, 24]
+| surface.shape.0: found 0: expected a whole number at least 1
+
+[32, 24]  =>  [32]
+| surface.shape: found [32]: expected a whole number of cells, or a list of two, along x and along y
+
+"2 N"  =>  nan
+| program.0.load: found nan: expected a number in N, or a string with a unit of its kind, finite
+
+"2 N"  =>  "2"
+| program.0.load: found '2', a text without a unit: expected a number in N, or a string with a unit of its kind
+    (such as '2 N')
+
+"2 N"  =>  true
+| program.0.load: found True: expected a number in N, or a string with a unit of its kind
+
+"zener"  =>  "zenner"
+| material.model: found 'zenner', which is no known model; did you mean 'zener'?
+
+"sphere"  =>  "ball"
+| surface.generate: found 'ball', which is no known recipe: expected one of sphere, cone, flat_punch, wavy,
+    self_affine
+
+generate = "sphere"  =>  # gone
+| surface: found a table with radius, size, shape: expected either file or generate
+
+generate = "sphere"  =>  generat = "sphere"
+| surface: found a table with generat, radius, size, shape: expected either file or generate; did you mean
+    'generate'?
+
+load = "2 N"  =>  laod = "2 N"
+| program.0: found a table with laod, over: expected exactly one of load, approach, hold, cycle, table; did you
+    mean 'load'?
+
+hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
+| program.1.control: found 'force': expected 'load' or 'approach'
+
+[material]  =>  [materials]
+| 2 problems
+| - material: missing: expected a [material] table with a model
+| - materials: unknown key; did you mean 'material'?
+
+title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
+| 2 problems
+| - solve.boundary: found 'periodc': expected 'free' or 'periodic'; did you mean 'periodic'?
+| - x: unknown key: expected one of title, surface, material, program, solve, keep
+
+[surface]  =>  [keep]\nfields = ['presure']\n[surface]
+| keep.fields: found 'presure', which is no field; did you mean 'pressure'?
+
+[surface]  =>  [keep]\ntimes = [1, '6 s']\n[surface]
+| keep.times: found 6 s: expected times up to the end of the program, 5.05 s
+
+[surface]  =>  [keep]\ntimes = 0\n[surface]
+| keep.times: found 0: expected a whole number at least 1
+
+[surface]  =>  [solve]\ntolerance = 0\n[surface]
+| solve.tolerance: found 0: expected a number above 0 and below 1
+
+[surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
+| solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
+
+[material]  =>  level = 4\n[material]
+| surface.level: found 4: expected true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3
+
+[material]  =>  fill = "cubic"\n[material]
+| surface.fill: found 'cubic': expected true, false, 'harmonic', 'nearest' or 'linear'
+
+[material]  =>  outliers = 5\n[material]
+| surface.outliers: found 5: expected true, false, or a table of window and threshold
+
+[material]  =>  outliers = { treshold = 5 }\n[material]
+| surface.outliers.treshold: unknown key; did you mean 'threshold'?
+
+[material]  =>  filter = "5 N"\n[material]
+| surface.filter.cutoff: found '5 N', which is in newton: expected a number in m, or a string with a unit of its kind
+
+[material]  =>  crop = { x = 3 }\n[material]
+| surface.crop.x: found 3: expected a list of two lengths, the lower and the upper limit
+
+[material]  =>  taper = [1, 2, 3]\n[material]
+| surface.taper: found [1, 2, 3]: expected a length, or a list of two, along x and along y
+"""
+
+
+def refused():
+    """The blocks of REFUSED: what to replace, by what, and the whole message."""
+    for block in REFUSED.strip().split("\n\n"):
+        change, *rest = block.split("\n")
+        old, new = (side.replace(r"\n", "\n") for side in change.split("  =>  "))
+        lines = " ".join(line.strip() for line in rest).removeprefix("| ").split(" | ")
+        yield old, new, "\n".join("  " + line.removeprefix("- ") if line.startswith("- ") else line for line in lines)
+
+
+@pytest.mark.parametrize(("old", "new", "message"), list(refused()))
+def test_read_study__refuses_in_plain_words(study, old, new, message):
+    assert refusal(study(BALL, (old, new))) == message
+
+
+def test_read_study__refuses_a_file_that_is_not_there(study, tmp_path):
+    table = BALL[BALL.index("[surface]") : BALL.index("[material]")]
+    path = study(BALL, (table, '[surface]\nfile = "gone.sur"\n'))
+    message = refusal(path)
+    assert message == f"surface.file: found 'gone.sur', which does not exist: expected a file ({tmp_path / 'gone.sur'})"
+    assert refusal(tmp_path / "none.toml") == "does not exist: expected a study file (TOML)"
+    (tmp_path / "bad.toml").write_text("title = ")
+    assert refusal(tmp_path / "bad.toml").startswith("is no valid TOML: Invalid value (at end of document)")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    assert refusal(tmp_path / "binary.toml").startswith("is no valid TOML")
+
+
+def test_read_study__refuses_a_program_of_another_kind(study):
+    assert refusal(study(BALL.split("[[program]]")[0] + "[program]\nload = 1")) == (
+        "program: found a table with load: expected a list of [[program]] tables, at least one"
+    )
+    assert refusal(study(BALL.split("[[program]]")[0])) == (
+        "program: missing: expected a list of [[program]] tables, at least one"
+    )
+    message = refusal(
+        study(
+            BALL.split("[[program]]")[0]
+            + "[[program]]\ncycle = { mean = 1, amplitude = 2, period = 1, cycles = 1 }\n"
+            + "[[program]]\ntable = { times = [0, 2, 1], values = [0, 1, 2] }"
+        )
+    )
+    assert "program.0: load reaches -1.0 N: expected no negative load" in message
+    assert "program.1: table row 2: time 1.0 s after 2.0 s: expected ascending times" in message
+
+
+def test_read_cases__product(study):
+    sweep = '\n[sweep]\n"program.0.load" = ["1 N", 2]\nmaterial.poisson = [0.4, 0.5]'
+    cases = read_cases(study(BALL + sweep))
+    assert [dict(case.varied) for case in cases] == [
+        {"program.0.load": load, "material.poisson": nu} for load in (1.0, 2.0) for nu in (0.4, 0.5)
+    ]
+    assert [case.program().segments[0].end for case in cases] == [1, 1, 2, 2]
+    assert len({case.key for case in cases}) == 4
+    with pytest.raises(InputError, match="sweep: found 4 cases: expected one"):
+        read_study(study(BALL + sweep))
+
+
+def test_read_cases__zipped(study):
+    text = BALL + (
+        '\n[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3, 1e-4]\n[[sweep]]\n"program.0.load" = 3'
+    )
+    cases = read_cases(study(text))
+    assert [(c.program().segments[0].end, c.settings.solve.tolerance) for c in cases] == [
+        (1, 1e-3),
+        (2, 1e-4),
+        (3, 1e-3),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("sweep", "message"),
+    [
+        ('[sweep]\n"program.0.load" = 3', "sweep.program.0.load: found 3: expected a list of values"),
+        ('[sweep]\n"program.7.load" = [3]', "program.7.load: found '7': program has entries 0 to 1"),
+        ('[sweep]\n"program.0.lod" = [1, 2]', "program.0.lod: unknown key; did you mean 'load'?"),
+        ('[sweep]\n"title.x" = [1]', "title.x: title is 'A ball', which has no keys"),
+        (
+            '[sweep]\n"program.0.load" = [1, -2]',
+            "program.0.load: found -2: expected a number in N, or a string with a unit of its kind, at least 0 "
+            "(case 2 of 2: program.0.load = -2)",
+        ),
+        (
+            '[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3]',
+            "sweep.0: found 2 for program.0.load, 1 for solve.tolerance: expected lists of one length, at least 1",
+        ),
+    ],
+)
+def test_read_cases__refuses_in_plain_words(study, sweep, message):
+    assert refusal(study(BALL + "\n" + sweep)) == message
+
+
+def test_vary__changes_one_value(study):
+    case = read_study(study())
+    changed = vary(case, {"program.0.load": "3 N", "keep.times": 5})
+    assert changed.program().segments[0].end == 3
+    assert changed.varied == {"program.0.load": 3.0, "keep.times": 5}
+    assert case.program().segments[0].end == 2
+    with pytest.raises(InputError, match=r"program\.0\.load: found -1: expected a number in N"):
+        vary(case, {"program.0.load": -1})
+
+
+def test_json__gives_the_case_back(study):
+    for case in read_cases(study(BALL + '\n[sweep]\n"program.0.load" = ["1 N", 2]')):
+        for again in (Case.from_json(case.to_json()), pickle.loads(pickle.dumps(case))):
+            assert again == case
+            assert again.key == case.key
+    with pytest.raises(InputError, match="not a case written by to_json"):
+        Case.from_json("nonsense")
+    with pytest.raises(InputError, match="surface: missing"):
+        Case.from_json("{}")
+
+
+def test_key__counts_what_determines_the_numbers(study):
+    same = [
+        ("A ball", "Another title"),
+        ('"50 ms"', "0.05"),
+        ('"3 MPa"', '"3e6 N/m^2"'),
+        ('"10 mm"', '"1 cm"'),
+        ('hold = "5 s"', 'hold = "5000 ms"\ncontrol = "load"'),
+        ("[surface]", "[solve]\nboundary = 'free'\n[keep]\nfields = ['gap', 'pressure']\n[surface]"),
+        ("[material]", "level = false\n[material]"),
+        ('model = "zener"', 'model = "zener"\npoisson = 0.5'),
+    ]
+    other = [
+        ('"50 ms"', '"51 ms"'),
+        ('"3 MPa"', '"3.00000000000001 MPa"'),
+        ("[32, 24]", "[24, 32]"),
+        ("[surface]", "[solve]\nboundary = 'periodic'\n[surface]"),
+        ("[surface]", "[solve]\nmethod = 'seed'\n[surface]"),
+        ("[surface]", "[keep]\ntimes = 3\n[surface]"),
+        ("[surface]", "[keep]\nfields = ['gap']\n[surface]"),
+        ("[material]", "level = 1\n[material]"),
+        ('model = "zener"', 'model = "zener"\npoisson = 0.4'),
+        ('model = "zener"', 'model = "zener"\nbulk_modulus = "1 GPa"'),
+    ]
+    key = read_study(study()).key
+    assert len(key) == 16
+    assert int(key, 16)
+    assert {read_study(study(BALL, pair)).key for pair in same} == {key}
+    others = {read_study(study(BALL, pair)).key for pair in other}
+    assert len(others) == len(other)
+    assert key not in others
+
+
+def test_key__knows_a_scan_by_its_content(study, tmp_path):
+    table = BALL[BALL.index("[surface]") : BALL.index("[material]")]
+    for name, content in (("a.sur", b"one"), ("b.sur", b"one"), ("c.sur", b"two")):
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "card.toml").write_text('title = "x"\nfile = "a.sur"\nlevel = 1')
+    (tmp_path / "same.toml").write_text('licence = "CC0"\nfile = "b.sur"\nlevel = 1')
+    (tmp_path / "other.toml").write_text('file = "a.sur"\nlevel = 2')
+    names = ("a.sur", "b.sur", "c.sur", "card.toml", "same.toml", "other.toml")
+    case = {n: read_study(study(BALL, (table, f'[surface]\nfile = "{n}"\n'))) for n in names}
+    key = {name: case[name].key for name in names}
+    assert key["a.sur"] == key["b.sur"]
+    assert key["card.toml"] == key["same.toml"]
+    assert len({key[n] for n in ("a.sur", "c.sur", "card.toml", "other.toml")}) == 4
+    assert case["a.sur"].surface_sha256 == case["card.toml"].surface_sha256
+    assert case["a.sur"].surface_sha256 != case["c.sur"].surface_sha256
+
+
+PREFIXES = st.sampled_from([("um", 1e-6), ("nm", 1e-9), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)])
+
+
+@settings(max_examples=60, deadline=None)
+@given(digits=st.integers(1, 10**12), unit=PREFIXES)
+def test_key__does_not_see_how_a_length_is_written(digits, unit):
+    name, factor = unit
+    base = Case.from_json(json.dumps(CASE))
+    # the decimal that the reader sees, exactly scaled: what a person would have written in metres
+    exponent = round(math.log10(factor))
+    texts = (f"{digits} {name}", float(f"{digits}e{exponent}"), f"{digits}e{exponent} m", f"{digits}e{exponent + 3} mm")
+    assert len({vary(base, {"surface.radius": text}).key for text in texts}) == 1
+
+
+CASE = {
+    "surface": {"generate": "sphere", "radius": 0.01, "size": [1e-3, 1e-3], "shape": [32, 24]},
+    "material": {"model": "elastic", "shear_modulus": 1e6},
+    "program": [{"load": 1.0, "over": 0.0}],
+}
+
+
+def test_study_schema__names_every_model_and_recipe():
+    schema = study_schema()
+    text = json.dumps(schema)
+    assert all(f'"{name}"' in text for name in (*MODELS, *RECIPES))
+    assert {"surface", "material", "program"} <= set(schema["required"])
+
+
+def test_recipes__are_those_of_surface_cards():
+    from roughvisc.topography import cards
+
+    assert {name: set(keys) for name, keys in RECIPES.items()} == {n: set(keys) for n, keys in cards.RECIPES.items()}
+
+
+def test_height__is_conditioned_as_asked_for(study):
+    steps = (
+        'level = true\noutliers = true\nfill = "nearest"\nfilter = "200 um"\nresample = 16\ntaper = "100 um"\n'
+        'mirror = true\ninvert = true\nrotate90 = 1\ncrop = { x = ["100 um", "0.9 mm"] }\n[material]'
+    )
+    case = read_study(study(BALL, ("[material]", steps)))
+    h = case.height()
+    assert h.shape == (32, 32)
+    for step in ("cropped", "levelled", "outliers", "filter", "resampled", "tapered", "mirrored"):
+        assert step in h.attrs["history"]
+    again = Case.from_json(case.to_json())
+    assert again == case
+    assert again.height().identical(h)
+    plain = read_study(study()).height()
+    assert plain.shape == (32, 24)
+    assert plain.attrs["history"] == "generated: sphere"

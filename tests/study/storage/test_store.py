@@ -1,0 +1,163 @@
+"""Files of results: whole or absent, plain to every reader, lazy to ours."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from sample_results import hertz_creep, rough_creep
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.storage import store
+from roughvisc.study.storage.store import open_result, round_bits, significant_bits, whole_file, write_result
+
+#: What the seed paper's algorithm, or the direct history, leaves unsaid.
+MISSING = {
+    *("stated_error", "time_error", "residual", "residual_bound", "pressure_error", "approach_error", "work_error"),
+    *("stored_energy", "dissipated_energy", "dissipated_energy_error", "contact_area_lower", "contact_area_upper"),
+}
+
+
+def test_missing__is_declared_where_it_occurs():
+    ball, rubber = rv.sphere(1e-3, 2e-4, 20), rv.zener(3e6, 1e6, 1e5)
+    program = rv.Program().load(1e-4, over=0.05).hold(0.1)
+    found = set()
+    for settings in ({"method": "seed", "time_step": 0.01}, {"memory": "direct"}, {"time_step": 0.02}):
+        ds = rv.simulate(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, **settings)
+        missing = {str(name) for name in ds.variables if ds[name].isnull().any()}
+        assert all(ds[name].isnull().all() for name in missing), "throughout"
+        found |= missing
+    assert found == MISSING
+    assert found <= store.MAY_BE_MISSING
+
+
+def test_write_result__gives_the_same_numbers_back(tmp_path):
+    written = rough_creep(shape=(21, 34), frames=5)
+    path = write_result(written, tmp_path / "new" / "result.nc")
+    assert [p.name for p in path.parent.iterdir()] == ["result.nc"]
+    with open_result(path) as read:
+        assert read["pressure"].encoding["chunksizes"] == (5, 21, 34)
+        assert not read["pressure"]._in_memory
+        xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
+        assert read.attrs["title"] == written.attrs["title"]
+        assert read["wall_time"].dtype.kind == "f", "seconds stay numbers"
+
+
+def test_write_result__follows_the_conventions(tmp_path):
+    path = write_result(rough_creep(shape=(16, 17), frames=4).assign_attrs(flag=True, nothing=None), tmp_path / "r.nc")
+    with netCDF4.Dataset(path) as raw:
+        assert raw.Conventions == "CF-1.11"
+        assert raw.flag == 1
+        assert "nothing" not in raw.ncattrs()
+        assert raw["status"].flag_meanings.split()[1] == "not_converged"
+        assert raw["status"].flag_values.dtype == raw["status"].dtype
+        assert {n for n, v in raw.variables.items() if "_FillValue" in v.ncattrs()} == MISSING | {"height", "gap"}
+        for name, variable in raw.variables.items():
+            large = len(variable.dimensions) == 3
+            assert (variable.chunking() == "contiguous") is not large, name
+            assert variable.filters()["zlib"] is large, name
+            assert variable.filters()["complevel"] == large
+            assert variable.long_name
+            assert name == "status" or variable.units
+            assert "axis" not in variable.ncattrs()
+
+
+def test_write_result__refuses_what_is_not_declared(tmp_path):
+    with pytest.raises(KeyError, match="'colour' is not declared"):
+        write_result(hertz_creep((5, 6), 2).assign(colour=3.0), tmp_path / "r.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_write_result__leaves_nothing_behind_when_it_fails(tmp_path, monkeypatch):
+    path = write_result(hertz_creep((5, 6), 2), tmp_path / "r.nc")
+    before = path.read_bytes()
+
+    def fails(*_):
+        assert any(p.name.endswith(".part.nc") for p in tmp_path.iterdir())
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store, "_write", fails)
+    with pytest.raises(OSError, match="No space left"):
+        write_result(hertz_creep((5, 6), 3), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_whole_file__appears_at_the_end_only(tmp_path):
+    with whole_file(tmp_path / "a" / "x.png") as temporary:
+        temporary.write_text("new")
+        assert temporary.suffix == ".png"
+        assert not (tmp_path / "a" / "x.png").exists()
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
+
+    def interrupted():
+        with whole_file(tmp_path / "a" / "y.png") as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
+    with pytest.raises(InputError, match="cannot be made"), whole_file(tmp_path / "a" / "x.png" / "z.nc"):
+        pass
+
+
+def test_open_result__refuses_what_is_none(tmp_path):
+    with pytest.raises(InputError, match="does not exist: expected a result"):
+        open_result(tmp_path / "none.nc")
+    with pytest.raises(InputError, match="is a folder"):
+        open_result(tmp_path)
+    (tmp_path / "text.nc").write_text("hello")
+    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+        open_result(tmp_path / "text.nc")
+    whole = write_result(hertz_creep((30, 40), 4), tmp_path / "whole.nc").read_bytes()
+    (tmp_path / "torn.nc").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+        open_result(tmp_path / "torn.nc")
+    xr.Dataset({"rain": ("time", np.arange(3.0))}).to_netcdf(tmp_path / "weather.nc")
+    with pytest.raises(InputError, match="holds no time, force, approach: expected a result of roughvisc"):
+        open_result(tmp_path / "weather.nc")
+
+
+@pytest.mark.parametrize("precision", [0.3, 1e-2, 1e-4, 1e-9])
+def test_precision__is_kept_and_said(tmp_path, precision):
+    exact = rough_creep(shape=(21, 34), frames=5)
+    exact["gap"][2, 3, 4] = np.nan
+    path = write_result(exact, tmp_path / "rounded.nc", precision=precision)
+    with open_result(path) as rounded:
+        for name in ("pressure", "gap"):
+            found, true = rounded[name].values, exact[name].values
+            np.testing.assert_allclose(found, true, rtol=precision, atol=0)
+            assert not np.array_equal(found, true, equal_nan=True)
+            assert np.array_equal(found == 0, true == 0), "contact stays contact"
+            assert rounded[name].attrs["relative_precision"] == precision
+            assert "bits of the fraction" in rounded[name].attrs["quantization"]
+        xr.testing.assert_identical(rounded["force"].load().drop_attrs(), exact["force"].drop_attrs())
+        assert "relative_precision" not in rounded["height"].attrs
+    with open_result(write_result(exact, tmp_path / "exact.nc")) as kept:
+        assert "relative_precision" not in kept["gap"].attrs
+        np.testing.assert_array_equal(kept["gap"].values, exact["gap"].values)
+
+
+def test_round_bits__is_to_nearest_and_uses_all_it_may():
+    values = np.concatenate([np.geomspace(1e-300, 1e300, 4001), -np.geomspace(1e-9, 1e9, 4001)])
+    for precision in (0.1, 1e-3, 1e-4, 1e-8):
+        bits = significant_bits(precision)
+        worst = np.max(np.abs(round_bits(values, bits) / values - 1))
+        assert precision / 4 < worst <= precision
+    special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan])
+    assert round_bits(special, 3).tobytes() == special.tobytes()
+
+
+def test_field__is_compressed_where_that_pays(tmp_path):
+    noise = np.random.default_rng(1)
+    ds = hertz_creep((128, 128), 12)
+    dense = noise.uniform(1.0, 2.0, ds["gap"].shape)
+    ds["gap"].values[:] = dense
+    ds["pressure"].values[:] = np.where(dense > 1.98, dense, 0.0)
+    for precision, compressed in ((None, {"pressure"}), (1e-3, {"pressure", "gap"})):
+        path = write_result(ds, tmp_path / "r.nc", precision=precision)
+        with netCDF4.Dataset(path) as raw:
+            assert {name for name in ("pressure", "gap") if raw[name].filters()["zlib"]} == compressed
+            assert raw["gap"].chunking() == [6, 64, 64], "12 frames in equal parts of at most 8"
+    assert path.stat().st_size < 0.5 * (ds["gap"].nbytes + ds["pressure"].nbytes)

@@ -1,0 +1,179 @@
+"""What tests of several modules share: cases, scenes, and how they are looked at."""
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import roughvisc as rv
+from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.halfspace.kernel import love_kernel
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.statement.case import read_study, vary
+
+RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
+RUBBER = rv.zener(3e6, 3e6, 0.3e6)
+PRESS = rv.Program().load(LOAD, over=0).hold(0.4)
+TIMES = [0.0, 0.1, 0.4]
+EXACT = closed_forms.lee_radok_step(RADIUS, RUBBER, LOAD)
+
+
+def true_errors(ds):
+    """Of pressure and approach, the larger; and of the corrected area, each at its worst time."""
+    r = np.hypot(ds.x.values[:, None] - SIZE[0] / 2, ds.y.values - SIZE[1] / 2)
+    cell = float(np.prod([SIZE[i] / ds.sizes[axis] for i, axis in enumerate(("x", "y"))]))
+    pressure = [np.abs(ds.pressure[i].values - EXACT.pressure(r, t)).sum() * cell / LOAD for i, t in enumerate(TIMES)]
+    approach = np.abs(ds.approach.values - EXACT.approach(TIMES)) / EXACT.approach(TIMES[-1])
+    area = np.abs(ds.contact_area_corrected.values / (np.pi * EXACT.radius(TIMES) ** 2) - 1)
+    return max(*pressure, *approach), float(area.max())
+
+
+BALL = """
+title = "A ball"
+[surface]
+generate = "sphere"
+radius = "10 mm"
+size = "1 mm"
+shape = [24, 21]
+level = 0    # what is conditioned counts as measured: its grid does not grow
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "5 mN"
+over = 0
+[[program]]
+hold = "0.2 s"
+[keep]
+fields = ["pressure", "displacement"]
+times = [0, "0.1 s", "200 ms"]
+"""
+
+
+def direct(pressure, spacing):
+    """Superposition of cells, one by one."""
+    nx, ny = pressure.shape
+    kernel = love_kernel(pressure.shape, spacing)
+    i, j = np.arange(nx), np.arange(ny)
+    influence = kernel[np.abs(i[:, None] - i)[:, None, :, None], np.abs(j[:, None] - j)[None, :, None, :]]
+    return np.einsum("ijkl,kl->ij", influence, pressure)
+
+
+def rough_gap(shape, seed=0, slope=1.0):
+    """Gap under a random surface with a fixed spectrum; cells are one long."""
+    rng = np.random.default_rng(seed)
+    qx, qy = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :]
+    amplitude = np.maximum(np.hypot(qx, qy), 4 / max(shape)) ** -1.8
+    amplitude[np.hypot(qx, qy) > 0.2] = 0
+    amplitude[0, 0] = 0
+    height = np.fft.irfft2(amplitude * np.fft.rfft2(rng.standard_normal(shape)), s=shape)
+    height *= slope / np.sqrt(np.mean(np.gradient(height, axis=0) ** 2 + np.gradient(height, axis=1) ** 2))
+    return height.max() - height
+
+
+UNIT_RADIUS = 1.0
+MATERIALS = {
+    "maxwell": rv.maxwell(1.0, 1.0),
+    "zener": rv.zener(1.0, 1.0, 1.0),
+    "zener_soft": rv.zener(1.0, 0.01, 0.01),
+    "two_branches": rv.Prony(1.0, 0.0, (1.0, 2.0), (0.3, 3.0)),
+}
+
+
+def scene(material, program, *, shape=(31, 28), size=1.6, **settings):
+    """A sphere on an odd, unequal grid, its apex on a cell centre."""
+    spacing = (size / shape[0], size / shape[1])
+    x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
+    gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * UNIT_RADIUS)
+    boundary = settings.pop("boundary", "free")
+    acts_on = settings.pop("acts_on", "displacement")
+    return Scene(HalfSpace(shape, spacing, boundary), gap, material, Modes(material, acts_on), program, **settings)
+
+
+STEP_LOAD = rv.Program().load(0.05, over=0).hold(2.0)
+STUDY = """
+title = "A ball"                            # a comment
+[surface]
+generate = "sphere"
+radius = "10 mm"
+size = ["2.4 mm", "2.3 mm"]
+shape = [33, 31]
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "3 MPa"
+kelvin_viscosity = "0.3 MPa s"
+[[program]]
+load = "0.1 N"
+over = 0
+[[program]]
+hold = "0.4 s"
+[keep]
+fields = ["gap"]
+times = [0, "0.1 s", "0.4 s"]
+"""
+ROUGH = """
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [30, 26]
+hurst = 0.8
+rms_slope = 0.1
+shortcut = "0.2 mm"
+seed = 3
+[material]
+model = "maxwell"
+shear_modulus = "1 MPa"
+viscosity = "1 MPa s"
+[[program]]
+load = "10 mN"
+over = "50 ms"
+[solve]
+boundary = "periodic"
+[keep]
+times = [0, "20 ms", "50 ms"]
+"""
+
+
+def case_of(tmp_path, text=STUDY, **changes):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    return vary(read_study(path), {key.replace("__", "."): value for key, value in changes.items()})
+
+
+def measured(case, *settings, **options):
+    return rv.trade(case, settings, **{"progress": False, "budget": 1e4, **options})
+
+
+def labels(figure):
+    return [text for ax in figure.axes for text in (ax.get_xlabel(), ax.get_ylabel()) if text]
+
+
+def lines(ax):
+    return {line.get_label(): line for line in ax.lines}
+
+
+def text_boxes(figure):
+    """Boxes of all texts that are seen, inset by a pixel."""
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw_without_rendering()
+    found = []
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            if not axis.get_visible():
+                continue
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            ticks = [t for t in axis.get_major_ticks() if low - slack <= t.get_loc() <= high + slack]
+            ticks += [t for t in axis.get_minor_ticks() if low - slack <= t.get_loc() <= high + slack]
+            found += [tick.label1 for tick in ticks if tick.label1.get_visible()]
+            found += [tick.label2 for tick in ticks if tick.label2.get_visible()]
+            found += [axis.label, axis.offsetText]
+        found += [ax.title, ax._left_title, ax._right_title]
+        found += ax.get_legend().get_texts() if ax.get_legend() else []
+    found += [figure._suptitle] if figure._suptitle else []
+    for legend in figure.legends:
+        found += legend.get_texts()
+    return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]

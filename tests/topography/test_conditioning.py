@@ -1,0 +1,414 @@
+"""Conditioning of scans."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.topography.conditioning import (
+    combine,
+    crop,
+    fill,
+    gaussian_filter,
+    invert,
+    level,
+    mask_outliers,
+    mirror,
+    resample,
+    rotate90,
+    taper,
+)
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.readers import from_array, open_scan
+from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
+
+SCANS = Path(__file__).parents[3] / "shared" / "scans"
+CELL = (2e-6, 3e-6)
+
+
+def rough(shape=(45, 38), missing=0.0, seed=0):
+    """Self-affine roughness of 1 um rms height, with some points missing."""
+    size = tuple(n * d for n, d in zip(shape, CELL, strict=True))
+    h = self_affine(size, shape, hurst=0.8, rms_height=1e-6, rolloff=4e-5, seed=seed)
+    return h.where(np.random.default_rng(seed).random(shape) >= missing)
+
+
+def slope(h):
+    """Root mean square of the forward differences present."""
+    gradients = [h.diff(axis) / d for axis, d in zip(("x", "y"), spacing(h), strict=True)]
+    return float(np.sqrt(sum((g**2).mean() for g in gradients)))
+
+
+ALL_STEPS = {
+    "level": level,
+    "mask_outliers": mask_outliers,
+    "fill": fill,
+    "resample": lambda h: resample(h, (21, 40)),
+    "gaussian_filter": lambda h: gaussian_filter(h, 2e-5),
+    "crop": lambda h: crop(h, x=(1e-5, 5e-5)),
+    "rotate90": rotate90,
+    "invert": invert,
+    "combine": lambda h: combine(h, h, flip="x"),
+    "taper": lambda h: taper(h, 1e-5),
+    "mirror": mirror,
+}
+
+
+@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
+def test_step__adds_a_line_to_history_and_leaves_its_input_alone(step):
+    h = fill(rough(missing=0.02))
+    before = h.copy(deep=True)
+    done = step(h)
+    xr.testing.assert_identical(h, before)
+    assert done.attrs["history"].startswith(before.attrs["history"] + "\n")
+    assert done.attrs["history"].count("\n") == before.attrs["history"].count("\n") + 1
+    assert (done.dims, done.name, done.attrs["units"]) == (("x", "y"), "height", "m")
+    assert done.x.attrs["units"] == "m"
+    assert done["filled"].dtype == bool
+    assert done["filled"].dims == ("x", "y")
+    done.to_netcdf()  # attributes that can be written
+
+
+@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
+def test_step__does_not_care_for_the_order_of_dimensions_or_the_unit(step):
+    h = rough(missing=0.02)
+    xr.testing.assert_allclose(step(h.transpose("y", "x")), step(h), atol=1e-18)
+
+
+@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
+@pytest.mark.parametrize(
+    ("wrong", "fragment"),
+    [
+        (np.zeros((5, 5)), "ndarray"),
+        (xr.DataArray(np.zeros((5, 5)), dims=("a", "b")), "('a', 'b')"),
+        (xr.DataArray(np.zeros((5, 5)), dims=("x", "y")), "no coordinate"),
+        (rough().assign_coords(x=np.arange(45.0) ** 2), "uniform"),
+        (rough().isel(x=[3]), "1 point"),
+    ],
+)
+def test_step__refuses_what_is_no_grid(step, wrong, fragment):
+    with pytest.raises(InputError, match="expected") as refused:
+        step(wrong)
+    assert fragment in str(refused.value)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    order=st.integers(0, 3),
+    missing=st.floats(0, 0.6),
+    coefficients=st.lists(st.floats(-1, 1), min_size=10, max_size=10),
+    offset=st.sampled_from([0.0, 1e-2]),
+)
+def test_level__removes_any_polynomial_of_its_order(order, missing, coefficients, offset):
+    h = rough(missing=missing)
+    powers = [(i, j) for i in range(4) for j in range(4) if i + j <= order]
+    x, y = h.x / 1e-4, h.y / 1e-4
+    added = sum(c * x**i * y**j for c, (i, j) in zip(coefficients, powers, strict=False)) * 1e-5 + offset
+    np.testing.assert_allclose(level(h + added, order), level(h, order), atol=1e-13 if not offset else 1e-16 / 1e-3)
+    assert abs(float(level(h, order).mean())) < 1e-15
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_level__is_the_least_squares_solution(order):
+    h = rough(missing=0.3)
+    present = np.isfinite(h.values)
+    x, y = np.meshgrid(h.x / 1e-4, h.y / 1e-4, indexing="ij")
+    design = np.stack([(x**i * y**j)[present] for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
+    solution = np.linalg.lstsq(design, h.values[present], rcond=None)[0]
+    np.testing.assert_allclose(level(h, order).values[present], h.values[present] - design @ solution, atol=1e-17)
+
+
+def test_level__refuses_order_and_undetermined_polynomials():
+    with pytest.raises(InputError, match="order is 4"):
+        level(rough(), 4)
+    line = rough()
+    with pytest.raises(InputError, match="do not determine"):
+        level(line.where(line.x == line.x[3]))
+    with pytest.raises(InputError, match="all 1710 points are missing"):
+        level(line * np.nan)
+
+
+def test_mask_outliers__finds_spikes_and_nothing_else():
+    h = rough((61, 54), missing=0.05)
+    rng = np.random.default_rng(1)
+    at = rng.choice(h.size, 30, replace=False)
+    spiked = h.copy(deep=True)
+    spiked.values.flat[at] += rng.choice([-1, 1], 30) * 3e-5
+    done = mask_outliers(spiked)
+    hit = np.zeros(h.shape, bool)
+    hit.flat[at] = True
+    np.testing.assert_array_equal(np.isnan(done.values), np.isnan(h.values) | hit)
+    assert done.attrs["outliers"] == int((hit & np.isfinite(h.values)).sum())
+    assert mask_outliers(h).attrs["outliers"] == 0
+
+
+def test_mask_outliers__median_is_that_of_the_finite_points():
+    from roughvisc.topography.gaps import _local_median
+
+    values = rough((13, 11), missing=0.4).values
+    values[:6, :6] = np.nan
+    expected = np.full(values.shape, np.nan)
+    for i, j in np.ndindex(values.shape):
+        part = values[max(i - 2, 0) : i + 3, max(j - 2, 0) : j + 3]
+        if np.isfinite(part).any():
+            expected[i, j] = np.nanmedian(part)
+    np.testing.assert_array_equal(_local_median(values, 5), expected)
+
+
+def test_mask_outliers__keeps_a_flat_surface_and_a_step():
+    flat = from_array(np.full((21, 18), 0.1), CELL)
+    assert mask_outliers(flat).attrs["outliers"] == 0
+    step = flat + xr.where(flat.x > 2e-5, 1e-5, 0.0) + 1e-8 * rough((21, 18)).values / 1e-6
+    assert int(np.isnan(mask_outliers(step)).sum()) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "fragment"), [({"window": 4}, "window is 4"), ({"threshold": 0}, "threshold is 0")]
+)
+def test_mask_outliers__refuses(options, fragment):
+    with pytest.raises(InputError, match=fragment):
+        mask_outliers(rough(), **options)
+
+
+@pytest.mark.skipif(not SCANS.exists(), reason="the real scans are not here")
+def test_outliers_before_fill__avoid_the_rise_of_slope_on_a_real_scan():
+    h = level(open_scan(SCANS / "sur-2.sur"))
+    assert slope(fill(h)) > 1.04 * slope(h)  # the spikes beside the holes spread into them
+    masked = mask_outliers(h)
+    assert masked.attrs["outliers"] < 0.02 * h.size
+    assert slope(fill(masked)) < 1.01 * slope(masked)
+
+
+@pytest.mark.parametrize("method", ["harmonic", "nearest", "linear"])
+def test_fill__keeps_the_points_present_and_says_what_it_did(method):
+    h = rough(missing=0.1)
+    done = fill(h, method)
+    missing = np.isnan(h.values)
+    assert np.isfinite(done.values).all()
+    np.testing.assert_array_equal(done.values[~missing], h.values[~missing])
+    np.testing.assert_array_equal(done["filled"].values, missing)
+    assert (done.attrs["filled_points"], done.attrs["fill_method"]) == (missing.sum(), method)
+    assert np.nanmin(h) <= done.min() <= done.max() <= np.nanmax(h)
+    again = fill(done.where(done.x > 4e-6), method)
+    assert again.attrs["filled_points"] == int((missing | (h.x.values <= 4e-6)[:, None]).sum())
+
+
+def test_fill__harmonic_solves_laplace_and_linear_keeps_planes():
+    x, y = np.meshgrid(np.arange(31.0), np.arange(26.0), indexing="ij")
+    plane = from_array(1e-6 * (0.3 * x - 0.2 * y) + 7e-2, CELL)
+    hole = plane.where((abs(plane.x - 3e-5) > 9e-6) | (abs(plane.y - 3e-5) > 9e-6))
+    assert int(np.isnan(hole).sum()) > 30
+    for method in ("harmonic", "linear"):
+        np.testing.assert_allclose(fill(hole, method), plane, rtol=0, atol=1e-15)
+    curved = from_array(1e-6 * np.sin(0.3 * x) * np.cosh(0.25 * y), CELL).where(np.isfinite(hole))
+    done, holes = fill(curved).values, np.argwhere(np.isnan(curved.values))
+    for i, j in holes:
+        mean = (done[i - 1, j] + done[i + 1, j] + done[i, j - 1] + done[i, j + 1]) / 4
+        assert done[i, j] == pytest.approx(mean, rel=1e-9, abs=1e-15)
+
+
+def test_fill__nearest_measures_in_metres():
+    h = from_array(np.array([[1.0, 2.0, 3.0], [4.0, np.nan, 6.0], [7.0, 8.0, 9.0]]), (1.0, 3.0))
+    assert float(fill(h, "nearest")[1, 1]) in (2.0, 8.0)
+    h = from_array(h.values, (3.0, 1.0))
+    assert float(fill(h, "nearest")[1, 1]) in (4.0, 6.0)
+
+
+def test_fill__refuses():
+    with pytest.raises(InputError, match="absent"):
+        fill(flat_punch(2e-5, 1e-4, 21))
+    with pytest.raises(InputError, match=r"method is 'magic'.*'harmonic'"):
+        fill(rough(), "magic")
+    with pytest.raises(InputError, match="all 1710 points are missing"):
+        fill(rough() * np.nan)
+
+
+@settings(max_examples=40, deadline=None)
+@given(old=st.tuples(st.integers(2, 30), st.integers(2, 30)), share=st.tuples(st.floats(0.1, 1), st.floats(0.1, 1)))
+def test_resample__coarsening_conserves_the_volume(old, share):
+    new = tuple(max(2, int(n * s)) for n, s in zip(old, share, strict=True))
+    h = from_array(np.random.default_rng(0).random(old), CELL)
+    coarse = resample(h, new)
+    assert coarse.shape == new
+    assert float(coarse.mean()) == pytest.approx(float(h.mean()), rel=1e-12)
+    for axis, d, n, m in zip(("x", "y"), CELL, old, new, strict=True):
+        np.testing.assert_allclose(coarse[axis], (np.arange(m) + 0.5) * n * d / m, rtol=1e-12)
+    assert coarse.min() >= h.min() - 1e-12
+
+
+def test_resample__averages_whole_cells_and_leaves_out_missing_ones():
+    values = np.arange(24.0).reshape(6, 4)
+    values[0, 0] = values[2, 2] = values[3, 2] = values[2, 3] = np.nan
+    coarse = resample(from_array(values, CELL), (3, 2))
+    assert float(coarse[0, 0]) == pytest.approx((1 + 4 + 5) / 3)
+    assert np.isnan(coarse[1, 1])  # three of four are missing
+    assert float(coarse[2, 1]) == pytest.approx((18 + 19 + 22 + 23) / 4)
+    assert float(resample(from_array(values, CELL), (4, 2))[3, 0]) == pytest.approx((0.5 * 16.5 + 20.5) / 1.5)
+
+
+def test_resample__finer_is_linear_between_centres_and_keeps_identity():
+    h = rough((9, 8))
+    np.testing.assert_allclose(resample(h, h.shape), h, rtol=1e-14)
+    fine = resample(h, (27, 24))
+    np.testing.assert_allclose(fine.isel(x=slice(1, None, 3), y=slice(1, None, 3)), h, rtol=1e-12, atol=1e-20)
+    np.testing.assert_allclose(fine[2, 1], (2 * h[0, 0] + h[1, 0]) / 3, rtol=1e-12)
+    marked = resample(fill(h.where(h.x > 3e-6)), (5, 8))
+    np.testing.assert_array_equal(marked["filled"].any("y"), [True, True, False, False, False])
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0, 4.0])
+def test_gaussian_filter__transmission_is_half_at_the_cutoff(periodic, axis, ratio):
+    cutoff, cells = 2.4e-5, {"x": (240, 7), "y": (7, 160)}[axis]
+    flat = from_array(np.zeros(cells), CELL)
+    wave = flat + 1e-6 * np.cos(2 * np.pi * flat[axis] / (ratio * cutoff)) + 0.05
+    passed = gaussian_filter(wave, cutoff, periodic=periodic) - 0.05
+    # away from the border, where the weights are cut
+    middle = passed.isel({axis: slice(50, -50)})
+    expected = 0.5 ** (1 / ratio**2) * (wave - 0.05).isel({axis: slice(50, -50)})
+    np.testing.assert_allclose(middle, expected, rtol=0, atol=1e-13)
+
+
+def test_gaussian_filter__short_is_the_rest_and_missing_points_weigh_nothing():
+    h = rough(missing=0.1)
+    long, short = (gaussian_filter(h, 2e-5, keep) for keep in ("long", "short"))
+    np.testing.assert_allclose(long + short, h, rtol=1e-12)
+    np.testing.assert_array_equal(np.isnan(long), np.isnan(h))
+    assert float(long.std()) < float(h.std())
+    constant = gaussian_filter(h * 0 + 0.3, 2e-5)
+    np.testing.assert_allclose(constant.values[np.isfinite(h)], 0.3, rtol=1e-14)
+
+
+def test_gaussian_filter__equals_the_sum_that_the_standard_writes():
+    h = rough((17, 14), missing=0.2)
+    alpha, cutoff = np.sqrt(np.log(2) / np.pi), 1.5e-5
+    present = np.isfinite(h.values)
+    x, y = np.meshgrid(h.x, h.y, indexing="ij")
+    i, j = 5, 2
+    assert present[i, j]
+    weight = np.exp(-np.pi * ((x - x[i, j]) ** 2 + (y - y[i, j]) ** 2) / (alpha * cutoff) ** 2)[present]
+    expected = (weight * h.values[present]).sum() / weight.sum()
+    assert float(gaussian_filter(h, cutoff)[i, j]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_gaussian_filter__refuses():
+    with pytest.raises(InputError, match=r"cutoff is 8e-06.*three cells, 9e-06"):
+        gaussian_filter(rough(), 8e-6)
+    with pytest.raises(InputError, match="keep is 'both'"):
+        gaussian_filter(rough(), 2e-5, keep="both")
+
+
+def test_crop__keeps_the_coordinates_and_refuses_to_keep_nothing():
+    h = rough()
+    part = crop(h, x=(1e-5, 2e-5), y=(0, 4e-5))
+    xr.testing.assert_equal(part, h.sel(x=slice(1e-5, 2e-5), y=slice(0, 4e-5)))
+    assert part.shape == (5, 13)
+    with pytest.raises(InputError, match="two cells"):
+        crop(h, x=(1.0, 2.0))
+    with pytest.raises(InputError, match="pair"):
+        crop(h, y=3e-5)
+
+
+def test_rotate90__turns_counter_clockwise():
+    h = sphere(1e-4, (6e-5, 3e-5), (15, 10))
+    h = h + 1e-7 * xr.where((h.x > 5e-5) & (h.y < 1e-5), 1.0, 0.0)  # a mark at lower right
+    once = rotate90(h)
+    assert once.shape == (10, 15)
+    np.testing.assert_allclose(spacing(once), spacing(h)[::-1], rtol=1e-14)
+    # what was at (x, y) from the centre is at (-y, x)
+    x, y = 2.6e-5, -1.2e-5
+    was = h.sel(x=3e-5 + x, y=1.5e-5 + y, method="nearest")
+    now = once.sel(x=1.5e-5 - y, y=3e-5 + x, method="nearest")
+    assert float(was) == float(now)
+    np.testing.assert_array_equal(rotate90(rotate90(h, 3)), h)
+    np.testing.assert_array_equal(rotate90(h, -1), rotate90(h, 3))
+    with pytest.raises(InputError, match=r"turns is 0\.5"):
+        rotate90(h, 0.5)
+
+
+def test_combine__adds_the_faces_and_refuses_unequal_grids():
+    a, b = rough(missing=0.05), rough(missing=0.05, seed=1)
+    both = combine(a, b)
+    np.testing.assert_array_equal(both, a.values + b.values)
+    np.testing.assert_array_equal(combine(a, b, flip="y"), a.values + b.values[:, ::-1])
+    np.testing.assert_allclose(combine(a, invert(a)).fillna(0), 0, atol=1e-20)
+    for other in (b.isel(x=slice(1, None)), b.assign_coords(x=b.x * 1.001), b.assign_coords(y=b.y + 1e-6)):
+        with pytest.raises(InputError, match="one grid"):
+            combine(a, other)
+    with pytest.raises(InputError, match="flip is 'z'"):
+        combine(a, b, flip="z")
+
+
+def test_taper__makes_the_border_repeat_and_leaves_the_middle():
+    h = level(rough()) + 1e-4 * (rough().x + rough().y) + 2e-6
+    done = taper(h, (2e-5, 3e-5))
+    inside = (h.x > 2e-5) & (h.x < 7e-5) & (h.y > 3e-5) & (h.y < 8.4e-5)
+    np.testing.assert_allclose(done.where(inside, 0), h.where(inside, 0), rtol=1e-12)
+    step = abs(done[0] - done[-1]).max()
+    assert float(step) < 0.02 * float(abs(h[0] - h[-1]).max())
+    with pytest.raises(InputError, match="half a side"):
+        taper(h, 5e-5)
+
+
+def test_mirror__repeats_without_a_step():
+    h = rough((8, 5))
+    doubled = mirror(h)
+    assert doubled.shape == (16, 10)
+    np.testing.assert_array_equal(doubled[:8, :5], h)
+    np.testing.assert_array_equal(doubled, doubled[::-1, ::-1])
+    np.testing.assert_array_equal(doubled[0], doubled[-1])
+    np.testing.assert_allclose(np.diff(doubled.x), CELL[0], rtol=1e-9)
+
+
+def test_conditioning__is_the_same_in_nanometres():
+    h = rough(missing=0.05)
+    small = (h * 1e-3).assign_coords(x=h.x * 1e-3, y=h.y * 1e-3)
+    done, tiny = (taper(gaussian_filter(fill(mask_outliers(level(g, 2))), c), c) for g, c in ((h, 2e-5), (small, 2e-8)))
+    np.testing.assert_allclose(tiny * 1e3, done.values, rtol=1e-9, atol=1e-16)
+
+
+def test_filled__goes_with_its_points_through_later_steps():
+    h = rough((20, 16), missing=0.1)
+    done = fill(h)
+    x, y = slice(3e-6, 2.5e-5), slice(0, 3e-5)
+    part = crop(done, x=(x.start, x.stop), y=(y.start, y.stop))
+    np.testing.assert_array_equal(part["filled"], np.isnan(h.sel(x=x, y=y)))
+    np.testing.assert_array_equal(rotate90(done)["filled"], np.isnan(np.rot90(h.values)))
+    doubled = mirror(done)
+    np.testing.assert_array_equal(doubled["filled"], np.isnan(mirror(h)))
+    coarse = resample(done, (10, 8))
+    np.testing.assert_array_equal(coarse["filled"], np.isnan(h.values).reshape(10, 2, 8, 2).any(axis=(1, 3)))
+    for step in (part, doubled, coarse, rotate90(done), level(done), taper(done, 1e-5), gaussian_filter(done, 2e-5)):
+        assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
+        assert step.attrs["fill_method"] == "harmonic"
+
+
+def test_filled__of_either_face_stays_in_the_combination():
+    a, b = rough((20, 16), missing=0.1), rough((20, 16), missing=0.1, seed=1)
+    both = combine(fill(a), fill(b, "nearest"), flip="x")
+    np.testing.assert_array_equal(both["filled"], np.isnan(a.values) | np.isnan(b.values)[::-1])
+    assert both.attrs["filled_points"] == int(both["filled"].sum())
+    assert both.attrs["fill_method"] == "harmonic, nearest"
+    np.testing.assert_array_equal(combine(a.fillna(0), fill(b))["filled"], np.isnan(b))
+    assert "filled" not in combine(a, b).coords
+
+
+def test_level__cubic_takes_off_what_quadratic_leaves():
+    h = rough((60, 50))
+    bent = h + 1e-5 * (h.x / 1e-4) ** 3 - 3e-5 * (h.x / 1e-4) * (h.y / 1e-4) ** 2
+    np.testing.assert_allclose(level(bent, 3), level(h, 3), atol=1e-13)
+    assert float((level(bent, 2) - level(h, 2)).std()) > 2e-7
+
+
+@pytest.mark.parametrize("keep", ["long", "short"])
+def test_gaussian_filter__both_filters_pass_half_at_the_cutoff(keep):
+    """S- and L-filter of one nesting index are complements: both let half of the amplitude pass there."""
+    flat = from_array(np.zeros((240, 7)), CELL)
+    wave = flat + 1e-6 * np.cos(2 * np.pi * flat.x / 2.4e-5)
+    passed = gaussian_filter(wave, 2.4e-5, keep, periodic=True)
+    np.testing.assert_allclose(passed, 0.5 * wave, atol=1e-16)

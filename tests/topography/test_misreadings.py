@@ -1,0 +1,218 @@
+"""What goes wrong with scan files in practice, where no real file is at hand to show it."""
+
+import importlib.util
+import random
+import re
+import resource
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+import xarray as xr
+from scan_files import CELL, SHAPE, damaged, refusal, survive, tilted, write_sdf, write_text, write_x3p
+
+from roughvisc.errors import InputError
+from roughvisc.topography.backend import RoughviscBackend
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.readers import from_array, list_channels, open_scan
+
+
+def write_xyz(path, heights=None, shuffled=True):
+    """Points in any order, one a line, y fastest or not: x and y in the file decide."""
+    z = tilted(missing=False) if heights is None else heights
+    lines = [f"{i * 2e-6:.6e} {j * 3e-6:.6e} {z[i, j]:.9e}" for i, j in np.ndindex(z.shape)]
+    if shuffled:
+        random.Random(3).shuffle(lines)
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def rewritten(source, target, pattern, replacement):
+    """An X3P archive whose main.xml is changed."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "main.xml":
+                changed = re.sub(pattern, replacement, content, count=1, flags=re.DOTALL)
+                assert changed != content
+                content = changed
+            new.writestr(name, content)
+    return target
+
+
+# -- channels, units, sizes --------------------------------------------------------------------------------------------
+
+
+def test_no_channel__is_said(tmp_path):
+    xr.Dataset({"a": 3.0, "trace": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "scan.nc")
+    assert "no areal height (channels none)" in refusal(tmp_path / "scan.nc")
+    assert list_channels(tmp_path / "scan.nc") == ()
+
+
+def test_several_heights__the_chosen_one_is_named_and_the_others_listed(tmp_path):
+    h = from_array(tilted(), CELL)
+    channels = {"forward": h, "z": 2 * h, "phase": h.assign_attrs(units="degree")}
+    xr.Dataset({name: c.assign_attrs({"units": "m", **c.attrs}) for name, c in channels.items()}).to_netcdf(
+        tmp_path / "scan.nc"
+    )
+    found = open_scan(tmp_path / "scan.nc")
+    assert (found.attrs["channel"], found.attrs["other_channels"]) == ("z", "forward, phase")
+    assert "channel 'z'" in found.attrs["history"]
+    assert [(c.name, c.is_height) for c in list_channels(tmp_path / "scan.nc")] == [
+        ("z", True),
+        ("forward", True),
+        ("phase", False),
+    ]
+    np.testing.assert_array_equal(open_scan(tmp_path / "scan.nc", channel="forward"), tilted())
+    message = refusal(tmp_path / "scan.nc", channel="phase")
+    assert "no areal height" in message
+    assert "'z'" in message
+    assert "channel is 'backward': expected one of 0: 'z'" in refusal(tmp_path / "scan.nc", channel="backward")
+
+
+def test_points__are_placed_by_their_coordinates_in_any_order(tmp_path):
+    assert "unit=" in refusal(write_xyz(tmp_path / "scan.xyz"))
+    for shuffled in (False, True):
+        h = open_scan(write_xyz(tmp_path / "scan.xyz", shuffled=shuffled), unit="m")
+        np.testing.assert_allclose(h, tilted(missing=False), rtol=1e-8)
+        np.testing.assert_allclose(spacing(h), CELL, rtol=1e-6)
+
+
+def test_spacing__is_size_over_number(tmp_path):
+    """A text matrix of 13 x 9 points that states 26 um x 27 um: 2 um and 3 um, not 26/12 and 27/8."""
+    np.testing.assert_allclose(spacing(open_scan(write_text(tmp_path / "scan.txt"))), CELL, rtol=1e-12)
+
+
+def test_axes__on_no_regular_grid_are_refused(tmp_path):
+    good = write_x3p(tmp_path / "good.x3p")
+    bad = rewritten(good, tmp_path / "bad.x3p", rb"(<CX>.*?<AxisType>)I", rb"\1A")
+    with pytest.raises(InputError, match=r"bad\.x3p"):
+        open_scan(bad)
+    lines = write_xyz(tmp_path / "scan.xyz", shuffled=False).read_text().replace("2.400000e-05", "3.000000e-05")
+    (tmp_path / "scan.xyz").write_text(lines)
+    refusal(tmp_path / "scan.xyz", unit="m")
+
+
+@pytest.mark.parametrize("width", [2.0, 1e3])
+@pytest.mark.parametrize("kind", ["x3p", "sdf", "nc"])
+def test_too_wide__is_refused_and_spacing_mends_it(kind, width, tmp_path):
+    path, cell = tmp_path / f"scan.{kind}", width / 13
+    if kind == "nc":
+        from_array(tilted(), (cell, 1e-6)).to_netcdf(path)
+    else:
+        library = pytest.importorskip(f"{kind}io")
+        library.write(path, tilted().T, x_scale=cell, y_scale=1e-6)
+    message = refusal(path)
+    assert f"{width:g} m wide along x" in message
+    assert "spacing=" in message
+    with pytest.raises(InputError, match="not plausible"):
+        xr.open_dataarray(path, engine=RoughviscBackend)  # before anything is read
+    np.testing.assert_allclose(spacing(open_scan(path, spacing=CELL)), CELL)
+
+
+@pytest.mark.parametrize("width", [0.15, 0.99])
+def test_wide__but_plausible_is_read(width, tmp_path):
+    from_array(tilted(), width / 13).to_netcdf(tmp_path / "scan.nc")
+    assert open_scan(tmp_path / "scan.nc").shape == SHAPE
+
+
+def test_profile__in_a_grid_file_is_refused(tmp_path):
+    h = from_array(tilted(), CELL)
+    h.isel(y=[0]).to_netcdf(tmp_path / "scan.nc")
+    refusal(tmp_path / "scan.nc")
+    h.isel(y=0).to_netcdf(tmp_path / "line.nc")
+    assert "no areal height" in refusal(tmp_path / "line.nc")
+
+
+# -- damage ------------------------------------------------------------------------------------------------------------
+
+
+def write_nc4(path):
+    from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", encoding={"height": {"zlib": True}})
+    return path
+
+
+WRITTEN = {"nc": write_nc4, "h5": write_nc4, "xyz": write_xyz, "csv": write_xyz, "asc": write_text, "dat": write_text}
+
+
+@pytest.mark.parametrize("suffix", WRITTEN)
+def test_damage__of_further_kinds(suffix, tmp_path):
+    path = WRITTEN[suffix](tmp_path / f"scan.{suffix}")
+    survive(path, path.read_bytes(), **({"unit": "m"} if WRITTEN[suffix] is write_xyz else {}))
+
+
+@pytest.mark.parametrize("kind", ["x3p", "sdf", "nc", "xyz"])
+def test_damage__gives_our_errors_from_channels_and_engine_too(kind, tmp_path):
+    path = {"x3p": write_x3p, "sdf": write_sdf, "nc": write_nc4, "xyz": write_xyz}[kind](tmp_path / f"scan.{kind}")
+    options = {"unit": "m"} if kind == "xyz" else {}
+    complaints = []
+    for version in damaged(path.read_bytes(), random.Random(2)):
+        path.write_bytes(version)
+        for attempt in (
+            lambda: list_channels(path),
+            lambda: xr.open_dataarray(path, engine=RoughviscBackend, cache=False, **options).values,
+        ):
+            try:
+                attempt()
+            except (InputError, UserWarning) as complaint:  # a warning is an error here
+                complaints.append(complaint)
+    assert any(isinstance(c, InputError) for c in complaints)
+    for complaint in complaints:
+        assert path.name in str(complaint)
+        assert isinstance(complaint, InputError) or "checksum" in str(complaint)
+
+
+def forged_x3p(tmp_path):
+    return rewritten(write_x3p(tmp_path / "good.x3p"), tmp_path / "forged.x3p", rb"<SizeY>9<", rb"<SizeY>900000000<")
+
+
+def forged_sdf(tmp_path):
+    sdfio = pytest.importorskip("sdfio")
+    path = write_sdf(tmp_path / "forged.sdf", format=sdfio.FileFormat.ASCII)
+    content = path.read_bytes()
+    changed = re.sub(
+        rb"(NumPoints\s*=\s*)13", rb"\g<1>60000", re.sub(rb"(NumProfiles\s*=\s*)9", rb"\g<1>60000", content)
+    )
+    assert changed != content
+    path.write_bytes(changed)
+    return path
+
+
+def forged_nc(tmp_path):
+    """A variable of which nothing was written: a file of 10 kB that claims 80 GB."""
+    netcdf4 = pytest.importorskip("netCDF4")
+    with netcdf4.Dataset(tmp_path / "forged.nc", "w") as file:
+        for axis in "xy":
+            file.createDimension(axis, 100_000)
+        variable = file.createVariable("height", "f8", ("x", "y"), chunksizes=(1000, 1000), zlib=True)
+        variable.units = "m"
+    return tmp_path / "forged.nc"
+
+
+@pytest.mark.parametrize("forge", [forged_x3p, forged_sdf, forged_nc])
+def test_forged_header__allocates_nothing(forge, tmp_path):
+    path = forge(tmp_path)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    refusal(path, **({"spacing": CELL} if forge is forged_nc else {}))
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    assert grown * (1 if sys.platform == "darwin" else 1024) < 3e8
+
+
+# -- Zarr --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(importlib.util.find_spec("zarr") is not None, reason="zarr is installed")
+def test_zarr__absent_says_what_to_install(tmp_path):
+    (tmp_path / "scan.zarr").mkdir()
+    (tmp_path / "scan.zarr" / "zarr.json").write_text("{}")
+    message = refusal(tmp_path / "scan.zarr")
+    assert "package zarr" in message
+    assert "netCDF" in message
+
+
+def test_zarr__grid_is_read(tmp_path):
+    pytest.importorskip("zarr")
+    h = from_array(tilted(), CELL)
+    h.to_dataset().to_zarr(tmp_path / "scan.zarr")
+    xr.testing.assert_equal(open_scan(tmp_path / "scan.zarr"), h)

@@ -1,0 +1,534 @@
+"""Figures by their artists: what is drawn, in which units, and that no label covers another."""
+
+import itertools
+import sys
+
+import matplotlib
+import numpy as np
+import pytest
+import sample_results as made
+import xarray as xr
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from PIL import Image
+from support import labels, lines, text_boxes
+
+from roughvisc.errors import InputError
+from roughvisc.views import plot
+from roughvisc.views.figures import animate as animation
+from roughvisc.views.figures import axes, sections, surfaces
+
+SAMPLES = {
+    "creep": made.hertz_creep,
+    "rough": made.rough_creep,
+    "cycle": lambda: made.hertz_cycle(500, (17, 12), 10),
+    "one frame": made.one_frame,
+    "open": made.open_contact,
+    "24 decades": lambda: made.hertz_creep((15, 12), times=np.r_[0, np.geomspace(1e-12, 1e12, 25)]),
+    "two frames": lambda: made.rough_creep(frames=2),
+    "strip": lambda: made.rough_creep((150, 21)).assign_coords(y=(np.arange(21) + 0.5) * 8e-6),
+    "pillar": lambda: made.rough_creep((21, 150)).assign_coords(x=(np.arange(21) + 0.5) * 8e-6),
+}
+
+
+def first_picture(dataset):
+    """The figure of an animation, as its first picture."""
+    figure, pictures = animation._moving(dataset, None, 3)
+    next(pictures)
+    return figure
+
+
+FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()}
+FIGURES |= {"area_against_load": plot.area_against_load, "animate": first_picture}
+
+
+#: figures whose layout depends on the proportions of the map
+OF_THE_PLANE = ("maps", "section", "surface", "animate")
+DRAWN = [(name, sample) for name in FIGURES for sample in SAMPLES]
+DRAWN = [(name, sample) for name, sample in DRAWN if name in OF_THE_PLANE or sample not in ("strip", "pillar")]
+
+
+@pytest.mark.parametrize(("name", "sample"), DRAWN)
+def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
+    figure = FIGURES[name](SAMPLES[sample]())
+    assert isinstance(figure, Figure)
+    boxes = text_boxes(figure)
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not a.overlaps(b), f"{one!r} covers {other!r}"
+    page = figure.bbox.padded(2)
+    for text, box in boxes:
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        assert inside, f"{text!r} runs off the figure"
+    for label in labels(figure):
+        bare = label in ("Rel. error", "Per kept time", "Contact clusters", "Clusters at least as large")
+        assert bare or label.endswith("]"), label
+
+
+def test_figures__leave_no_global_state():
+    before = dict(matplotlib.rcParams)
+    plot.history(made.hertz_creep())
+    plot.maps(made.one_frame())
+    assert dict(matplotlib.rcParams) == before
+    if "matplotlib.pyplot" in sys.modules:
+        assert sys.modules["matplotlib.pyplot"].get_fignums() == []
+
+
+@pytest.mark.parametrize("draw", [plot.history, plot.maps, plot.section, plot.hysteresis, plot.distributions])
+def test_figures__refuse_many_cases_and_other_things(draw):
+    with pytest.raises(InputError, match=r"ds\.isel\(case=0\)"):
+        draw(xr.concat([made.one_frame()] * 2, dim="case"))
+    with pytest.raises(InputError, match="found list"):
+        draw([1.0])
+    with pytest.raises(InputError, match="no time at all"):
+        draw(made.one_frame().isel(time=slice(0)))
+
+
+# ------------------------------------------------------------------------------------------------- units, times
+
+
+@pytest.mark.parametrize(
+    ("values", "si", "text"),
+    [
+        ([3e-9], "m", "3 nm"),
+        ([-2e-6, 1e-9], "m", "2 µm"),
+        ([0.9999999], "N", "1 N"),
+        ([999.0], "N", "999 N"),
+        ([4e5], "N/m", "400 kN/m"),
+        ([0.05e-6], "m2", "0.05 mm²"),
+        ([2e-12], "m2", "2 µm²"),
+        ([7200.0], "s", "2 h"),
+        ([3000.0], "s", "3000 s"),
+        ([3 * 86400.0], "s", "3 d"),
+        ([2e-5], "J", "20 µJ"),
+        ([0.0, np.nan], "Pa", "0 Pa"),
+        ([0.25], "1", "0.25"),
+    ],
+)
+def test_unit_for__reads_well(values, si, text):
+    assert axes.unit_for(values, si).text(np.nanmax(np.abs(values))) == text
+
+
+def test_time_axis__chosen_by_the_data():
+    assert not axes.TimeAxis.of(np.linspace(0, 5, 500)).logarithmic
+    assert axes.TimeAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
+    assert axes.TimeAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
+    assert not axes.TimeAxis.of([0.0]).logarithmic
+    assert axes.TimeAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
+
+
+def test_spread_frames__first_and_last_and_even():
+    times = np.r_[0, np.geomspace(1e-3, 1e3, 499)]
+    frames = axes.spread_frames(times, 4)
+    assert frames[[0, -1]].tolist() == [0, 499]
+    assert len(frames) == 4
+    assert np.all(np.abs(np.diff(frames) - 500 / 3) < 20)
+    assert axes.spread_frames(np.linspace(0, 1, 501), 3).tolist() == [0, 250, 500]
+    assert axes.spread_frames([3.0], 4).tolist() == [0]
+    assert axes.spread_frames([1.0, 2.0], 1).tolist() == [1]
+
+
+def test_telling_frames__show_contact_and_its_largest_extent():
+    time = np.linspace(0.0, 1.0, 21)
+    area = np.where((time > 0.1) & (time < 0.8), 1.0, 0.0)
+    area[13] = 2.0
+    area[-1] = 1e-4
+    ds = xr.Dataset({"contact_area": ("time", area)}, {"time": time})
+    frames = axes.telling_frames(ds, 4)
+    assert frames == [3, 7, 13, 15]
+    assert axes.fullest_frame(ds) == 13
+    assert axes.telling_frames(0 * ds, 3) == [0, 10, 20]
+    assert axes.telling_frames(ds.drop_vars("contact_area"), 3) == [0, 10, 20]
+    assert axes.fullest_frame(ds.drop_vars("contact_area")) == axes.fullest_frame(0 * ds) == 20
+
+
+def test_frame_at__nearest_time_or_counted_from_the_end():
+    times = [0.0, 1.0, 10.0]
+    assert [axes.frame_at(times, t) for t in (0, 0.6, 5.4, 5.6, 99, -1, -3)] == [0, 1, 1, 2, 2, 2, 0]
+    for wrong in (-4, -0.5, np.nan):
+        with pytest.raises(InputError, match="expected a"):
+            axes.frame_at(times, wrong)
+
+
+# ---------------------------------------------------------------------------------------------------- histories
+
+
+def test_history__data_and_units():
+    ds = made.hertz_creep()
+    force, approach, area, gap, work, cost, accuracy = plot.history(ds).axes
+    assert [ax.get_ylabel() for ax in (force, approach, area, gap, work, cost)] == [
+        "Force [mN]",
+        "Approach [µm]",
+        "Contact area [mm²]",
+        "Mean gap [µm]",
+        "Work [µJ]",
+        "Per kept time",
+    ]
+    np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
+    np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
+    for name in ("stored", "dissipated"):
+        np.testing.assert_allclose(lines(work)[name].get_ydata(), 1e6 * ds[f"{name}_energy"])
+    for name in ("convolutions", "iterations"):
+        np.testing.assert_allclose(lines(cost)[name].get_ydata(), ds[name])
+    assert accuracy.get_xlabel() == "Time [s]"
+    assert accuracy.get_xscale() == "symlog"
+    np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
+    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
+    assert list(lines(accuracy)) == ["stated", "time steps", "contact solver (estimate)", "tolerance"]
+    np.testing.assert_allclose(lines(accuracy)["stated"].get_ydata(), ds["stated_error"])
+    np.testing.assert_allclose(lines(accuracy)["contact solver (estimate)"].get_ydata(), ds["residual"])
+    np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
+    np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
+
+
+def test_history__fraction_on_the_right_agrees():
+    ds = made.hertz_creep()
+    figure = plot.history(ds)
+    figure.draw_without_rendering()
+    area = figure.axes[2]
+    right = area.child_axes[0]
+    ratio = right.get_ylim()[1] / area.get_ylim()[1]
+    np.testing.assert_allclose(ratio * 1e6 * ds["contact_area"], 100 * ds["contact_fraction"], rtol=1e-9)
+
+
+def test_history__steps_that_did_not_converge_are_crossed_out():
+    ds = made.rough_creep()
+    force = plot.history(ds).axes[0]
+    np.testing.assert_allclose(lines(force)["not converged"].get_xdata(), ds["time"][3])
+    assert "not converged" not in lines(plot.history(made.hertz_creep()).axes[0])
+
+
+def test_history__of_what_is_there():
+    ds = made.hertz_creep()[["force", "approach", "height"]].assign(time_error=("time", np.full(30, np.nan)))
+    ds.attrs = {}
+    figure = plot.history(ds)
+    assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]", "Rel. error"]
+    assert [text.get_text() for text in figure.axes[-1].texts] == ["no accuracy recorded"]
+    lowest = [ax.get_ylabel() for ax in plot.history(made.hertz_creep().drop_vars("force")).axes if ax.get_xlabel()]
+    assert lowest == ["Work [µJ]", "Per kept time", "Rel. error"], "the lowest panel of each column, and the one below"
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot.history(ds[["height", "time_error"]])
+
+
+def test_hysteresis__loop_and_work():
+    ds = made.hertz_cycle(200)
+    (ax,) = plot.hysteresis(ds).axes
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), 1e6 * ds["approach"])
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), ds["force"])
+    work = np.trapezoid(ds["force"], ds["approach"])
+    assert f"{1e6 * work:.3g} µJ" in ax.lines[2].get_label()
+    assert len(ax.texts) == 5  # arrows
+
+
+def test_area_against_load__one_line_a_case_and_the_low_load_line():
+    ds = made.rough_creep(absent=False)
+    ds["force"] = ("time", np.geomspace(0.01, 10, 12))
+    figure = plot.area_against_load({"soft": ds, "hard": 2 * ds}, contact_modulus={"glassy": 4e6})
+    (ax,) = figure.axes
+    assert {"soft", "hard", "low loads, glassy"} <= set(lines(ax))
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    np.testing.assert_allclose(lines(ax)["hard"].get_ydata(), 2e6 * ds["contact_area"])
+    x, y = lines(ax)["low loads, glassy"].get_data()
+    dx, dy = (float(ds[name][1] - ds[name][0]) for name in "xy")
+    slope = np.sqrt((ds["height"].diff("x") ** 2).mean() / dx**2 + (ds["height"].diff("y") ** 2).mean() / dy**2)
+    np.testing.assert_allclose(1e-6 * y, np.sqrt(2 * np.pi) * x / (4e6 * float(slope)))
+
+
+def test_area_against_load__cases_in_many_shapes():
+    one = made.hertz_cycle(30)
+    stacked = xr.concat([one, one], dim=xr.Variable("case", ["a", "b"]))
+    assert {"a", "b"} <= set(lines(plot.area_against_load(stacked).axes[0]))
+    assert {"Sphere in cycles", "Sphere in cycles (2)"} <= set(lines(plot.area_against_load([one, one]).axes[0]))
+    hundred = plot.area_against_load([one] * 100)
+    assert len(hundred.axes[0].lines) == 100
+    assert not hundred.legends
+    with pytest.raises(InputError, match="no result given"):
+        plot.area_against_load([])
+    with pytest.raises(InputError, match="found int"):
+        plot.area_against_load(3)
+
+
+# ------------------------------------------------------------------------------------------------------- fields
+
+
+def images(figure):
+    return [image for ax in figure.axes for image in ax.images]
+
+
+def test_maps__data_scale_and_absent_cells():
+    ds = made.rough_creep()
+    figure = plot.maps(ds, times=[0.0, 1.0, -1])
+    shown = images(figure)
+    assert [image.get_gid() for image in shown] == ["pressure"] * 3 + ["gap"] * 3
+    frames = [0, 4, 11]
+    for image, frame in zip(shown[:3], frames, strict=True):
+        expected = 1e-6 * ds["pressure"].isel(time=frame).where(ds["height"].notnull()).T
+        np.testing.assert_allclose(image.get_array().filled(np.nan), expected)
+    for image, frame in zip(shown[3:], frames, strict=True):
+        np.testing.assert_allclose(image.get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
+        assert image.get_clim() == (0.0, pytest.approx(1e6 * float(ds["gap"].max())))
+    absent = ds["height"].isnull().values.T
+    for image in shown:
+        assert np.array_equal(np.ma.getmaskarray(image.get_array()), absent)
+        assert tuple(image.get_cmap().get_bad()) == to_rgba(axes.ABSENT)
+        assert image.axes.get_aspect() == 1.0
+        np.testing.assert_allclose(image.get_extent(), [0, 1.2, 0, 0.9])
+    assert len({image.get_clim() for image in shown[:3]}) == 1
+    assert [ax.get_title() for ax in figure.axes[:3]] == ["t = 10 ms", "t = 1.52 s", "t = 2.78 h"]
+    assert "Pressure [MPa]" in labels(figure)
+    assert "Gap [µm]" in labels(figure)
+
+
+def test_maps__outline_encloses_the_contact():
+    ds = made.hertz_creep()
+    (ax,) = (ax for ax in plot.maps(ds, times=-1, fields="pressure").axes if ax.images)
+    (outline,) = (artist for artist in ax.collections if artist.get_gid() == "contact outline")
+    points = np.concatenate([path.vertices for path in outline.get_paths()])
+    distance = np.hypot(points[:, 0] - 1.0, points[:, 1] - 0.75)
+    radius = np.sqrt(float(ds["approach"][-1]) * 10e-3) * 1e3
+    assert np.all(np.abs(distance - radius) < 0.06)
+
+
+@pytest.mark.parametrize("touching", [0.0, 1.0])
+def test_maps__no_outline_around_nothing_or_everything(touching):
+    ds = made.one_frame()
+    ds["pressure"][:] = touching
+    assert not any(ax.collections for ax in plot.maps(ds).axes if ax.images)
+
+
+def test_maps__load_only_the_frames_drawn():
+    seen = []
+
+    def watch(block, block_info=None):
+        seen.append(block_info[0]["chunk-location"][0])
+        return block
+
+    ds = made.hertz_creep().chunk(time=1)
+    gap = ds["gap"].data.map_blocks(watch, dtype=float, meta=np.empty((0, 0, 0)))
+    with_watch = ds.assign(gap=(("time", "x", "y"), gap))
+    plot.maps(with_watch, times=[-1], fields=["gap"])
+    assert set(seen) <= {29}
+
+
+def test_maps__choices():
+    ds = made.hertz_creep()
+    assert len(images(plot.maps(ds))) == 8
+    assert len(images(plot.maps(ds, times=ds["time"].values[:6], fields="gap"))) == 6
+    assert len(images(plot.maps(ds.drop_vars("pressure")))) == 4
+    assert images(plot.maps(ds, times=5.0, fields=["displacement"]))[0].get_gid() == "displacement"
+    with pytest.raises(InputError, match="30 times to map"):
+        plot.maps(ds, times=ds["time"].values)
+    with pytest.raises(InputError, match="field 'stress' is unknown"):
+        plot.maps(ds, fields=["stress"])
+    with pytest.raises(InputError, match="holds no 'pressure'"):
+        plot.maps(ds.drop_vars(["pressure", "gap", "displacement"]))
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_section__surfaces_touch_where_pressure_is(axis):
+    ds = made.hertz_creep()
+    figure = plot.section(ds, axis=axis)
+    top, bottom = figure.axes
+    profile, surface, contact = bottom.lines[:3]
+    index = {"x": {"y": 21}, "y": {"x": 30}}[axis]
+    last = ds.isel(time=-1, **index)
+    np.testing.assert_allclose(profile.get_ydata(), 1e6 * last["height"])
+    np.testing.assert_allclose(surface.get_ydata(), 1e6 * (last["height"] + last["gap"]), atol=1e-9)
+    assert np.array_equal(np.isfinite(contact.get_ydata()), last["pressure"] > 0)
+    np.testing.assert_allclose(top.patches[0].get_data().values, 1e-3 * last["pressure"])
+    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pressure [kPa]", "Height [µm]")
+    assert bottom.get_xlabel() == f"{axis} [mm]"
+    level = lines(bottom)["undeformed"].get_ydata()[0]
+    assert level == pytest.approx(1e6 * float(ds["height"].max() - ds["approach"][-1]))
+
+
+def test_section__draws_the_undeformed_surface_below_an_apex_between_the_cells():
+    ds = made.hertz_creep()
+    ds["height"].attrs["highest"] = float(ds["height"].max()) + 2e-8
+    level = lines(plot.section(ds).axes[1])["undeformed"].get_ydata()[0]
+    assert level == pytest.approx(1e6 * float(ds["height"].max() + 2e-8 - ds["approach"][-1]))
+
+
+def test_section__states_its_exaggeration():
+    figure = plot.section(made.hertz_creep())
+    bottom = figure.axes[1]
+    (note,) = (text for text in bottom.texts if text.get_gid() == "exaggeration")
+    box, view = bottom.get_window_extent(), bottom.viewLim
+    ratio = box.height / (view.height * 1e-6) / (box.width / (view.width * 1e-3))
+    assert float(note.get_text().split("×")[1]) == pytest.approx(ratio, rel=0.05)
+
+
+def test_section__gap_and_displacement_give_the_same_surface():
+    ds = made.hertz_creep()
+    by_gap = sections.deformed_surface(ds.drop_vars("displacement"), 5)
+    for other in (ds, ds.drop_vars("gap")):
+        np.testing.assert_allclose(sections.deformed_surface(other, 5), by_gap, atol=1e-10)
+
+
+def test_section__goes_where_it_is_told():
+    ds = made.rough_creep()
+    figure = plot.section(ds, time=1.0, axis="y", at=0.31e-3)
+    assert figure.axes[0].get_title(loc="right") == "t = 1.52 s,  x = 0.306 mm"
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), 1e6 * ds["height"].isel(x=24))
+    with pytest.raises(InputError, match="axis is 'z'"):
+        plot.section(ds, axis="z")
+    with pytest.raises(InputError, match="no 'gap'"):
+        plot.section(ds.drop_vars("gap"))
+
+
+def test_section__of_a_flat_face_in_full_contact_has_the_scale_of_the_approach():
+    ds = made.one_frame()
+    ds["height"][:] = ds["gap"][:] = 0.0
+    ds["pressure"][:] = 1.0
+    ds = ds.drop_vars("displacement")
+    bottom = plot.section(ds).axes[1]
+    assert bottom.get_ylabel() == "Height [µm]"
+    assert lines(bottom)["undeformed"].get_ydata()[0] == pytest.approx(-1e6 * float(ds["approach"][0]))
+    bar = plot.maps(ds, fields="gap").axes[-1]
+    assert bar.get_yticks().tolist() == [0.0]
+
+
+def test_section__without_pressure_says_so():
+    top, _ = plot.section(made.hertz_creep().drop_vars("pressure")).axes
+    assert [text.get_text() for text in top.texts] == ["pressure was not kept"]
+
+
+# ----------------------------------------------------------------------------------- distributions and surfaces
+
+
+def test_distributions__every_curve_encloses_one():
+    figure = plot.distributions(made.rough_creep(), bins=30)
+    assert [ax.get_xlabel() for ax in figure.axes] == ["Pressure [MPa]", "Gap [µm]"]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["Density [1/MPa]", "Density [1/µm]"]
+    for ax in figure.axes:
+        assert len(ax.patches) == 5
+        for curve in ax.patches:
+            values, limits, _ = curve.get_data()
+            assert np.sum(values * np.diff(limits)) == pytest.approx(1.0)
+
+
+def test_contact_clusters__areas_add_up_to_the_contact_area():
+    ds = made.rough_creep()
+    count, area, sizes = plot.contact_clusters(ds, times=[-1]).axes
+    number, mean = count.lines[0].get_ydata(), lines(area)["mean"].get_ydata()
+    np.testing.assert_allclose(number * mean, 1e6 * ds["contact_area"], rtol=1e-9)
+    steps = sizes.lines[0]
+    assert steps.get_ydata()[-1] == number[-1]
+    assert np.sum(steps.get_xdata()) == pytest.approx(1e6 * float(ds["contact_area"][-1]))
+
+
+def test_surface__panels_and_missing_points():
+    h = made.rough_creep()["height"]
+    figure = plot.surface(h)
+    on_map, profile, heights, spectrum = figure.axes[:4]
+    np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * h.T)
+    assert figure.get_suptitle() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (grey)"
+    np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * h.isel(y=37))
+    assert lines(heights)["normal, Sq = 1.5 µm"]
+    assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
+    assert spectrum.get_ylabel() == "Power spectral density [µm⁴]"
+
+
+def test_surface__takes_a_result_and_refuses_what_is_no_surface():
+    ds = made.hertz_creep()
+    assert len(plot.surface(ds).axes) == len(plot.surface(ds["height"].T).axes) == 5
+    flat = plot.surface(0 * ds["height"].isel(x=slice(5), y=slice(4)))
+    assert [text.get_text() for ax in flat.axes for text in ax.texts] == ["flat: one height", "too small or too flat"]
+    with pytest.raises(InputError, match="all missing"):
+        plot.surface(np.nan * ds["height"])
+    with pytest.raises(InputError, match="dimensions x and y"):
+        plot.surface(ds["force"])
+    with pytest.raises(InputError, match="holds no 'height'"):
+        plot.surface(ds[["force"]])
+
+
+def test_radial_spectrum__of_noise_gives_back_its_variance():
+    shape, steps, deviation = (160, 121), (2e-6, 3e-6), 1e-7
+    values = deviation * np.random.default_rng(1).standard_normal(shape)
+    x, y = (step * (np.arange(n) + 0.5) for n, step in zip(shape, steps, strict=True))
+    _, density = surfaces.radial_spectrum(xr.DataArray(values, {"x": x, "y": y}))
+    # white noise: C = variance * cell area, alike at every wavevector
+    np.testing.assert_allclose(np.mean(density) / (deviation**2 * steps[0] * steps[1]), 1.0, rtol=0.03)
+
+
+# --------------------------------------------------------------------------------------------- files, animation
+
+
+def test_save_figures__writes_what_the_result_allows(tmp_path):
+    ds = made.hertz_creep(shape=(21, 16))
+    written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)
+    assert [path.name for path in written] == [f"sphere-{name}.png" for name in plot.FIGURES]
+    assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == sorted(path.name for path in written)
+    for path in written:
+        with Image.open(path) as picture:
+            assert picture.format == "PNG"
+    few = plot.save_figures(ds[["force", "approach"]].isel(time=[3]), tmp_path, "few", suffix=".pdf")
+    assert [path.name for path in few] == ["few-history.pdf"]
+    with pytest.raises(InputError, match="allows no figure"):
+        plot.save_figures(ds[["residual"]], tmp_path, "none")
+
+
+@pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame, made.open_contact])
+def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
+    ds = make()
+    path = plot.animate(ds, tmp_path / "contact.gif", frames=3, dpi=40)
+    assert list(tmp_path.iterdir()) == [path]
+    with Image.open(path) as picture:
+        assert getattr(picture, "n_frames", 1) == min(3, ds.sizes["time"])
+
+
+def test_animate__map_section_and_history_move_together():
+    ds = made.rough_creep()
+    figure, pictures = animation._moving(ds, "gap", 4)
+    on_map, section, force, approach, area = (ax for ax in figure.axes if ax.get_label() != "<colorbar>")
+    assert [ax.get_ylabel() for ax in (force, approach, area)] == ["Force [N]", "Approach [µm]", "Contact area [mm²]"]
+    seen = []
+    for frame in pictures:
+        seen.append(frame)
+        np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
+        assert figure.get_suptitle() == axes.time_text(float(ds["time"][frame]))
+        assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
+        assert len(approach.lines[1].get_xdata()) == frame + 1
+        index = int(ds["pressure"][-1].sum("x").argmax("y"))
+        surface = (ds["height"] + ds["gap"].isel(time=frame)).isel(y=index)
+        np.testing.assert_allclose(section.lines[1].get_ydata(), 1e6 * surface)
+    assert seen == [0, 4, 7, 11]
+
+
+def test_animate__without_histories_or_heights(tmp_path):
+    bare = made.rough_creep()[["pressure"]]
+    figure, pictures = animation._moving(bare, None, 2)
+    assert list(pictures) == [0, 11]
+    assert len(figure.axes) == 3
+    assert figure.axes[1].texts[0].get_text() == "no height or gap kept: no section"
+
+
+def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):
+    ds = made.one_frame()
+    with pytest.raises(InputError, match=r"ends in \.gif"):
+        plot.animate(ds, tmp_path / "contact.txt")
+    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    with pytest.raises(InputError, match="ffmpeg was not found"):
+        plot.animate(ds, tmp_path / "contact.mp4")
+    with pytest.raises(InputError, match="field is 'height'"):
+        plot.animate(ds, tmp_path / "contact.gif", field="height")
+    with pytest.raises(InputError, match="positive"):
+        plot.animate(ds, tmp_path / "contact.gif", frames=0)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not animation.FFMpegWriter.isAvailable(), reason="ffmpeg is not installed")
+def test_animate__mp4(tmp_path):
+    path = plot.animate(made.hertz_creep(), tmp_path / "contact.mp4", frames=3, dpi=40)
+    assert path.read_bytes()[4:8] == b"ftyp"
+
+
+def test_stability_map__hatches_what_was_refused_and_frames_what_is_beyond():
+    error = xr.DataArray([[1e-5, np.nan], [1e-2, np.inf]], dims=("time", "ratio"), name="error")
+    found = error.assign_coords(time=[1e-3, 1e3], ratio=[1.0, 10.0]).to_dataset()
+    figure = plot.stability_map(found, expected=1e-3)
+    axes = figure.axes[0]
+    assert len(axes.lines) == 2, "one error beyond what is expected, one that is no number"
+    assert sum(bool(c.get_hatch()) for c in axes.collections) == 1
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["refused, with a reason", "beyond 0.001"]
+    with pytest.raises(InputError, match="expected errors over two parameters"):
+        plot.stability_map(found.isel(time=0))

@@ -1,0 +1,345 @@
+"""Figures of sweeps by their artists: what lies where, on which scale, and that any number of cases stays legible."""
+
+import itertools
+
+import numpy as np
+import pytest
+import sample_results as made
+import xarray as xr
+from matplotlib.collections import QuadMesh
+from support import labels, lines, text_boxes
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.views import plot
+from roughvisc.views.sweep_figures.cases import cases_of
+from roughvisc.views.sweep_figures.colouring import even_in_log
+from roughvisc.views.sweep_figures.files import results_of, sweep_figures
+
+MATERIALS = [
+    '{"model": "elastic", "shear_modulus": 1e6}',
+    '{"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5}',
+]
+LOADS = [0.01, 0.02, 0.04]
+DECADES = np.geomspace(1e-4, 1.0, 9).tolist()
+VISCOSITIES = [1e3, 1e4, 1e5, 1e6]
+
+
+def product(**values):
+    """Every combination, as ``__`` for the dots of keys."""
+    rows = list(itertools.product(*values.values()))
+    return {key.replace("__", "."): [row[i] for row in rows] for i, key in enumerate(values)}
+
+
+def stacked(parameters, area=lambda values: 1e-6):
+    """A sweep as ``open_results`` gives it, with a contact area [m2] that grows in time to the one given."""
+    times = np.array([0.0, 0.1, 1.0, 10.0])
+    rows = [dict(zip(parameters, row, strict=True)) for row in zip(*parameters.values(), strict=True)]
+    last = np.array([area(row) for row in rows])
+    data = {
+        "contact_area": (("case", "time"), last[:, None] * np.array([0.25, 0.5, 0.75, 1.0])),
+        "force": (("case", "time"), np.ones((len(rows), 4))),
+        "status": (("case", "time"), np.zeros((len(rows), 4), dtype="int8")),
+    }
+    on_case = {key: ("case", np.array(values)) for key, values in parameters.items()}
+    ds = xr.Dataset(data, {"time": times, "case_key": ("case", [f"{i:016x}" for i in range(len(rows))]), **on_case})
+    return ds.assign(contact_area=ds.contact_area.assign_attrs(units="m2", long_name="real contact area"))
+
+
+def by_load(values):
+    return 1e-6 * values["program.0.load"] ** 0.9
+
+
+SWEEPS = {
+    "loads": product(program__0__load=LOADS),
+    "decades": product(program__0__load=DECADES),
+    "hundred": product(program__0__load=np.geomspace(1e-3, 1, 100).tolist()),
+    "two": product(program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES),
+    "grid": product(program__0__load=DECADES, material__kelvin_viscosity=VISCOSITIES),
+    "materials": product(program__0__load=LOADS, material=MATERIALS),
+    "files": product(surface__file=[f"scans/steel_{i}.x3p" for i in range(12)]),
+    "three": product(surface__seed=[1, 2, 3], program__0__load=LOADS, surface__hurst=[0.6, 0.8]),
+}
+DRAWN = {
+    "lines": lambda ds: plot.sweep(ds, kind="lines"),
+    "panels": lambda ds: plot.sweep(ds, times=[0.1, -1], kind="lines"),
+    "histories": plot.histories_of_cases,
+}
+
+
+@pytest.mark.parametrize("draw", DRAWN)
+@pytest.mark.parametrize("name", SWEEPS)
+def test_every_figure__has_labels_that_do_not_overlap(name, draw):
+    figure = DRAWN[draw](stacked(SWEEPS[name], lambda values: 1e-6 * (2 + len(str(values)) % 3)))
+    boxes = text_boxes(figure)
+    page = figure.bbox.padded(2)
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not a.overlaps(b), f"{one!r} covers {other!r}"
+    for text, box in boxes:
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        assert inside, f"{text!r} runs off the figure"
+    for label in labels(figure):
+        assert label == "File" or label.endswith("]"), label
+
+
+def test_sweep__of_one_parameter_has_a_line_for_each_time():
+    ds = stacked(product(program__0__load=[0.04, 0.01, 0.02]), by_load)
+    (ax,) = plot.sweep(ds, times=[1.2, -1]).axes
+    assert ax.get_xlabel() == "Load [mN]"
+    assert ax.get_ylabel() == "Contact area [mm²]"
+    assert set(lines(ax)) == {"t = 1 s", "t = 10 s"}
+    for label, share in (("t = 1 s", 0.75), ("t = 10 s", 1.0)):
+        x, y = lines(ax)[label].get_data()
+        np.testing.assert_allclose(x, [10, 20, 40])
+        np.testing.assert_allclose(y, share * np.array(LOADS) ** 0.9)
+    assert ax.get_xscale() == ax.get_yscale() == "linear"
+    assert len(plot.sweep(ds).axes[0].lines) == 4, "all four times by default"
+
+
+def test_sweep__has_logarithmic_axes_where_values_span_decades():
+    (ax,) = plot.sweep(stacked(SWEEPS["decades"], by_load)).axes
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    (ax,) = plot.sweep(stacked(product(program__0__load=[-1.0, 1.0, 1000.0]))).axes
+    assert ax.get_xscale() == "linear"
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([1, 10, 100], True), ([1, 2, 3, 20], True), ([1, 34, 67, 100], False), ([0, 10, 100], False), ([1, 9], False)],
+)
+def test_even_in_log__of_values(values, expected):
+    assert even_in_log(values) is expected
+
+
+def test_sweep__of_two_parameters_is_a_map():
+    ds = stacked(SWEEPS["grid"], lambda v: by_load(v) * v["material.kelvin_viscosity"])
+    figure = plot.sweep(ds.isel(case=slice(1, None)))
+    ax = figure.axes[0]
+    (mesh,) = (artist for artist in ax.collections if isinstance(artist, QuadMesh))
+    cells = mesh.get_array().reshape(4, 9)
+    expected = (
+        ds.set_index(case=list(SWEEPS["grid"])).unstack().contact_area.isel(time=-1).transpose(..., "program.0.load")
+    )
+    unit = 1e-6 if "mm²" in figure.axes[-1].get_ylabel() else 1.0
+    assert np.ma.getmaskarray(cells).sum() == 1, "the case that was left out"
+    np.testing.assert_allclose(cells.filled(np.nan).ravel()[1:], expected.values.ravel()[1:] / unit)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Load [mN]", "Kelvin viscosity [kPa s]")
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    corners = mesh.get_coordinates()
+    shown = 1e3 * np.array(DECADES)
+    assert np.all((corners[0, :-1, 0] < shown) & (corners[0, 1:, 0] > shown))
+    turned = plot.sweep(ds, along=["material.kelvin_viscosity", "program.0.load"]).axes[0]
+    assert turned.get_xlabel() == "Kelvin viscosity [kPa s]"
+
+
+def test_sweep__of_two_parameters_as_a_family_of_lines():
+    ds = stacked(SWEEPS["two"], lambda v: by_load(v) * np.log10(v["material.kelvin_viscosity"]))
+    figure = plot.sweep(ds, along="program.0.load", times=[0.1, -1])
+    assert [ax.get_title(loc="right") for ax in figure.axes] == ["t = 100 ms", "t = 10 s"]
+    (legend,) = figure.legends
+    named = [text.get_text() for text in legend.get_texts()]
+    assert named == ["1 kPa s", "10 kPa s", "100 kPa s", "1000 kPa s"]
+    for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
+        assert len(ax.lines) == 4
+        for line, power in zip(ax.lines, (3, 4, 5, 6), strict=True):
+            np.testing.assert_allclose(line.get_ydata(), share * power * np.array(LOADS) ** 0.9)
+
+
+def test_sweep__many_lines_have_a_colour_bar_instead_of_a_legend():
+    ds = stacked(product(program__0__load=LOADS, material__viscosity=np.geomspace(1e3, 1e6, 12).tolist()), by_load)
+    figure = plot.sweep(ds, kind="lines", along="program.0.load")
+    assert not figure.legends
+    assert figure.axes[-1].get_ylabel() == "Viscosity [kPa s]"
+    assert len({line.get_color() for line in figure.axes[0].lines}) == 12
+
+
+def test_sweep__categories_are_named_by_what_tells_them_apart():
+    figure = plot.sweep(stacked(SWEEPS["materials"], by_load))
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [name.split(",")[0] for name in named] == ["elastic", "zener"]
+    assert "shear modulus 3 MPa" in named[1]
+    (ax,) = plot.sweep(stacked(SWEEPS["files"])).axes
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == [f"steel_{i}.x3p" for i in range(12)]
+    assert {line.get_linestyle() for line in ax.lines} == {"None"}, "points of categories are not joined"
+    figure = plot.sweep(stacked(SWEEPS["three"], by_load))
+    assert figure.axes[0].get_xlabel() == "Load [mN]", "seeds are no numbers"
+    assert figure.legends[0].get_texts()[1].get_text() == "Seed 1, Hurst 0.8"
+
+
+def test_sweep__crosses_out_what_did_not_converge():
+    ds = stacked(SWEEPS["loads"], by_load)
+    ds["status"][1, -1] = 1
+    (ax,) = plot.sweep(ds, times=-1).axes
+    np.testing.assert_allclose(lines(ax)["not converged"].get_xdata(), [20])
+
+
+def test_sweep__what_follows_from_another_parameter_takes_no_axis():
+    ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
+    assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
+    assert plot.sweep(ds).axes[0].get_xlabel() == "Load [mN]"
+
+
+def test_sweep__over_many_decades_has_the_unit_of_their_middle():
+    holds = product(program__1__hold=np.geomspace(1e-12, 1e12, 9).tolist(), material__compliances=["[1e-8]", "[1e-6]"])
+    first, second = cases_of(stacked(holds)).parameters
+    assert first.label == "Hold [s]"
+    assert second.numeric, "lists of one number are numbers"
+    assert second.levels.tolist() == [1e-8, 1e-6]
+    ax = plot.sweep(stacked(holds, lambda v: v["program.1.hold"] ** 0.25)).axes[0]
+    assert ax.get_xscale() == ax.get_yscale() == "log"
+    assert ax.get_ylabel() == "Contact area [m²]"
+
+
+def test_sweep__parameters_of_one_name_are_told_apart():
+    ds = stacked(product(program__0__load=LOADS, program__1__load=[1.0, 2.0]))
+    assert [one.label for one in cases_of(ds).parameters] == ["Load (program.0) [mN]", "Load (program.1) [N]"]
+
+
+def test_sweep__refuses_what_cannot_be_drawn():
+    ds = stacked(SWEEPS["loads"])
+    for options, words in (
+        ({"quantity": "pressure"}, "expected a history of every case: contact_area, force, status"),
+        ({"along": "surface.seed"}, "'surface.seed' was not varied"),
+        ({"kind": "pie"}, "expected 'auto', 'lines' or 'map'"),
+        ({"kind": "map"}, "a map needs two parameters"),
+        ({"times": range(9)}, "choose 1 to 6"),
+    ):
+        with pytest.raises(InputError, match=words):
+            plot.sweep(ds, **options)
+    for wrong in (ds.isel(case=0), made.one_frame(), [ds], 3):
+        with pytest.raises(InputError, match=r"expected what rv\.open_results"):
+            plot.sweep(wrong)
+    with pytest.raises(InputError, match="found one case"):
+        plot.sweep(ds.isel(case=[0]))
+    with pytest.raises(InputError, match="nothing varies"):
+        plot.sweep(ds.isel(case=[0, 0]))
+    with pytest.raises(InputError, match="several cases lie in one cell"):
+        plot.sweep(stacked(SWEEPS["three"]), kind="map")
+
+
+# ------------------------------------------------------------------------------------------ histories of all cases
+
+
+def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
+    ds = stacked(product(program__0__load=[0.01, 0.02]), by_load)
+    figure = plot.histories_of_cases(ds)
+    (ax,) = figure.axes
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN"]
+    for line, load in zip(ax.lines, (0.01, 0.02), strict=True):
+        np.testing.assert_allclose(line.get_ydata(), np.array([0.25, 0.5, 0.75, 1.0]) * load**0.9)
+    figure = plot.histories_of_cases(stacked(SWEEPS["hundred"], by_load))
+    assert len(figure.axes[0].lines) == 100
+    assert not figure.legends
+    assert figure.axes[1].get_yscale() == "log"
+    assert figure.axes[1].get_ylabel() == "Load [mN]"
+
+
+def test_histories_of_cases__a_second_parameter_has_line_styles():
+    ds = stacked(SWEEPS["materials"], by_load)
+    figure = plot.histories_of_cases(ds)
+    assert len(figure.legends[0].get_texts()) == 5
+    styles = [line.get_linestyle() for line in figure.axes[0].lines]
+    assert styles == ["-", "--"] * 3
+    by_material = plot.histories_of_cases(ds, by="material")
+    assert len({line.get_color() for line in by_material.axes[0].lines}) == 2
+
+
+def test_histories_of_cases__that_nothing_tells_apart_are_numbered():
+    figure = plot.histories_of_cases(stacked(SWEEPS["loads"]).drop_vars("program.0.load"))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["1", "2", "3"]
+
+
+# ------------------------------------------------------------------------------------------------- from a folder
+
+STUDY = """
+title = "Bumps"
+[surface]
+generate = "wavy"
+amplitude = "1 um"
+wavelength = "50 um"
+size = "0.1 mm"
+shape = 16
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "1 mN"
+over = "50 ms"
+[[program]]
+hold = "0.2 s"
+[solve]
+boundary = "periodic"
+tolerance = 1e-2
+[keep]
+fields = []
+times = "all"
+[sweep]
+"program.0.load" = ["1 mN", "5 mN", "10 mN"]
+"program.1.hold" = ["0.1 s", "0.2 s"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a sweep, whose cases keep different times."""
+    out = tmp_path_factory.mktemp("sweep")
+    study = out / "bumps.toml"
+    study.write_text(STUDY)
+    for case in rv.read_cases(study):
+        run_case(case, out / "results")
+    return out / "results"
+
+
+def test_tree__of_cases_with_times_of_their_own(folder):
+    tree = results_of(folder)
+    assert isinstance(tree, xr.DataTree)
+    (ax, *_) = plot.sweep(tree, "approach", along="program.0.load").axes
+    assert ax.get_xlabel() == "Load [mN]"
+    assert ax.get_title(loc="right") == "at the end"
+    held = [node for node in tree.children.values() if float(node["program.1.hold"]) == 0.1]
+    held.sort(key=lambda node: float(node["program.0.load"]))
+    scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), [scale * float(node["approach"][-1]) for node in held])
+    assert len(plot.histories_of_cases(tree, "approach").axes[0].lines) == 6
+
+
+def test_files__of_a_folder(folder, tmp_path):
+    assert [name for name, _, _ in sweep_figures(results_of(folder))] == ["area", "approach", "histories"]
+    written = plot.save_sweep_figures(results_of(folder), tmp_path, dpi=40)
+    assert [path.name for path in written] == ["sweep-area.png", "sweep-approach.png", "sweep-histories.png"]
+    assert sorted(tmp_path.iterdir()) == sorted(written)
+    assert results_of(tmp_path) is None
+
+
+def test_command__draws_the_sweep_of_a_folder(folder, tmp_path):
+    from click.testing import CliRunner
+
+    from roughvisc.cli import main
+
+    done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path)])
+    assert done.exit_code == 0
+    assert done.output.count("sweep-") == 3
+    assert len(list(tmp_path.glob("*-history.png"))) == 6
+    assert (tmp_path / "sweep-area.png").stat().st_size > 5000
+
+
+def test_report__shows_the_sweep(folder, tmp_path):
+    page = rv.report(folder, tmp_path / "page.html").read_text()
+    assert "Contact area against what was varied" in page
+    assert "Approach against what was varied" in page
+
+
+def test_units__of_parameters_are_on_their_coordinates(folder):
+    node = next(iter(results_of(folder).children.values()))
+    assert (node["program.0.load"].attrs["units"], node["program.1.hold"].attrs["units"]) == ("N", "s")
+
+
+def test_unit_of__cycles_by_what_they_control():
+    case = {"program": [{"cycle": {}, "control": "load"}, {"cycle": {}, "control": "approach"}]}
+    assert [unit_of(f"program.{i}.cycle.mean", case) for i in range(3)] == ["N", "m", ""]
+    assert unit_of("program.0.cycle.period", case) == "s"
+    assert unit_of("surface.amplitude") == "m"

@@ -1,0 +1,148 @@
+"""Results in other tools: CSV, deformed surfaces, and files after the CF conventions."""
+
+import csv
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import sample_results as made
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.storage.store import write_result
+from roughvisc.variables import STATUS_MEANINGS
+
+#: Units as UDUNITS, which CF refers to, writes them.
+UDUNITS = {"1", "s", "m", "m2", "Pa", "N", "J"}
+CARD = Path(__file__).parents[2] / "surfaces" / "ground_steel.toml"
+SAMPLES = {"creep": made.hertz_creep, "rough": made.rough_creep, "open": made.open_contact, "one": made.one_frame}
+
+CHECKER = shutil.which("compliance-checker")
+
+
+@pytest.fixture(params=SAMPLES, scope="module")
+def file(request, tmp_path_factory):
+    return write_result(SAMPLES[request.param](), tmp_path_factory.mktemp("cf") / f"{request.param}.nc")
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """A result with every field, on a card's conditioned scan."""
+    scan = rv.resample(rv.open_scan(CARD), (32, 28))
+    rubber = rv.zener(3e6, 1e6, 1e5)
+    press = rv.Program().load(0.01, over=0.05).hold(0.2)
+    fields = ("pressure", "gap", "displacement")
+    options = {"boundary": "periodic", "tolerance": 1e-2, "times": 3, "fields": fields, "progress": False}
+    return rv.simulate(scan, rubber, press, **options)
+
+
+def test_csv__gives_every_history_back(computed, tmp_path):
+    path = rv.to_csv(computed, tmp_path / "there" / "histories.csv")
+    with open(path, newline="", encoding="utf-8") as stream:
+        heading, *rows = csv.reader(stream)
+    assert heading[0] == "time [s]"
+    assert {"force [N]", "approach [m]", "contact_area [m2]", "contact_fraction", "status"} <= set(heading)
+    columns = dict(zip((name.partition(" ")[0] for name in heading), zip(*rows, strict=True), strict=True))
+    assert set(columns) == {"time", *(n for n, v in computed.data_vars.items() if v.dims == ("time",))}
+    for name, texts in columns.items():
+        if name == "status":
+            assert [STATUS_MEANINGS.index(text) for text in texts] == computed.status.values.tolist()
+        else:
+            found = [float(text) if text else np.nan for text in texts]
+            np.testing.assert_array_equal(found, computed[name].values)
+
+
+def test_csv__is_refused_for_many_cases(computed, tmp_path):
+    with pytest.raises(InputError, match="choose one case"):
+        rv.to_csv(computed.expand_dims(case=2), tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("without", ["gap", "displacement", None])
+def test_deformed__rests_on_the_profile(computed, without):
+    dataset = computed.drop_vars(without) if without else computed
+    surface = rv.deformed(dataset)
+    touching = (computed.pressure[-1] > 0).values
+    above = (surface - computed.height).values
+    assert surface.dims == ("x", "y")
+    assert surface.attrs["units"] == "m"
+    assert np.abs(above[touching]).max() < 1e-2 * float(np.ptp(computed.height.values))
+    np.testing.assert_allclose(above, computed.gap[-1], atol=1e-2 * float(np.ptp(computed.height.values)))
+
+
+@pytest.mark.parametrize("suffix", [".x3p", ".sdf", ".nc"])
+def test_deformed__goes_to_the_instrument_and_back(computed, tmp_path, suffix):
+    surface = rv.deformed(computed, time=0.0)
+    rv.save_scan(surface, tmp_path / f"pressed{suffix}")
+    again = rv.open_scan(tmp_path / f"pressed{suffix}")
+    np.testing.assert_allclose(again.values, surface.values, rtol=1e-6, atol=1e-12)
+    assert np.diff(again.x).mean() == pytest.approx(np.diff(surface.x).mean())
+
+
+# ------------------------------------------------------------------------------------------- the CF conventions
+
+
+def test_cf__every_variable_says_what_it_is_in_known_units(file):
+    with netCDF4.Dataset(file) as found:
+        assert re.fullmatch(r"CF-1\.\d+", found.Conventions)
+        assert found.title
+        for name, variable in found.variables.items():
+            assert re.fullmatch(r"[A-Za-z]\w*", name)
+            assert variable.long_name
+            if "flag_values" in variable.ncattrs() or name == "filled":
+                continue
+            assert variable.units in UDUNITS
+
+
+def test_cf__coordinates_ascend_and_are_complete(file):
+    with netCDF4.Dataset(file) as found:
+        for name in ("time", "x", "y"):
+            values = found[name][:]
+            assert found[name].dimensions == (name,)
+            assert not np.ma.is_masked(values)
+            assert np.isfinite(values).all()
+            assert (np.diff(values) > 0).all()
+            assert "_FillValue" not in found[name].ncattrs()
+            assert "axis" not in found[name].ncattrs(), "ParaView would wrap the surface on a sphere"
+        assert all(
+            v.dimensions in (("time",), ("x",), ("y",), ("x", "y"), ("time", "x", "y"))
+            for v in found.variables.values()
+        )
+
+
+def test_cf__flags_have_values_and_meanings(file):
+    with netCDF4.Dataset(file) as found:
+        status = found["status"]
+        assert status.flag_values.dtype == status.dtype
+        assert len(status.flag_values) == len(status.flag_meanings.split())
+        assert set(status[:].tolist()) <= set(status.flag_values.tolist())
+
+
+def test_cf__no_attribute_is_of_a_kind_that_others_cannot_read(file):
+    with netCDF4.Dataset(file) as found:
+        holders = [found, *found.variables.values()]
+        for holder in holders:
+            for name in holder.ncattrs():
+                value = holder.getncattr(name)
+                assert isinstance(value, str | int | float | np.number | np.ndarray), name
+
+
+@pytest.mark.skipif(CHECKER is None, reason="needs compliance-checker")
+def test_cf__a_checker_finds_one_thing_alone(computed, tmp_path):
+    file = write_result(computed.assign_attrs(title="Ground steel"), tmp_path / "computed.nc")
+    done = subprocess.run([CHECKER, "-t", "cf:1.11", "-f", "json", str(file)], capture_output=True, text=True)
+    found = json.loads(done.stdout[done.stdout.index("{") :])["cf:1.11"]
+    said = {message for one in found["all_priorities"] for message in one["msgs"]}
+    assert len(found["all_priorities"]) > 10, "it has looked"
+    # with that name CF wants a date that times count from, and a program has none
+    assert said == {"Coordinate variable 'time' should have standard_name='time', found: 'None'"}
+
+
+def test_file__opens_in_xarray_without_a_complaint(file):
+    with xr.open_dataset(file, decode_timedelta=False) as found:
+        assert found.time.dtype == float
