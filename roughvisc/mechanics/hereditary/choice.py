@@ -39,7 +39,7 @@ class Engine:
     Attributes
     ----------
     memory : Modes or History
-        What the stepper marches with.
+        What a march keeps its past in.
     series_error : float
         Largest relative error of the compliance at time zero and from the shortest age on; zero where the memory is
         exact. Before that age it is less, relative to the compliance that has crept by then.

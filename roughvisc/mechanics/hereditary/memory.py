@@ -31,7 +31,7 @@ ActsOn = Literal["displacement", "pressure", "both"]
 
 
 class Memory(Protocol):
-    """What the stepper asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
+    """What a march asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
 
     @property
     def acts_on(self) -> ActsOn:

@@ -7,16 +7,37 @@ Energies are sums over the steps, whose error follows the second order closely: 
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
+from roughvisc.mechanics.hereditary.memory import Rule
+from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, with_cost
+from roughvisc.mechanics.stepping.control import rule_for
+from roughvisc.mechanics.stepping.domain import is_outgrown
+from roughvisc.mechanics.stepping.program import Segment
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial, Uncertainty
 
 Array = NDArray[np.float64]
 
+# The companion's contact is solved to so many times the tolerance of the march's.
+_SHARE = 2.5
+# Where steps double from one to the next, those of the companion grow fourfold.
+_GROWTH = 4.1
+_NO_FIELD = np.zeros((0, 0))
+#: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
+#: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
+STATED = 1.0
+#: The same of energies, from which a third of the difference is taken off; and of those of soft materials.
+_STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
+# Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
+# where a cell has entered within the companion's step.
+_ENTERED = 0.3
+# The companion's contact is solved to so many times the tolerance of the march's.
+_SHARE = 2.5
+# Where steps double from one to the next, those of the companion grow fourfold.
+_GROWTH = 4.1
 _NO_FIELD = np.zeros((0, 0))
 #: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
 #: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
@@ -111,8 +132,8 @@ def difference(
     )
 
 
-def sharpened(scene: Scene, before: State, state: State, ahead: float) -> float:
-    """Part of the tolerance's share that steps may use from here on, by what those so far have come to. [-]
+def sharpened(scene: Scene, before: State, state: State, ahead: float) -> State:
+    """State whose steps take from here on the part of the tolerance's share that what they have come to leaves them.
 
     Parameters
     ----------
@@ -124,15 +145,7 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float) -> float:
         What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
     """
     used, earlier = (_used(scene, one) / ahead for one in (state, before))
-    if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
-        wanted = max(_MOST_USED / used, 0.5)
-    elif used < _LEAST_USED:
-        wanted = 1.5
-    else:
-        return state.sharpness
-    # in steps of sqrt(2): what rounding does to small differences must not show in the length of steps
-    wanted = 2 ** (0.5 * round(2 * math.log2(wanted)))
-    return min(max(state.sharpness * wanted, _SHARPEST), _BLUNTEST)
+    return replace(state, pace=state.pace.sharpened(used, earlier))
 
 
 def _used(scene: Scene, state: State) -> float:
@@ -159,3 +172,51 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, displacement: Array) -
     if scene.present is not None:
         outside &= scene.present
     return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
+
+
+def caught_up(
+    scene: Scene, state: State, segment: Segment, together: Instant | None, rule: Rule | None = None
+) -> tuple[State, Trial] | None:
+    """State whose companion has come to the same instant by one step, and that step; None if it outgrew the grid.
+
+    ``together`` is the state's instant where the companion is, if it is known.
+    """
+    companion = state.companion
+    assert companion is not None
+    time = state.now.time
+    length = time - companion.now.time
+    value = segment.value(time - companion.began, companion.start)
+    rule = rule or rule_for(scene, companion, length, _GROWTH)
+    guess = beside(state.now, companion.now, together)
+    trial = attempt(scene, companion, segment.control, value, length, rule, _SHARE, guess)
+    trial = replace(trial, instant=replace(trial.instant, time=time))
+    if is_outgrown(scene, trial.instant):
+        return None
+    followed = committed(scene, companion, trial)
+    if companion.unresolved:
+        followed = restarted(scene, followed, 0.0)
+    return replace(with_cost(state, trial), companion=bare(followed), behind=0), trial
+
+
+def compared(
+    scene: Scene, step: Step, companion_trial: Trial, earlier: Array | None = None, asked: bool = True
+) -> Step:
+    """A step with what its companion says of it."""
+    companion = step.state.companion
+    assert companion is not None
+    return stating(step, difference(scene, step, companion, companion_trial.displacement, earlier, asked))
+
+
+def of_a_pair(waiting: Step, step: Step) -> Step:
+    """The first step of a pair, with what is stated of it by the second."""
+    companion = waiting.state.companion  # it waits where the pair began
+    if companion is None:
+        return waiting
+    first, second = waiting.shown.time - companion.now.time, step.shown.time - waiting.shown.time
+    part = first**3 / (first**3 + second**3)  # of what both add to the energies, which steps do by their cube
+    return replace(waiting, uncertainty=waiting.uncertainty.or_worse(step.uncertainty, part))
+
+
+def stating(step: Step, uncertainty: Uncertainty) -> Step:
+    """The step, with what is stated of it."""
+    return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty))

@@ -23,6 +23,12 @@ _STEPS_A_CYCLE = 16
 # The two-step rule is stable while steps grow by no more than 1 + sqrt(2) (E. Hairer, S. P. Norsett, G. Wanner, Solving
 # Ordinary Differential Equations I, section III.5).
 _GROWTH = 2.4
+# Compliance at the end of a step over its mean in it, less one, from which the damped rule is taken: pressure that is
+# linear in each step rings there (docs/theory.md, "Step lengths").
+_STIFF = 0.5
+# The next step errs by curvature h^2 / 6 by the linear rule, and by curvature h (h + last) / 3 by the damped one. It
+# aims at 0.7 of what is allowed: hence 0.7 times 6, and 0.7 times 12 in the quadratic equation for the damped rule.
+_LINEAR, _DAMPED = 4.2, 8.4
 # Steps double at most, or grow so many times where the estimate is below this part of what is allowed.
 _FASTEST, _EASY = 4.0, 0.02
 # What can be wrong by less than this part of the tolerance is not looked at.
@@ -61,7 +67,7 @@ def error_limit(scene: Scene, state: State, arrival: float) -> float:
 
 def _allowed(scene: Scene, state: State) -> float:
     """Estimated error that a step may make. [-]"""
-    return _SHARE * state.sharpness * scene.tolerance
+    return _SHARE * state.pace.sharpness * scene.tolerance
 
 
 def step_length(scene: Scene, state: State, segment: Segment, event: float, end: float) -> float:
@@ -69,7 +75,7 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
     distance = event - state.now.time
     if scene.time_step is not None:
         return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
-    length = state.suggestion or _first_length(scene, state, segment, event)
+    length = state.pace.suggestion or _first_length(scene, state, segment, event)
     length = max(length, shortest_step(scene, state, segment))
     if "bdf2" not in scene.memory.rules:
         length = min(length, _longest_linear(scene, distance))
@@ -91,7 +97,7 @@ def shortest_step(scene: Scene, state: State, segment: Segment) -> float:
 def _longest_linear(scene: Scene, distance: float) -> float:
     """Longest step in which pressure taken as linear does not ring. [s]"""
     length = distance
-    while scene.stiff_ratio(length) > 0.5 and length > 1e-9 * distance:
+    while scene.stiff_ratio(length) > _STIFF and length > 1e-9 * distance:
         length /= 2
     return length
 
@@ -125,7 +131,7 @@ def rule_for(scene: Scene, state: State, length: float, growth: float = _GROWTH)
         return "linear"
     if state.before is None:
         return "euler" if scene.is_soft(length) else "linear"
-    if scene.stiff_ratio(length) <= 0.5:
+    if scene.stiff_ratio(length) <= _STIFF:
         return "linear"
     # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
     return "bdf2" if length <= growth * (state.now.time - state.before.time) else "euler"
@@ -150,7 +156,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
     difference = float(np.sum(np.abs(trial.instant.pressure - state.extrapolated(trial.length))))
-    pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.blind else 0.0
+    pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.blind else 0.0
     ratio = trial.length / last
     if segment.control == "load":
         found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach
@@ -208,7 +214,7 @@ def suggestion(scene: Scene, trial: Trial, error: float, state: State) -> float:
     if math.isnan(error) or state.before is None:
         return trial.length
     most = 2.0
-    if error < _EASY * _allowed(scene, state) and scene.stiff_ratio(_FASTEST * trial.length) <= 0.5:
+    if error < _EASY * _allowed(scene, state) and scene.stiff_ratio(_FASTEST * trial.length) <= _STIFF:
         most = _FASTEST
     if error == 0:
         return most * trial.length
@@ -216,7 +222,7 @@ def suggestion(scene: Scene, trial: Trial, error: float, state: State) -> float:
     constant = _error_constant(trial, last)
     curvature = error / (constant * trial.length * (trial.length + last))
     target = _allowed(scene, state) / curvature
-    length = min(math.sqrt(4.2 * target), most * trial.length, scene.program.duration)
-    if scene.stiff_ratio(length) > 0.5:
-        length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + 8.4 * target))
+    length = min(math.sqrt(_LINEAR * target), most * trial.length, scene.program.duration)
+    if scene.stiff_ratio(length) > _STIFF:
+        length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + _DAMPED * target))
     return max(min(length, most * trial.length), 0.2 * trial.length)

@@ -16,6 +16,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
+from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.program import Control, Program
 
 Array = NDArray[np.float64]
@@ -222,8 +223,6 @@ class State:
         Index of the segment of the program.
     began, start : float
         Time at which the segment began [s], and the value of what it controls then [N or m].
-    suggestion : float
-        Length of the next step; zero after an event. [s]
     largest_force, largest_approach : float
         So far. [N], [m]
     contact_since : float
@@ -238,14 +237,10 @@ class State:
         Accepted steps since the companion was last at the present instant.
     uncertainty : Uncertainty
         As of then.
-    sharpness : float
-        Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
-    blind : bool
-        Whether the next estimate leaves the pressure out, once.
-    rejected_error : float
-        Estimate of the last attempt at this step, if it was rejected.
+    pace : Pace
+        How long the next step should be.
     iterations, convolutions : int
         Spent so far, rejected steps included.
     """
@@ -257,7 +252,6 @@ class State:
     segment: int = 0
     began: float = 0.0
     start: float = 0.0
-    suggestion: float = 0.0
     largest_force: float = 0.0
     largest_approach: float = 0.0
     contact_since: float = 0.0
@@ -266,10 +260,8 @@ class State:
     companion: State | None = None
     behind: int = 0
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
-    sharpness: float = 1.0
     unresolved: bool = False
-    blind: bool = False
-    rejected_error: float = math.inf
+    pace: Pace = field(default_factory=Pace)
     iterations: int = 0
     convolutions: int = 0
 

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.materials.models import Prony
-from roughvisc.mechanics.stepping.march import at_edge, edge_error, next_event, work_between
+from roughvisc.mechanics.stepping.attempt import work_between
+from roughvisc.mechanics.stepping.domain import at_edge, edge_error
+from roughvisc.mechanics.stepping.events import next_event
 from roughvisc.mechanics.stepping.scene import UNKNOWN, Instant, Scene, State, Step
 
 Array = NDArray[np.float64]

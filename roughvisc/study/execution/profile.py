@@ -14,7 +14,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.window import Reach
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.memory import Modes
-from roughvisc.mechanics.stepping import march as stepper
+from roughvisc.mechanics.stepping import attempt
 from roughvisc.study.execution import run
 from roughvisc.study.simulation import rows, simulate
 from roughvisc.study.statement.case import Case
@@ -27,7 +27,7 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
         *((HalfSpace, name) for name in ("displacement", "rough_displacement", "approximate_inverse")),
         (Reach, "spread"),
     ),
-    "vector work of the solver": ((stepper, "solve_contact"),),
+    "vector work of the solver": ((attempt, "solve_contact"),),
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
     "surface and kernels": ((Case, "height"), (simulate, "prepare"), (HalfSpace, "__init__"), (Reach, "__init__")),
     "kept rows": ((rows.Rows, "add"), (RowFile, "append")),

@@ -1,4 +1,4 @@
-"""From labels to arrays: a surface, a material and a program become the scene that the stepper marches through."""
+"""From labels to arrays: a surface, a material and a program become the scene of a march."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """How far a run has come, in a file: from it the run goes on, and ends with the same numbers to the last bit.
 
-A checkpoint is one record of everything in the stepper's state, all floats exact. Two files take turns, each written
+A checkpoint is one record of everything in the state of a march, all floats exact. Two files take turns, each written
 whole under another name first, so that one whole checkpoint outlives whatever happens to the other.
 """
 
@@ -21,6 +21,7 @@ from roughvisc.mechanics.halfspace.transforms import transform_engine
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.memory import ModesState
 from roughvisc.mechanics.stepping.energy import Energy
+from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State, Step, Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
@@ -30,7 +31,7 @@ log = logging.getLogger("roughvisc")
 
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
-_TYPES = {kind.__name__: kind for kind in (State, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
+_TYPES = {kind.__name__: kind for kind in (State, Pace, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Reached:
     Attributes
     ----------
     state : State or None
-        The stepper's; None at the start.
+        Of the march; None at the start.
     converged : bool
         Whether all steps since the last kept row are.
     rows, growths : int

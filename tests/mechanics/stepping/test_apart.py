@@ -13,7 +13,7 @@ import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.memory import Modes
 from roughvisc.mechanics.stepping import apart
-from roughvisc.mechanics.stepping import march as stepper
+from roughvisc.mechanics.stepping import march as marching
 from roughvisc.mechanics.stepping.apart import _first_crossing, closing_time
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -114,8 +114,8 @@ def test_recovery__overtakes_an_approach(end):
 def test_what_never_touches__is_seen_at_a_glance(monkeypatch):
     """A hundred thousand cycles: no look at each of them where no one of them can reach the surface."""
     calls = []
-    counted = stepper._touched
-    monkeypatch.setattr(stepper, "_touched", lambda *given: calls.append(1) or counted(*given))
+    counted = marching._touched
+    monkeypatch.setattr(marching, "_touched", lambda *given: calls.append(1) or counted(*given))
     outside = rv.Program.cycle(-2.0, 1.0, 1.0, 1e5, control="approach")
     steps = list(march(sphere(outside, times=(outside.duration,))))
     assert contacts(steps) == 0

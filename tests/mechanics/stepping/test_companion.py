@@ -8,7 +8,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.memory import Modes
-from roughvisc.mechanics.stepping import march as stepper
+from roughvisc.mechanics.stepping import attempt
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.rows import keeps_its_word, stated
@@ -75,7 +75,7 @@ def matrix():
     """Rows of all cases, and those of the same at a thirtieth of the tolerance; only the steps leave an error."""
     cases = {}
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(stepper, "_ALGEBRAIC", 1e-6)
+        patched.setattr(attempt, "_ALGEBRAIC", 1e-6)
         for name in ("maxwell", "two_branches"):
             for what, program in PROGRAMS.items():
                 for surface, scene in SURFACES.items():

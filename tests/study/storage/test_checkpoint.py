@@ -22,6 +22,7 @@ import roughvisc as rv
 from roughvisc.errors import InUseError
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.memory import ModesState
+from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run, run_case
@@ -201,7 +202,7 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     modes = ModesState(np.zeros((0, 2, 3)), strange, None, 1 / 3)
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
-        state = State(now, strange, memory, before=None, rejected_error=math.inf, blind=True, convolutions=2**40)
+        state = State(now, strange, memory, before=None, pace=Pace(0.1, 0.5, True), convolutions=2**40)
         reached = Reached(state, False, 3, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
         back = load_checkpoint(tmp_path / "c", "key")

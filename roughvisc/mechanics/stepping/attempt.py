@@ -1,0 +1,229 @@
+"""One step: the elastic contact problem that it is, the state after it, and what is shown of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.hereditary.memory import Modes, Rule
+from roughvisc.mechanics.stepping import energy
+from roughvisc.mechanics.stepping.program import Control
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial
+
+Array = NDArray[np.float64]
+
+# The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
+# as large in the median and 7 times as large in one of fifty (workflows/benchmarks/solver_error.py).
+_ALGEBRAIC = 0.03
+_DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure, in steps
+
+
+def rest(scene: Scene) -> State:
+    nothing = np.zeros(scene.halfspace.shape)
+    given = any(segment.control == "approach" for segment in scene.program.segments[:1])
+    now = Instant(0.0, nothing, 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
+    at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes) else None
+    return State(now, nothing, scene.memory.start(scene.halfspace.shape), energy=at_rest)
+
+
+def trial_at_rest(scene: Scene, state: State) -> Trial:
+    nothing = np.zeros(scene.halfspace.shape)
+    return Trial(state.now, nothing, None if scene.memory.acts_on == "displacement" else nothing, 0.0, "linear")
+
+
+def attempt(
+    scene: Scene,
+    state: State,
+    control: Control,
+    value: float,
+    length: float,
+    rule: Rule,
+    share: float = 1.0,
+    guess: tuple[Array, Array] | None = None,
+    stated: bool = False,
+) -> Trial:
+    """Contact state a step ahead, where the load or the approach has a given value.
+
+    ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought, and its displacement
+    at unit compliance, where such are known; ``stated`` asks for an estimate of the error that the solver leaves.
+    """
+    alpha, effective, carried = predicted(scene, state.memory, length, rule)
+    gap = scene.gap + carried
+    time = state.now.time + length
+    apart = value == 0 if control == "load" else value <= scene.lowest(gap)
+    if apart:
+        approach = scene.lowest(gap) if control == "load" else value
+        nothing = np.zeros_like(gap)
+        return Trial(Instant(time, nothing, 0.0, approach, nothing), carried, effective, length, rule, control)
+    if alpha <= 0:
+        raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
+    area = scene.halfspace.cell_area
+    start, start_displacement = (
+        state.first_guess(length, alpha) if guess is None else (guess[0] * alpha, guess[1] * alpha)
+    )
+    contact = solve_contact(
+        scene.halfspace,
+        gap,
+        load=value * alpha / area if control == "load" else None,
+        approach=value if control == "approach" else None,
+        tolerance=max(_ALGEBRAIC * scene.tolerance * share, 1e-14),
+        start=start,
+        start_displacement=start_displacement,
+        present=scene.present,
+        overwrite=True,
+        estimate_error=stated,
+    )
+    pressure, displacement = contact.pressure, contact.displacement
+    carried += displacement
+    if effective is not None:
+        effective += pressure
+    pressure /= alpha
+    displacement /= alpha
+    instant = Instant(
+        time,
+        pressure,
+        value if control == "load" else contact.load / alpha * area,
+        value if control == "approach" else contact.approach,
+        displacement,
+    )
+    return Trial(
+        instant,
+        carried,
+        effective,
+        length,
+        rule,
+        control,
+        contact.bound,
+        contact.error,
+        contact.converged,
+        contact.iterations,
+        contact.convolutions + (scene.memory.acts_on == "pressure"),
+    )
+
+
+def predicted(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
+    """``alpha`` of a step, and what is carried into it: the effective pressure, if known, and the displacement."""
+    alpha, carried = scene.memory.predict(memory, length, rule)
+    if scene.memory.acts_on == "displacement":
+        return alpha, None, carried
+    if scene.memory.acts_on == "both":
+        return alpha, carried[0], carried[1]
+    return alpha, carried, scene.halfspace.displacement(carried)
+
+
+def committed(scene: Scene, state: State, trial: Trial) -> State:
+    """State after an accepted trial."""
+    now = trial.instant
+    assert now.unit_displacement is not None
+    fields = {"pressure": now.pressure, "displacement": now.unit_displacement}
+    both = scene.memory.acts_on == "both"
+    field = np.stack(list(fields.values())) if both else fields[scene.memory.acts_on]
+    memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
+    if both:  # held once
+        now = replace(now, pressure=field[0], unit_displacement=field[1])
+    touching = now.force > 0
+    assert state.now.unit_displacement is not None
+    spent = energy_after(scene, state, trial)
+    if spent is None:
+        work = state.work + work_between(scene, state, now.pressure, trial.displacement, jumped=state.unresolved)
+    else:
+        work = spent.stored + spent.dissipated
+    return replace(
+        state,
+        now=now,
+        displacement=trial.displacement,
+        before=state.now if trial.length > 0 else None,
+        memory=memory,
+        largest_force=max(state.largest_force, now.force),
+        largest_approach=max(state.largest_approach, abs(now.approach)),
+        contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
+        work=work,
+        energy=spent,
+        unresolved=False,
+        pace=state.pace.seeing(),
+    )
+
+
+def energy_after(scene: Scene, state: State, trial: Trial) -> energy.Energy | None:
+    """Energies at the end of a step; None where the memory is no series."""
+    if state.energy is None:
+        return None
+    before, now = state.now, trial.instant
+    assert isinstance(scene.memory, Modes)
+    assert before.unit_displacement is not None
+    assert now.unit_displacement is not None
+    return energy.after_step(
+        state.energy,
+        scene.memory,
+        state.memory,
+        trial.length,
+        trial.rule,
+        (before.pressure, before.unit_displacement),
+        (now.pressure, now.unit_displacement),
+        scene.halfspace.cell_area,
+        fresh=state.before is None,
+        jumped=state.unresolved,
+    )
+
+
+def work_between(scene: Scene, state: State, pressure: Array, displacement: Array, jumped: bool = False) -> float:
+    """Work of the pressure on the displacement from a state to the next. [J]
+
+    Where surfaces touch that is the force on the approach; cells that touch in a part of the step count by that part
+    only. Without memory it is the stored energy, whatever the steps. ``jumped``: the pressure changed at once, before.
+    """
+    mean = pressure if jumped else 0.5 * (state.now.pressure + pressure)
+    return float(np.sum(mean * (displacement - state.displacement))) * scene.halfspace.cell_area
+
+
+def with_cost(state: State, trial: Trial) -> State:
+    return replace(
+        state,
+        iterations=state.iterations + trial.iterations,
+        convolutions=state.convolutions + trial.convolutions,
+    )
+
+
+def step_of(scene: Scene, state: State, trial: Trial) -> Step:
+    """What is yielded of an accepted trial; as uncertain as the state is."""
+    shown, converged = trial, trial.converged
+    pressure, level = state.now.pressure, state.now.approach
+    if not trial.apart and trial.length > 0 and scene.keeps(state.now.time) and scene.is_soft(trial.length):
+        # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
+        # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
+        alone = replace(state, before=None)
+        shown = attempt(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
+        state = with_cost(state, shown)
+        converged = converged and shown.converged
+        pressure, level = shown.instant.pressure, shown.instant.approach
+    now = replace(state.now, pressure=pressure)
+    return Step(
+        shown=now,
+        displacement=shown.displacement,
+        effective=shown.effective,
+        level=level,
+        control=trial.control,
+        given=scene.program.gives(_number(scene, state)),
+        bound=shown.bound,
+        residual=shown.residual,
+        uncertainty=state.uncertainty,
+        converged=converged,
+        scene=scene,
+        state=state,
+    )
+
+
+def _number(scene: Scene, state: State) -> int:
+    """Index of the segment that ended or goes on at the present instant."""
+    return max(state.segment - (state.now.time <= state.began), 0)
+
+
+def restarted(scene: Scene, state: State, suggestion: float) -> State:
+    """State from which nothing is extrapolated."""
+    memory = scene.memory.restart(state.memory)
+    return replace(state, before=None, pace=state.pace.after_event(suggestion), memory=memory)

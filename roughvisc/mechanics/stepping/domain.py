@@ -1,0 +1,72 @@
+"""A contact that grows: whether the grid is too small for it, and how a state goes on on a larger one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import EdgeContactError
+from roughvisc.mechanics.hereditary.memory import padded
+from roughvisc.mechanics.stepping.attempt import predicted
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State
+
+Array = NDArray[np.float64]
+
+# The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
+_BEYOND = 1.05
+
+
+def is_outgrown(scene: Scene, instant: Instant) -> bool:
+    """Whether the grid is too small: contact cannot be excluded beyond it, or has reached the domain's border."""
+    if scene.outside < math.inf:
+        return _BEYOND * instant.approach >= scene.outside
+    return at_edge(scene, instant.pressure)
+
+
+def at_edge(scene: Scene, pressure: Array) -> bool:
+    """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
+    if scene.halfspace.boundary != "free" or scene.accept_edge:
+        return False
+    borders = (-1,) if scene.halfspace.mirrored else (0, -1)
+    return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
+
+
+def edge_error(scene: Scene, time: float) -> EdgeContactError:
+    """The error to raise where the grid cannot grow."""
+    nx, ny = scene.halfspace.surface_shape
+    return EdgeContactError(
+        f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
+        "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
+        "edge='accept' to press it as a punch of that outline"
+    )
+
+
+def enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
+    """Scene and state on a larger grid: nothing outside ever carried pressure."""
+    larger = scene.enlarge(scene) if scene.enlarge is not None else None
+    if larger is None:
+        raise edge_error(scene, time)
+    scene, offset = larger
+    return scene, _on_larger(scene, state, offset)
+
+
+def _on_larger(scene: Scene, state: State, offset: tuple[int, int]) -> State:
+    """State on a larger grid, in which the present one begins at a cell; its companion too."""
+    shape = scene.halfspace.shape
+    memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
+
+    def moved(instant: Instant) -> Instant:
+        if not instant.pressure.size:  # of a companion
+            return instant
+        return replace(instant, pressure=padded(instant.pressure, shape, offset), unit_displacement=None)
+
+    now, before = moved(state.now), None if state.before is None else moved(state.before)
+    glassy, _, carried = predicted(scene, memory, 0.0, "linear")
+    unit_displacement = scene.halfspace.displacement(now.pressure)
+    now = replace(now, unit_displacement=unit_displacement)
+    displacement = carried + glassy * unit_displacement
+    companion = None if state.companion is None else _on_larger(scene, state.companion, offset)
+    return replace(state, now=now, displacement=displacement, before=before, memory=memory, companion=companion)
