@@ -168,7 +168,22 @@ def energy_after(scene: Scene, state: State, trial: Trial) -> energy.Energy | No
         scene.halfspace.cell_area,
         fresh=state.before is None,
         jumped=state.unresolved,
+        work=work_while_held(state, trial) if scene.remembers and trial.length > 0 else None,
     )
+
+
+def work_while_held(state: State, trial: Trial) -> float | None:
+    """Work of a step in which the load or the approach is held, exactly; None where neither is. [J]
+
+    Where surfaces touch, their displacement follows the approach: the work is the integral of the force over it,
+    however the pressure runs meanwhile. A load that jumps is held from then on.
+    """
+    before, now = state.now, trial.instant
+    if trial.control == "approach" and now.approach == before.approach:
+        return 0.0
+    if trial.control == "load" and (now.force == before.force or state.unresolved):
+        return now.force * (now.approach - before.approach)
+    return None
 
 
 def work_between(scene: Scene, state: State, pressure: Array, displacement: Array, jumped: bool = False) -> float:

@@ -80,6 +80,7 @@ def after_step(
     area: float,
     fresh: bool = False,
     jumped: bool = False,
+    work: float | None = None,
 ) -> Energy:
     """Energies after a step.
 
@@ -101,6 +102,8 @@ def after_step(
         Whether the step is the first one after an event: elements that relax within it do so beside the pressure.
     jumped : bool
         Whether the pressure changed at once at the start of the step.
+    work : float, optional
+        Of the step, where it is known: what of it is not stored is dissipated. [J]
 
     Returns
     -------
@@ -159,6 +162,8 @@ def after_step(
         flowed = step * last
     stored = glassy * last + 0.5 * float(np.sum(weights * squared))
     dissipated = float(np.sum(lost)) + memory.factor * memory.material.fluidity * flowed
+    if work is not None:
+        dissipated, unresolved = work - (stored - energy.stored), energy.unresolved
     return Energy(stored, energy.dissipated + dissipated, unresolved, last, beside, ahead, squared, crossed, energy.own)
 
 

@@ -123,7 +123,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             if unjudged:
                 waiting.clear()
             continue
-        alone = state.behind == 0 and trial.instant.time < end and not state.unresolved
+        alone = state.behind == 0 and trial.instant.time < end
         judged = None if outgrown else _judged(scene, state, segment, trial, error, alone)
         if judged is None:  # the grid is too small for this step, or for the companion's
             while waiting:

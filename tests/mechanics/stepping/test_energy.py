@@ -224,6 +224,20 @@ def test_held_approach__takes_no_work_and_turns_what_is_stored_into_heat(name):
     assert dissipated[-1] > 0.3 * stored[0]
 
 
+@pytest.mark.parametrize("material", [rv.PowerLaw(0.0, 1.0, 0.3), rv.PowerLaw(0.001, 1.0, 0.3)], ids=["pure", "glassy"])
+def test_step_load_on_hardly_any_compliance_at_once__works_by_what_it_sinks(material):
+    """Contact grows many times over in the first step: no path within it would tell the work, the approach does."""
+    force, times = 1e-3, (0.25, 1.0)
+    exact = closed_forms.lee_radok_step(1.0, material, force)
+    ball = rv.sphere(1.0, 0.2, (33, 31))
+    ds = rv.simulate(
+        ball, material, rv.Program().load(force, over=0).hold(1.0), times=times, tolerance=1e-2, progress=False
+    )
+    jump = 2 / 5 * float(exact.approach(0.0))  # Hertz: F is the power 3/2 of the approach
+    np.testing.assert_allclose(ds.work, force * (exact.approach(times) - float(exact.approach(0.0)) + jump), rtol=1e-2)
+    assert (ds.work_error < 2e-2 * ds.work).all()
+
+
 def test_ramp_of_load__works_as_force_on_approach():
     program = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
     times = tuple(np.linspace(0, 2, 201).tolist())
