@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -482,6 +483,21 @@ def test_unconverged_state__has_its_own_displacement():
     assert not state.converged
     expected = halfspace.displacement(state.pressure)
     assert np.abs(state.displacement - expected).max() < 1e-13 * expected.max()
+
+
+@pytest.mark.parametrize(("mean", "fields"), [(0.3, 11.5), (3.0, 13.3)], ids=["half", "full"])
+def test_memory__is_that_of_a_few_fields(mean, fields):
+    """What a step needs is freed when it is taken, and the displacement of the last before the next is convolved."""
+    gap = rough_gap((128, 125))
+    halfspace = HalfSpace(gap.shape, (1.0, 1.0))
+    solve_contact(halfspace, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already
+    tracemalloc.start()
+    try:
+        solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-4, overwrite=True)
+        largest = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert largest < fields * gap.nbytes
 
 
 def test_first_guess__of_a_quarter_knows_its_mirror_images():
