@@ -283,8 +283,10 @@ def test_process__ends_with_its_status(tmp_path):
     assert (bad.returncode, bad.stdout) == (2, "")
     assert bad.stderr.startswith("roughvisc: bad.toml: 4 problems\n  title: found 3: expected a text\n")
     code = (
-        "import sys; from roughvisc.cli import main; main(['--help'], standalone_mode=False); "
+        "import sys; from roughvisc.cli import main; main(sys.argv[1:], standalone_mode=False); "
         "print(sorted({'numpy', 'xarray', 'pydantic', 'pint', 'rich', 'matplotlib'} & set(sys.modules)))"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.endswith("[]\n")
+    for quick in ("--help", "--version"):
+        command = [sys.executable, "-c", code, quick]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert done.stdout.endswith("[]\n")

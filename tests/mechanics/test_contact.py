@@ -2,6 +2,7 @@
 
 import importlib
 import pathlib
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from scipy import optimize
 from support import direct, rough_gap
 
 import roughvisc as rv
-from roughvisc.mechanics import closed_forms, contact
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.contact import coarse_guess, descent, iteration, solve_contact
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
@@ -131,7 +132,7 @@ def test_cold_start__is_guessed_on_a_coarser_grid_where_contact_is_sparse(bounda
     gap = rough_gap(shape)
     sparse, dense = 0.02 * gap.size, 3.0 * gap.size
     guessed = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
-    monkeypatch.setattr(contact, "_COARSE_FROM", 10**6)
+    monkeypatch.setattr(coarse_guess, "_COARSE_FROM", 10**6)
     cold = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
     assert np.mean(cold[0].pressure > 0) < 0.1 < 0.5 < np.mean(cold[1].pressure > 0)
     assert guessed[0].iterations < 0.8 * cold[0].iterations
@@ -207,7 +208,7 @@ def test_not_converged__says_so():
 
 def test_simplex_projection__keeps_the_sum_and_is_nearest():
     values = np.random.default_rng(0).standard_normal((4, 5))
-    found = contact._onto_simplex(values, 1.5)
+    found = descent.onto_simplex(values, 1.5)
     expected = optimize.minimize(
         lambda p: np.sum((p - values.ravel()) ** 2),
         np.full(20, 1.5 / 20),
@@ -439,7 +440,7 @@ def convolved(monkeypatch):
         return lambda self, pressure: kinds.append(kind) or sound(self, pressure)
 
     monkeypatch.setattr(HalfSpace, "displacement", noted("double", HalfSpace.displacement))
-    monkeypatch.setattr(HalfSpace, "rough_displacement", noted("single", HalfSpace.rough_displacement))
+    monkeypatch.setattr(HalfSpace, "displacement_single", noted("single", HalfSpace.displacement_single))
     return kinds
 
 
@@ -453,7 +454,7 @@ def test_single_precision__is_for_steps_far_from_the_solution(boundary, known, c
     assert convolved[-1] == "double"
     found = solve_contact(halfspace, gap, **known, tolerance=1e-14)
     assert found.converged
-    monkeypatch.setattr(contact, "_SINGLE_FROM", np.inf)
+    monkeypatch.setattr(iteration, "_SINGLE_FROM", np.inf)
     convolved.clear()
     exact = solve_contact(halfspace, gap, **known, tolerance=1e-14)
     assert set(convolved) == {"double"}
@@ -484,10 +485,25 @@ def test_unconverged_state__has_its_own_displacement():
     assert np.abs(state.displacement - expected).max() < 1e-13 * expected.max()
 
 
+@pytest.mark.parametrize(("mean", "fields"), [(0.3, 11.5), (3.0, 13.3)], ids=["half", "full"])
+def test_memory__is_that_of_a_few_fields(mean, fields):
+    """What a step needs is freed when it is taken, and the displacement of the last before the next is convolved."""
+    gap = rough_gap((128, 125))
+    halfspace = HalfSpace(gap.shape, (1.0, 1.0))
+    solve_contact(halfspace, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already
+    tracemalloc.start()
+    try:
+        solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-4, overwrite=True)
+        largest = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert largest < fields * gap.nbytes
+
+
 def test_first_guess__of_a_quarter_knows_its_mirror_images():
     x, y = (np.arange(512) - 255.5) / 512, (np.arange(544) - 271.5) / 512
     gap = x[:, None] ** 2 + y**2
-    surface = contact._guessed(HalfSpace(gap.shape, (1.0, 1.0)), gap, 1.0)
-    quarter = contact._guessed(HalfSpace((256, 272), (1.0, 1.0), mirrored=True), gap[256:, 272:], 0.25)
+    surface = coarse_guess.coarse_guess(HalfSpace(gap.shape, (1.0, 1.0)), gap, 1.0)
+    quarter = coarse_guess.coarse_guess(HalfSpace((256, 272), (1.0, 1.0), mirrored=True), gap[256:, 272:], 0.25)
     assert np.sum(quarter) == pytest.approx(0.25 * np.sum(surface), rel=0.05)
     assert np.abs(quarter - surface[256:, 272:]).sum() < 0.1 * quarter.sum()

@@ -108,7 +108,7 @@ class HalfSpace:
         """
         return self._convolved(pressure, self._symbol)
 
-    def rough_displacement(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
+    def displacement_single(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
 
         Parameters
@@ -121,10 +121,10 @@ class HalfSpace:
         ndarray of float32, shape (nx, ny)
             Displacement over :attr:`largest_influence`. [-]
         """
-        return self._convolved(pressure, self._rough_symbol)
+        return self._convolved(pressure, self._single_symbol)
 
     @cached_property
-    def _rough_symbol(self) -> NDArray[np.float32]:
+    def _single_symbol(self) -> NDArray[np.float32]:
         return (self._symbol / self.largest_influence).astype(np.float32)
 
     def _convolved(self, pressure: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:

@@ -24,7 +24,7 @@ from roughvisc.study.storage.records import RowFile
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
 _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "transforms": (
-        *((HalfSpace, name) for name in ("displacement", "rough_displacement", "approximate_inverse")),
+        *((HalfSpace, name) for name in ("displacement", "displacement_single", "approximate_inverse")),
         (Reach, "spread"),
     ),
     "vector work of the solver": ((attempt, "solve_contact"),),

@@ -90,11 +90,11 @@ def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_rough_displacement__is_the_displacement_over_the_largest_influence(boundary, mirrored):
+def test_displacement_single__is_the_displacement_over_the_largest_influence(boundary, mirrored):
     halfspace = HalfSpace((45, 150), (2e-9, 3e-9), boundary, mirrored=mirrored)
     pressure = np.random.default_rng(0).random((45, 150))
     exact = halfspace.displacement(pressure)
-    found = halfspace.rough_displacement(pressure.astype(np.float32))
+    found = halfspace.displacement_single(pressure.astype(np.float32))
     assert found.dtype == np.float32
     np.testing.assert_allclose(found * halfspace.largest_influence, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
     assert np.array_equal(halfspace.displacement(pressure), exact), "they share their working memory"

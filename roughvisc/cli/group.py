@@ -1,0 +1,54 @@
+"""The group of commands, and how a command fails: one message and an exit status."""
+
+from __future__ import annotations
+
+import errno
+from typing import Any
+
+import click
+
+from roughvisc.errors import InputError, RoughviscError
+
+
+class Failure(click.ClickException):
+    """One message on the standard error stream, and an exit status."""
+
+    def __init__(self, message: str, status: int) -> None:
+        super().__init__(message)
+        self.exit_code = status
+
+    def show(self, file: Any = None) -> None:
+        click.echo(f"roughvisc: {self.message}", err=True)
+
+
+class Commands(click.Group):
+    """Errors made on purpose end in one message and an exit status, never in a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            raise Failure(str(error), 2) from error
+        except RoughviscError as error:
+            raise Failure(str(error), 1) from error
+        except OSError as error:  # a full disk, a file taken away
+            if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
+                raise
+            raise Failure(f"{error.filename or 'input or output'}: {error.strerror or error}", 1) from error
+        except KeyboardInterrupt as error:
+            raise Failure("interrupted; what was finished is kept", 130) from error
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="roughvisc", message="roughvisc %(version)s")
+def main() -> None:
+    """Contact of measured rough surfaces with viscoelastic materials.
+
+    A scan and a study file in; labelled (time, x, y) NetCDF results and figures out.
+
+    \b
+    Example:
+      roughvisc scan ground.sur
+      roughvisc run study.toml
+      roughvisc plot results/study
+    """

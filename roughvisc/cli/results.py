@@ -1,0 +1,67 @@
+"""Commands on results: ``plot``, ``report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from roughvisc.cli.output import draw, say
+from roughvisc.errors import InputError
+
+
+@click.command()
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
+def plot(result: Path, out: Path | None) -> None:
+    """Draw the figures of a result, of all results in a folder, or of a trade.
+
+    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases.
+
+    \b
+    Example:
+      roughvisc plot results/quickstart --out figures
+      roughvisc plot results/study-trade/trade.nc
+    """
+    from rich.console import Console
+
+    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.trade.files import is_trade, open_trade
+    from roughvisc.views.plot import save_figures, save_sweep_figures, trade
+    from roughvisc.views.sweep_figures.files import results_of
+
+    paths = sorted(p for p in result.glob("*.nc") if not p.name.startswith(".")) if result.is_dir() else [result]
+    if not paths:
+        raise InputError(f"{result}: holds no results: expected files .nc, as roughvisc run writes them")
+    console = Console()
+    for path in paths:
+        if path.is_file() and is_trade(path):
+            draw(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png")
+            say(console, "Figure", (out or path.parent) / f"{path.stem}.png")
+            continue
+        with open_result(path) as dataset:
+            for figure in save_figures(dataset, out or path.parent, path.stem):
+                say(console, "Figure", figure)
+    together = results_of(result) if len(paths) > 1 else None
+    for figure in save_sweep_figures(together, out or result) if together is not None else ():
+        say(console, "Figure", figure)
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Page. [default: report.html in the folder]")
+def report(results: Path, output: Path | None) -> None:
+    """Write one self-contained page (HTML) about a result, or about all results in a folder.
+
+    What was run, the surface and its conditioning, figures, cases with accuracy and cost, and how to run them again;
+    case and time can be picked. Nothing is fetched from anywhere when the page is looked at.
+
+    \b
+    Example:
+      roughvisc report results/quickstart -o quickstart.html
+    """
+    from rich.console import Console
+
+    from roughvisc.views.report.page import report as write
+
+    say(Console(), "Report", write(results, output))

@@ -1,0 +1,102 @@
+"""The certificate of a pressure: the duality gap, a bound on its error, and whether that is small enough."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from roughvisc.mechanics.contact.full_contact import ROUNDED, load_certainty
+from roughvisc.mechanics.contact.influence import Array, Cells
+from roughvisc.mechanics.contact.problem import Problem
+
+# Rounding of a sum over the cells, in parts of the sum: pairwise summation errs by a few units in the last place.
+_ROUNDING = 8 * float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What is known of a pressure.
+
+    Attributes
+    ----------
+    duality_gap : float
+        Bound on ``f(p) - min f``.
+    energy : float
+        ``p.Kp``.
+    level : float
+        Approach that the contact has: the given one, or the mean over the contact.
+    converged : bool
+        Whether the duality gap is small enough, and the load certain.
+    hopeless : bool
+        Whether the approach does not determine the load.
+    """
+
+    duality_gap: float
+    energy: float
+    level: float
+    converged: bool
+    hopeless: bool
+
+    @property
+    def settled(self) -> bool:
+        """Whether there is nothing more to find."""
+        return self.converged or self.hopeless
+
+
+def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array, separation: Array) -> Certificate:
+    """Judge a pressure.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is asked.
+    pressure, displacement, separation : ndarray, shape (nx, ny)
+        The pressure, its displacement, and the gap with that at zero approach.
+    contact : ndarray of int
+        Cells that carry pressure, as flat indices.
+
+    Returns
+    -------
+    Certificate
+    """
+    pressure = pressure.take(contact)
+    own, here = displacement.take(contact), separation.take(contact)
+    energy = float((pressure * own).sum())
+    lowest = (
+        float(separation.min())
+        if problem.present is None
+        else float(separation.min(where=problem.present, initial=math.inf))
+    )
+    load = float(pressure.sum())
+    if problem.load is not None:
+        level = float(np.mean(here))
+        duality_gap = float((pressure * (here - lowest)).sum())
+    else:
+        level = problem.target
+        duality_gap = _under_approach(problem, pressure, displacement, here, lowest)
+    # with rounding of the sums above; a pressure of nothing has no error to speak of
+    largest = max(float(here.max(initial=1.0)), -float(here.min(initial=-1.0)))
+    converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0
+    hopeless = contact.size == separation.size and problem.remaining < -ROUNDED  # no load is enough
+    if converged and not problem.sees_load:
+        rounding = _ROUNDING * max(largest, float(own.max()))
+        converged, hopeless = load_certainty(problem, contact, separation, here, load, rounding)
+    return Certificate(duality_gap, energy, level, converged, hopeless)
+
+
+def _under_approach(problem: Problem, pressure: Array, displacement: Array, here: Array, lowest: float) -> float:
+    """The duality gap where the approach is given; pressure and separation are those of the contact's cells."""
+    excess = float((pressure * (here - problem.target)).sum())
+    missing = max(0.0, problem.target - lowest)
+    if not problem.periodic:
+        # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform
+        uniform, response = problem.uniform
+        duality_gap = excess + missing * uniform * float(displacement.sum())
+        return duality_gap + 0.5 * missing**2 * uniform**2 * response
+    # The periodic kernel is singular, no such q exists. The pressure is certified under its own load, and its
+    # own approach must be the one asked for.
+    load = float(pressure.sum())
+    own_duality_gap = float((pressure * (here - lowest)).sum())
+    return max(own_duality_gap, abs(excess) + load * missing) if load > 0 else math.inf

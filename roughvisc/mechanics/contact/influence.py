@@ -1,0 +1,77 @@
+"""The influence of pressure on displacement in scaled variables, and what has been spent on it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Cells = NDArray[np.intp]
+
+
+class Influence:
+    """The half-space with lengths and pressures scaled; counts convolutions, and owns memory that is used again.
+
+    Parameters
+    ----------
+    halfspace : HalfSpace
+        Grid and boundary.
+    scale : float
+        Unit of pressure over unit of length. [1/m]
+
+    Attributes
+    ----------
+    convolutions : int
+        Displacements and applications of the preconditioner so far.
+    work : ndarray, shape (nx, ny)
+        For what is needed in a part of an iteration: spent whenever the influence of some cells is asked for.
+    """
+
+    def __init__(self, halfspace: HalfSpace, scale: float) -> None:
+        self.halfspace = halfspace
+        self.scale = scale
+        self.convolutions = 0
+        self.work = np.empty(halfspace.shape)
+
+    @property
+    def largest(self) -> float:
+        """Largest eigenvalue of the influence, or a bound on it."""
+        return self.halfspace.largest_influence * self.scale
+
+    def displacement(self, pressure: Array) -> Array:
+        """Displacement by a pressure, in double precision."""
+        self.convolutions += 1
+        displacement = self.halfspace.displacement(pressure)
+        displacement *= self.scale
+        return displacement
+
+    def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:
+        """Displacement by a pressure on some cells in single precision, and its unit."""
+        self.convolutions += 1
+        field, size = self._spread(pressure, cells)
+        unit = size * self.halfspace.largest_influence * self.scale
+        return self.halfspace.displacement_single(field), unit
+
+    def approximate_pressure(self, displacement: Array, cells: Cells) -> Array:
+        """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
+        self.convolutions += 1
+        field, size = self._spread(displacement, cells)
+        pressure = self.halfspace.approximate_inverse(field).take(cells).astype(float)
+        pressure *= size
+        return pressure
+
+    def approximate_pressure_field(self, displacement: Single) -> Array:
+        """The same for a displacement everywhere, of ordinary size."""
+        self.convolutions += 1
+        return self.halfspace.approximate_inverse(displacement).astype(float)
+
+    def _spread(self, values: Array, cells: Cells) -> tuple[Single, float]:
+        """Values of some cells over the whole grid, zero elsewhere, over the largest; and that: single underflows."""
+        size = float(np.abs(values).max(initial=0.0)) or 1.0
+        field = self.work.reshape(-1).view(np.float32)[: self.work.size]
+        field.fill(0)
+        field[cells] = (values / size).astype(np.float32)
+        return field.reshape(self.work.shape), size

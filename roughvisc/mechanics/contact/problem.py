@@ -1,0 +1,142 @@
+"""One contact problem in scaled variables."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.contact.influence import Array, Cells, Influence
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is asked of the solver: all lengths over one of them, all pressures over another.
+
+    Attributes
+    ----------
+    influence : Influence
+        From pressure to displacement.
+    gap : ndarray, shape (nx, ny)
+        Gap without pressure, above its lowest point.
+    load : float or None
+        Sum of the pressure over the cells, where that is given.
+    target : float
+        Approach above the gap's lowest point, where that is given; else NaN.
+    tolerance : float
+        On the relative duality gap.
+    present : ndarray of bool or None
+        Cells where there is material; None: all.
+    unit, length, lowest : float
+        Unit of pressure [-], unit of length [m], and the gap's lowest point [m].
+    remaining : float
+        Mean gap in full contact, where the approach given determines it: periodic displacements have no mean; else NaN.
+    """
+
+    influence: Influence
+    gap: Array
+    load: float | None
+    target: float
+    tolerance: float
+    present: Mask | None
+    unit: float
+    length: float
+    lowest: float
+    remaining: float
+
+    @classmethod
+    def scaled(
+        cls,
+        halfspace: HalfSpace,
+        gap: Array,
+        *,
+        load: float | None,
+        approach: float | None,
+        tolerance: float,
+        present: Mask | None,
+    ) -> Problem:
+        """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
+        lowest = float((gap if present is None else gap[present]).min())
+        if load is not None:
+            unit = load
+            length = load * halfspace.self_influence or load * halfspace.spacing[0]
+        else:
+            assert approach is not None
+            length = approach - lowest
+            unit = length / (halfspace.self_influence or halfspace.spacing[0])
+        gap -= lowest
+        gap /= length
+        target = math.nan if approach is None else 1.0
+        known = load is None and halfspace.boundary == "periodic" and present is None
+        return cls(
+            influence=Influence(halfspace, unit / length),
+            gap=gap,
+            load=None if load is None else load / unit,
+            target=target,
+            tolerance=tolerance,
+            present=present,
+            unit=unit,
+            length=length,
+            lowest=lowest,
+            remaining=float(np.mean(gap)) - target if known else math.nan,
+        )
+
+    @property
+    def periodic(self) -> bool:
+        return self.influence.halfspace.boundary == "periodic"
+
+    @property
+    def sees_load(self) -> bool:
+        """Whether the energy knows the load: with periodic boundaries a uniform pressure displaces nothing."""
+        return self.load is not None or not self.periodic
+
+    @cached_property
+    def uniform(self) -> tuple[float, float]:
+        """Uniform pressure that displaces every present cell by at least one length, and its total displacement."""
+        ones = np.ones(self.gap.shape) if self.present is None else self.present.astype(float)
+        response = self.influence.displacement(ones)
+        inside = response if self.present is None else response[self.present]
+        return 1 / float(inside.min()), float(inside.sum())
+
+    def separation(self, displacement: Array) -> Array:
+        """Gap under pressure at zero approach, in the work array: there until that is used for something else."""
+        return np.add(self.gap, displacement, out=self.influence.work)
+
+    def free_set(self, pressure: Array, separation: Array, level: float) -> Cells:
+        """Cells that may change pressure: those in contact and those that would penetrate."""
+        mask = separation < level
+        if self.present is not None:
+            mask &= self.present
+        mask |= pressure > 0
+        return np.flatnonzero(mask)
+
+    def tangent(self, vector: Array) -> Array:
+        """Part of a vector on the free set that keeps a given load."""
+        return vector if self.load is None else vector - float(np.mean(vector))
+
+    def preconditioned(self, residual: Array, free_set: Cells) -> Array:
+        """About the change of pressure that a residual asks for, but for the scale; keeps a given load."""
+        return self.tangent(self.influence.approximate_pressure(residual, free_set))
+
+    def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
+        """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
+        if start is None or not np.any(start > 0):
+            pressure, displacement = np.ones(self.gap.shape), None
+            if self.load is None:
+                pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)
+        else:
+            pressure = np.maximum(start, 0, out=start)
+            pressure /= self.unit
+        if self.present is not None:
+            pressure = np.where(self.present, pressure, 0.0)
+        factor = 1.0 if self.load is None else self.load / float(pressure.sum())
+        pressure *= factor
+        if displacement is not None:
+            displacement *= factor / self.length
+        return pressure, displacement

@@ -1,0 +1,78 @@
+"""The door of the solver: a half-space, a gap and what is prescribed go in, a contact state comes out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.contact.coarse_guess import coarse_guess
+from roughvisc.mechanics.contact.iteration import solved
+from roughvisc.mechanics.contact.problem import Array, Problem
+from roughvisc.mechanics.contact.state import ContactState
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+
+def solve_contact(
+    halfspace: HalfSpace,
+    gap: Array,
+    *,
+    load: float | None = None,
+    approach: float | None = None,
+    tolerance: float = 1e-8,
+    start: Array | None = None,
+    start_displacement: Array | None = None,
+    present: NDArray[np.bool_] | None = None,
+    max_iterations: int = 1000,
+    overwrite: bool = False,
+    estimate_error: bool = False,
+) -> ContactState:
+    """Contact state under given load or given approach.
+
+    Parameters
+    ----------
+    halfspace : HalfSpace
+        Grid and boundary.
+    gap : ndarray, shape (nx, ny)
+        Gap without pressure at zero approach; ignored at absent cells. [m]
+    load : float, optional
+        Sum of the pressure over the cells, positive. [-]
+    approach : float, optional
+        Rigid-body approach; this or the load is given. [m]
+    tolerance : float
+        On the relative duality gap, ``G / p.Kp``; the square of the relative error in the energy norm. Near full
+        contact under given approach 10 times it is the largest relative error of the load.
+    start : ndarray, shape (nx, ny), optional
+        First guess of the pressure; negative values count as zero. [-]
+    start_displacement : ndarray, shape (nx, ny), optional
+        Displacement due to `start`, where that is known and nowhere negative or absent: saves a convolution. [m]
+    present : ndarray of bool, shape (nx, ny), optional
+        Cells where there is material; None: all.
+    max_iterations : int
+        The state reached by then is returned as not converged.
+    overwrite : bool
+        Whether `gap`, `start` and `start_displacement` may be used up, which spares copies of them.
+    estimate_error : bool
+        Whether to estimate the error of the pressure. It costs nothing, but under given approach with periodic
+        boundaries two applications of the preconditioner.
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    ValueError
+        If neither a load nor an approach is given, or both are.
+    """
+    if (load is None) == (approach is None):
+        raise ValueError("give either a load or an approach")
+    if present is not None and present.all():
+        present = None
+    if not overwrite:
+        gap = np.array(gap, dtype=float)
+        start = None if start is None else np.array(start, dtype=float)
+        start_displacement = None if start_displacement is None else np.array(start_displacement, dtype=float)
+    if load is not None and present is None and (start is None or not np.any(start > 0)):
+        start, start_displacement = coarse_guess(halfspace, gap, load), None
+    problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
+    return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)
