@@ -56,6 +56,14 @@ def test_quiet__shows_nothing(shown):
         assert console.file.getvalue() == ""
 
 
+def test_line__is_not_said_twice_in_a_row(shown):
+    console = shown(False)
+    with Bar(console, "pressing", lambda now, end: "half") as bar:
+        for _ in range(3):
+            bar.reached(0.0, 1.0)
+    assert console.file.getvalue() == "pressing: half, 0 s so far\n"
+
+
 def test_trade__says_each_setting_once(shown, monkeypatch):
     console = shown(False)
     monkeypatch.setattr(progress, "LINE_EVERY", 100.0)
