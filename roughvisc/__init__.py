@@ -1,15 +1,13 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
 ``import roughvisc as rv`` gives the public names below; each is imported from its module when first used, so that
-the package itself is imported in no time. ``h.roughvisc`` has the conditioning as methods of a DataArray.
+the package itself is imported in no time. ``h.roughvisc`` has the conditioning as methods of a DataArray, as soon as
+a function that gives or takes heights has been used; for DataArrays made otherwise, ``import roughvisc.topography``.
 """
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module, metadata
-from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
 from typing import Any
 
 #: public name -> module that defines it
@@ -63,31 +61,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return __all__
-
-
-class _AfterXarray(MetaPathFinder):
-    """Registers the accessor ``h.roughvisc`` as soon as xarray is imported, so that it need not be imported here."""
-
-    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        if fullname != "xarray":
-            return None
-        found = (f.find_spec(fullname, path, target) for f in sys.meta_path if f is not self)
-        spec = next((spec for spec in found if spec is not None), None)
-        if spec is None or spec.loader is None:
-            return spec
-        execute = spec.loader.exec_module
-
-        def execute_and_register(module: Any) -> None:
-            execute(module)
-            if self in sys.meta_path:
-                sys.meta_path.remove(self)
-            import_module("roughvisc.topography.accessor")
-
-        spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
-        return spec
-
-
-if "xarray" in sys.modules:
-    import_module("roughvisc.topography.accessor")
-else:
-    sys.meta_path.insert(0, _AfterXarray())

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "roughvisc"
 _LABELS = {"errors", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
-_SIMULATION = {*_STORAGE, "study.storage", "mechanics.contact"}
+_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact"}
 _EXECUTION = {*_SIMULATION, "study.simulation"}
 _COST = {*_EXECUTION, "study.execution"}
 _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
@@ -38,6 +38,7 @@ ALLOWED = {
     "topography": _LABELS,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,
+    "study.progress": set(),
     "study.simulation": _SIMULATION,
     "study.execution": _EXECUTION,
     "study.cost": _COST,
@@ -61,6 +62,7 @@ ALLOWED = {
     "views.console": {*_LABELS, "study.execution", "study.trade", "study.validation", "views.figures"},
     "cli": {
         *_LABELS,
+        "study.progress",
         "topography",
         "study.statement",
         "study.storage",

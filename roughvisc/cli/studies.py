@@ -82,11 +82,12 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from scipy import fft
 
     from roughvisc.study.execution.run import run_case, unconverged
+    from roughvisc.study.progress import Bar
     from roughvisc.study.storage.store import open_result
-    from roughvisc.views.console.tables import progress, result_table
+    from roughvisc.views.console.tables import reached, result_table
 
-    with progress(console, label) as report, fft.set_workers(CPU_COUNT):
-        path = run_case(case, folder, progress=report)
+    with Bar(console, label, reached) as bar, fft.set_workers(CPU_COUNT):
+        path = run_case(case, folder, progress=bar.reached)
     with open_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
@@ -207,7 +208,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)
     with reporting(True, console) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, budget=time, progress=report)
+        dataset = measured(case, budget=time, progress=bar.reached)
     console.print(trade_table(dataset))
     say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
     draw(figure(dataset), folder / "trade.png")

@@ -1,6 +1,7 @@
 """The accessor ``h.roughvisc``: conditioning and numbers of a height grid as methods, so that steps can be chained.
 
-``h.roughvisc.level().roughvisc.fill()`` is ``rv.fill(rv.level(h))``. Registering it imports nothing but xarray.
+``h.roughvisc.level().roughvisc.fill()`` is ``rv.fill(rv.level(h))``. ``import roughvisc.topography`` registers it, and
+with it whatever gives heights: ``rv.open_scan``, ``rv.sphere``, the xarray engine. It imports nothing but xarray.
 """
 
 from __future__ import annotations

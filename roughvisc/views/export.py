@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -40,27 +39,20 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
     """
     require(dataset, "time")
-    names = ["time", *(str(name) for name, variable in dataset.data_vars.items() if variable.dims == ("time",))]
-    columns = [_column(dataset[name]) for name in names]
-    with whole_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(_heading(dataset[name]) for name in names)
-        writer.writerows(zip(*columns, strict=True))
+    names = [name for name, variable in dataset.data_vars.items() if variable.dims == ("time",)]
+    table = dataset[names].reset_coords(drop=True).to_dataframe().replace([np.inf, -np.inf], np.nan)
+    if "status" in table:
+        table["status"] = [STATUS_MEANINGS[value] for value in table["status"]]
+    heading = [_heading(dataset[name]) for name in names]
+    settings = {"index_label": _heading(dataset["time"]), "lineterminator": "\r\n"}  # the same on every system
+    with whole_file(path) as temporary:
+        table.to_csv(temporary, header=heading, compression=None, **settings)
     return Path(path)
 
 
 def _heading(variable: xr.DataArray) -> str:
     unit = variable.attrs.get("units", "")
     return f"{variable.name} [{unit}]" if unit not in ("", "1") else str(variable.name)
-
-
-def _column(variable: xr.DataArray) -> list[str]:
-    values = variable.values
-    if variable.name == "status":
-        return [STATUS_MEANINGS[int(value)] for value in values]
-    if values.dtype.kind == "f":
-        return [repr(float(value)) if np.isfinite(value) else "" for value in values]
-    return [str(value) for value in values]
 
 
 def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:

@@ -36,21 +36,28 @@ def test_accessor__has_every_step_and_number_with_its_docstring():
         h.roughvisc.smooth  # noqa: B018
 
 
-@pytest.mark.parametrize("order", ["roughvisc, xarray", "xarray, roughvisc"])
-def test_accessor__is_there_after_the_import_in_either_order(order):
-    code = (
-        f"import sys, importlib.util; importlib.util.find_spec('xarray'); import {order}; import numpy as np; "
-        "h = xarray.DataArray(np.eye(4), dims=('x', 'y'), coords={'x': np.arange(4.), 'y': np.arange(4.)}); "
-        "print(h.roughvisc.level().shape, [f for f in sys.meta_path if 'Xarray' in type(f).__name__])"
-    )
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "(4, 4) []"
+HEIGHTS = {
+    "a recipe": "h = rv.sphere(1e-3, 2e-4, 5)",
+    "an array": "h = rv.from_array([[0.0, 1.0], [1.0, 0.0]], spacing=1.0)",
+    "the engine": "h = xr.open_dataarray('scan.sdf', engine='roughvisc')",
+    "xarray alone": "import roughvisc.topography; h = xr.DataArray([[0.0, 1.0]])",
+}
 
 
-def test_import__registers_the_accessor_without_heavy_libraries():
+@pytest.mark.parametrize("first", ["roughvisc as rv, xarray as xr", "xarray as xr, roughvisc as rv"])
+@pytest.mark.parametrize("source", HEIGHTS)
+def test_accessor__is_there_wherever_heights_are(source, first, tmp_path):
+    rv.save_scan(rv.sphere(1e-3, 2e-4, 5), tmp_path / "scan.sdf")
+    code = f"import {first}; {HEIGHTS[source]}; print(type(h.roughvisc).__name__)"
+    command = [sys.executable, "-W", "error", "-W", "ignore::ImportWarning", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert done.stdout.strip() == "HeightAccessor"
+
+
+def test_accessor__is_registered_without_heavy_libraries():
     heavy = {"matplotlib", "dask", "distributed", "SurfaceTopography", "x3pio", "sdfio", "netCDF4", "scipy", "pint"}
     code = (
-        "import sys, xarray; before = set(sys.modules); import roughvisc; "
+        "import sys, xarray; before = set(sys.modules); import roughvisc.topography; "
         "assert hasattr(xarray.DataArray, 'roughvisc'); print(*sorted(set(sys.modules) - before))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -60,9 +67,11 @@ def test_import__registers_the_accessor_without_heavy_libraries():
 
 
 def test_import__leaves_xarray_alone_until_it_is_wanted():
-    code = "import sys, roughvisc; print('xarray' in sys.modules, 'numpy' in sys.modules)"
+    code = "import sys; finders = [*sys.meta_path]; import roughvisc; " + (
+        "print('xarray' in sys.modules, 'numpy' in sys.modules, sys.meta_path == finders)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False False"
+    assert done.stdout.strip() == "False False True"
 
 
 def test_accessor__of_an_array_that_is_no_grid():

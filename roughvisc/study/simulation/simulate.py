@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Literal
 
 import xarray as xr
@@ -205,8 +206,7 @@ def _press(
     spent = reached.wall_time - began
     kept = set(program.corners if scene.times is None else scene.times)
     every = scene.times is None
-    report, close = _reporter(progress)
-    try:
+    with _reporting(progress) as report:
         for step in march(scene, reached.state) if method == "fast" else march_seed(scene):
             scene = step.scene
             reached = reached.after(step, ground.growths, spent + time.perf_counter())
@@ -218,8 +218,6 @@ def _press(
             if keeper is not None and method == "fast":
                 keeper.passed(reached)
             del step  # its fields are not needed while the next one is computed
-    finally:
-        close()
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     dataset = rows.dataset(scene, method)
@@ -238,14 +236,14 @@ def _press(
     return dataset
 
 
-def _reporter(progress: bool | Progress) -> tuple[Progress, Callable[[], None]]:
+@contextmanager
+def _reporting(progress: bool | Progress) -> Iterator[Progress]:
     if callable(progress):
-        return progress, lambda: None
-    if not progress:
-        return (lambda _time, _duration: None), (lambda: None)
-    from rich.progress import Progress as Bar
+        yield progress
+    elif not progress:
+        yield lambda _now, _end: None
+    else:
+        from roughvisc.study.progress import Bar
 
-    bar = Bar(transient=True)
-    task = bar.add_task("pressing", total=1.0)
-    bar.start()
-    return (lambda now, duration: bar.update(task, completed=now / duration if duration else 1.0)), bar.stop
+        with Bar(label="pressing") as bar:
+            yield bar.reached

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
-from numpy.typing import NDArray
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
@@ -155,7 +154,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
                 # all are declared before any is written: each change of mode would write the file's metadata anew
                 declared = [_declare(file, str(name), v, precision) for name, v in dataset.variables.items()]
                 for written, variable in zip(declared, dataset.variables.values(), strict=True):
-                    _write(written, variable, precision)
+                    _write(written, variable)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             number = errno.ENOSPC if full else errno.EIO
@@ -181,20 +180,17 @@ def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision:
         declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
         declared.set_auto_maskandscale(False)
         declared.setncatts(plain_attributes(variable.attrs))
-        if _is_field(variable) and precision is not None:
+        if (bits := _bits(variable, precision)) is not None:
             declared.relative_precision = precision
-            bits = significant_bits(precision)
             declared.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
     return declared
 
 
-def _write(written: netCDF4.Variable, variable: xr.Variable, precision: float | None) -> None:
+def _write(written: netCDF4.Variable, variable: xr.Variable) -> None:
     """Write a variable; a field over (time, x, y) one layer of chunks after the other: no more of it is in memory."""
     together = _chunks(variable.shape)[0] if _is_field(variable) else 0
     for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
         values = variable[layer].values  # outside the lock, too
-        if together:
-            values = round_bits(values, significant_bits(precision))
         with NETCDF:
             written[layer] = values
 
@@ -203,44 +199,37 @@ def _is_field(variable: xr.Variable) -> bool:
     return variable.dims == ("time", "x", "y")
 
 
-def significant_bits(precision: float | None) -> int:
-    """Bits of a double's fraction to keep, so that rounding changes it by less than that part; None: by nothing."""
-    if precision is None:
-        return 52
-    return min(max(math.ceil(-math.log2(precision)) - 1, 0), 52)
-
-
-def round_bits(values: NDArray[np.float64], bits: int) -> NDArray[np.float64]:
-    """Doubles with that many bits of their fraction, rounded to nearest; zeros and missing values stay."""
-    dropped = 52 - bits
-    if dropped == 0:
-        return values
-    whole = values.view(np.int64) + (1 << (dropped - 1))
-    whole &= -(1 << dropped)
-    return np.where(np.isfinite(values), whole.view(float), values)
+def _bits(variable: xr.Variable, precision: float | None) -> int | None:
+    """Bits of a double's fraction to keep of a field, so that rounding changes it by less than that part; None: all."""
+    if precision is None or not _is_field(variable):
+        return None
+    return min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
 
 
 def _encoding(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and name in MAY_BE_MISSING:
         encoding["fill_value"] = variable.dtype.type(np.nan)
+    bits = _bits(variable, precision)
+    if bits is not None:
+        encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
     if variable.nbytes > _TINY:
         encoding["chunksizes"] = _chunks(variable.shape)
-        encoding |= _filters(variable, significant_bits(precision) if _is_field(variable) else 52)
+        encoding |= _filters(variable, bits)
     return encoding
 
 
-def _filters(variable: xr.Variable, bits: int) -> dict[str, Any]:
+def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
     """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
     middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
     sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
-    if bits < 52:
-        sample = round_bits(sample, bits)
+    if bits is not None:
+        sample = (sample.view(np.int64) & -(1 << (52 - bits))).view(float)  # cut off compresses as rounded
     shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
     size, shuffle = min(
         (len(zlib.compress(text.tobytes(), 1)), shuffle) for shuffle, text in enumerate((sample, shuffled))
     )
-    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits == 52 else _WORTHWHILE_ROUNDED):
+    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
         return {}
     return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+
+from roughvisc.study.progress import Bar
 
 Report = Callable[[str, float, float], None]
-
-#: Seconds between two pictures of the bar.
-_EVERY = 0.2
 
 
 @contextmanager
@@ -23,38 +20,13 @@ def reporting(progress: bool | Report, console: Console | None = None) -> Iterat
     """
     if callable(progress):
         yield progress
-    elif not progress or (console is not None and console.quiet):
+    elif not progress:
         yield lambda _label, _now, _end: None
     else:
-        console = console or Console(stderr=True)
-        if console.is_terminal:
-            columns = BarColumn(), TextColumn("{task.description}")
-            with Progress(*columns, console=console, transient=True) as bar:
-                yield _bar(bar)
-        else:
-            yield _lines(console)
+        with Bar(console) as bar:
 
+            def report(label: str, now: float, end: float) -> None:
+                bar.turned_to(label)
+                bar.reached(now, end)
 
-def _bar(bar: Progress) -> Report:
-    task = bar.add_task("", total=1.0)
-    shown = 0.0
-
-    def report(label: str, now: float, end: float) -> None:
-        nonlocal shown
-        if time.monotonic() - shown > _EVERY:
-            shown = time.monotonic()
-            bar.update(task, description=label, completed=now / end if end else 1.0)
-
-    return report
-
-
-def _lines(console: Console) -> Report:
-    last = ""
-
-    def report(label: str, _now: float, _end: float) -> None:
-        nonlocal last
-        if label != last:
-            last = label
-            console.print(f"measuring {label}", highlight=False, soft_wrap=True)
-
-    return report
+            yield report

@@ -1,16 +1,13 @@
-"""What the command line shows: progress, and tables of what was found and what it cost."""
+"""What the command line shows: tables of what was found and what it cost."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from rich.console import Console, Group
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -27,7 +24,6 @@ _ERRORS = {
     "time_error": "time steps, worst",
     "residual": "contact solver, estimated",
 }
-_PLAIN_EVERY = 5.0  # seconds between lines where there is no terminal
 
 
 def readable(value: float, unit: str) -> str:
@@ -35,39 +31,8 @@ def readable(value: float, unit: str) -> str:
     return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
 
 
-@contextmanager
-def progress(console: Console, label: str) -> Iterator[Callable[[float, float], None]]:
-    """A function to call with the time reached and the time at the end [s].
-
-    It draws a bar, or writes a line every few seconds where there is no terminal.
-    """
-    if console.is_terminal and not console.quiet:
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[at]}"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=console, transient=True) as bar:
-            task = bar.add_task(label, total=1.0, at="")
-            yield lambda now, end: bar.update(task, completed=now / end if end else 1.0, at=_at(now, end))
-    else:
-        yield _lines(console, label)
-
-
-def _lines(console: Console, label: str) -> Callable[[float, float], None]:
-    began = last = time.monotonic()
-
-    def report(now: float, end: float) -> None:
-        nonlocal last
-        if time.monotonic() - last >= _PLAIN_EVERY:
-            last = time.monotonic()
-            console.print(f"{label}: {_at(now, end)}, {last - began:.0f} s", highlight=False)
-
-    return report
-
-
-def _at(now: float, end: float) -> str:
+def reached(now: float, end: float) -> str:
+    """The time reached and the time at the end [s], as one reads them."""
     unit = unit_for(end, "s")
     return f"t = {unit(now):.3g} of {unit.text(end)}"
 

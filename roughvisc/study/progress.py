@@ -1,0 +1,151 @@
+"""What is shown while something is computed: a live picture on a terminal or in a notebook, elsewhere plain lines."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from importlib.util import find_spec
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+#: Seconds between two lines, and between two pictures.
+LINE_EVERY, PICTURE_EVERY = 10.0, 0.2
+
+#: A label, how much is done of how much (None: no bar), and a text beside the bar.
+Row = tuple[str, float, float | None, str]
+
+
+class Display:
+    """Shows rows with bars, or a line now and then.
+
+    Parameters
+    ----------
+    console : rich.console.Console or None
+        Where to; None: the standard error.
+    rows : callable
+        Gives the rows to draw.
+    line : callable
+        Gives what is said in a line where nothing can be drawn.
+    below : bool
+        Whether the line is drawn, too, below the rows.
+    """
+
+    def __init__(
+        self, console: Console | None, rows: Callable[[], Iterable[Row]], line: Callable[[], str], below: bool = False
+    ) -> None:
+        self.console = console or Console(stderr=True)
+        self._rows, self._line, self._below = rows, line, below
+        self._shown, self._said = time.monotonic(), ""
+        self._live: Live | None = None
+
+    def start(self) -> None:
+        """Begin to draw, where that is possible."""
+        self._shown = time.monotonic()
+        if self.draws:
+            self._live = Live(self._picture(), console=self.console, auto_refresh=False, transient=True)
+            self._live.start(refresh=True)
+
+    @property
+    def draws(self) -> bool:
+        """Whether there is something to draw on."""
+        notebook = self.console.is_jupyter and find_spec("ipywidgets") is not None
+        return (self.console.is_terminal or notebook) and not (self.console.quiet or self.console.is_dumb_terminal)
+
+    def tick(self) -> None:
+        """Show what has changed, if it is time to."""
+        if time.monotonic() - self._shown < (LINE_EVERY if self._live is None else PICTURE_EVERY):
+            return
+        self._shown = time.monotonic()
+        if self._live is None:
+            self.say(self._line())
+        else:
+            self._live.update(self._picture(), refresh=True)
+
+    def say(self, line: str) -> None:
+        """Write a line, once; a picture stays below it."""
+        if line != self._said:
+            self._said = line
+            self.console.print(Text(line), soft_wrap=True)
+
+    def stop(self) -> None:
+        """Draw no more: the picture vanishes."""
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def _picture(self) -> Group:
+        rows = Table.grid(padding=(0, 1))
+        for label, done, total, text in self._rows():
+            bar = "" if total is None else ProgressBar(total=total or 1.0, completed=done, width=30)
+            rows.add_row(Text(label), bar, Text(text))
+        return Group(rows, *([Text(self._line())] if self._below else []))
+
+
+class Bar:
+    """One row, of what is computed one after the other.
+
+    Parameters
+    ----------
+    console : rich.console.Console, optional
+        Where to; None: the standard error.
+    label : str
+        What is computed.
+    at : callable, optional
+        Text for the time reached and the time at the end. [s]
+    """
+
+    def __init__(
+        self, console: Console | None = None, label: str = "", at: Callable[[float, float], str] | None = None
+    ) -> None:
+        self._at = at or (lambda now, end: f"t = {now:.3g} of {end:.3g} s")
+        self._label, self._now, self._end, self._began = label, 0.0, 0.0, time.monotonic()
+        self._display = Display(console, self._rows, self._line)
+
+    def __enter__(self) -> Bar:
+        self._display.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._display.stop()
+
+    def reached(self, now: float, end: float) -> None:
+        """It is at this time of so much. [s]"""
+        self._now, self._end = now, end
+        self._display.tick()
+
+    def turned_to(self, label: str) -> None:
+        """Something else is computed from now on; where nothing is drawn, a line says so."""
+        if label != self._label:
+            self._label, self._now, self._began = label, 0.0, time.monotonic()
+            if not self._display.draws:
+                self._display.say(f"measuring {label}")
+
+    def _rows(self) -> list[Row]:
+        return [(self._label, self._now, self._end, self._text())]
+
+    def _line(self) -> str:
+        return f"{self._label}: {self._text()}"
+
+    def _text(self) -> str:
+        spent = time.monotonic() - self._began
+        words = [self._at(self._now, self._end) if self._end else "starting"]
+        if 0 < self._now < self._end:
+            words.append(f"about {clock(spent * (self._end - self._now) / self._now)} left")
+        return ", ".join([*words, f"{clock(spent)} so far"])
+
+
+def clock(seconds: float) -> str:
+    """A length of time as one says it.
+
+    Examples
+    --------
+    >>> clock(0.04), clock(75), clock(4000), clock(200000)
+    ('0 s', '75 s', '67 min', '55.6 h')
+    """
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
