@@ -44,7 +44,11 @@ _PUBLIC = {
     }.items()
     for name in names.split()
 }
-_MODULES = {"plot": "roughvisc.views.plot", "closed_forms": "roughvisc.mechanics.closed_forms"}
+_MODULES = {
+    "plot": "roughvisc.views.plot",
+    "observables": "roughvisc.views.observables",
+    "closed_forms": "roughvisc.mechanics.closed_forms",
+}
 
 __all__ = ["__version__", *sorted(_PUBLIC), *sorted(_MODULES)]
 

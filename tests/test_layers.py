@@ -58,7 +58,7 @@ ALLOWED = {
         "views.sweep_figures",
         "views.plot",
     },
-    "views.console": {*_LABELS, "study.execution", "study.trade", "study.validation", "views.figures"},
+    "views.console": {*_LABELS, "topography", "study.execution", "study.trade", "study.validation", "views.figures"},
     "cli": {
         *_LABELS,
         "topography",

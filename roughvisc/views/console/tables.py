@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
 
 if TYPE_CHECKING:
@@ -294,7 +295,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     channels : sequence, optional
         Of :func:`roughvisc.list_channels`; told where there are several.
     """
-    sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
+    sides = spacing(height)
     counts = [height.sizes[axis] for axis in ("x", "y")]
     missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
     rows = [
