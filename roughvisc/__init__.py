@@ -16,7 +16,8 @@ from typing import Any
 _PUBLIC = {
     name: module
     for module, names in {
-        "roughvisc.topography.readers": "open_scan from_array supported_formats list_channels",
+        "roughvisc.topography.scans": "open_scan",
+        "roughvisc.topography.readers": "from_array supported_formats list_channels",
         "roughvisc.topography.conditioning": (
             "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror"
         ),

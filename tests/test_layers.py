@@ -146,6 +146,12 @@ def test_rooms__form_no_circle():
     assert set(ALLOWED) <= set(order.static_order())
 
 
+def test_modules__form_no_circle():
+    """Not even through imports inside functions."""
+    graph = {module_of(path): {one for one in modules(path) if one != "__init__"} for path in FILES}
+    TopologicalSorter({one: uses - {one} for one, uses in graph.items()}).prepare()
+
+
 @pytest.mark.parametrize("folder", MOST_ENTRIES)
 def test_folders__hold_no_more_than_one_sees_at_a_glance(folder):
     entries = [p for p in (PACKAGE / folder).iterdir() if p.name != "__pycache__"]

@@ -24,7 +24,8 @@ from roughvisc.topography.conditioning import (
     taper,
 )
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, open_scan
+from roughvisc.topography.readers import from_array
+from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
 
 SCANS = Path(__file__).parents[3] / "shared" / "scans"
