@@ -22,6 +22,7 @@ STATUS_MEANINGS = (
     "open",
     "full_contact",
 )
+NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
 @dataclass(frozen=True)

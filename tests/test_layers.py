@@ -141,6 +141,16 @@ def test_imports__point_downward(path):
         assert room(module) == here or room(module) in ALLOWED[here], f"{here} imports {module}"
 
 
+def test_storage__is_the_one_door_to_result_files():
+    outside = [path for path in FILES if room(module_of(path)) != "study.storage"]
+    assert len(outside) < len(FILES)
+    for path in outside:
+        assert "netCDF4" not in {name.split(".")[0] for name in imports(path)}, path
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("glob", "rglob"):
+                assert ".nc" not in ast.unparse(node), f"{path} looks for results by name"
+
+
 def test_rooms__form_no_circle():
     order = TopologicalSorter(ALLOWED)
     assert set(ALLOWED) <= set(order.static_order())

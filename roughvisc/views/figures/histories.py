@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
-from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     GREEN,
@@ -57,7 +57,6 @@ _COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", S
 _FAINTEST = 1e-5
 #: Panels up to which they stand in one column.
 _ONE_COLUMN = 3
-_NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
 def marker_of(count: int) -> str:
@@ -69,7 +68,7 @@ def failed_frames(dataset: xr.Dataset) -> np.ndarray:
     """Frames whose step did not converge."""
     if "status" not in dataset:
         return np.zeros(dataset.sizes["time"], dtype=bool)
-    return dataset["status"].values == _NOT_CONVERGED
+    return dataset["status"].values == NOT_CONVERGED
 
 
 def leave_room(ax: Axes, *values: np.ndarray) -> None:
