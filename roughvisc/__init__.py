@@ -14,7 +14,8 @@ from typing import Any
 _PUBLIC = {
     name: module
     for module, names in {
-        "roughvisc.topography.readers": "open_scan from_array supported_formats list_channels",
+        "roughvisc.topography.scans": "open_scan",
+        "roughvisc.topography.readers": "from_array supported_formats list_channels",
         "roughvisc.topography.conditioning": (
             "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror"
         ),
@@ -42,7 +43,11 @@ _PUBLIC = {
     }.items()
     for name in names.split()
 }
-_MODULES = {"plot": "roughvisc.views.plot", "closed_forms": "roughvisc.mechanics.closed_forms"}
+_MODULES = {
+    "plot": "roughvisc.views.plot",
+    "observables": "roughvisc.views.observables",
+    "closed_forms": "roughvisc.mechanics.closed_forms",
+}
 
 __all__ = ["__version__", *sorted(_PUBLIC), *sorted(_MODULES)]
 

@@ -1,4 +1,4 @@
-"""The vocabulary: every variable that a result Dataset may hold, declared once.
+"""The vocabulary: every variable that a result Dataset may hold or that is derived from one, declared once.
 
 Dimensions, units and prose of each variable stand here and nowhere else; :func:`annotate` writes them on a Dataset
 and refuses a variable that is not declared or whose dimensions differ.
@@ -6,6 +6,7 @@ and refuses a variable that is not declared or whose dimensions differ.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +22,15 @@ STATUS_MEANINGS = (
     "open",
     "full_contact",
 )
+NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
 @dataclass(frozen=True)
 class Variable:
-    """One entry of the vocabulary: what a variable is, how it is written, and which others state its error."""
+    """One entry of the vocabulary: what a variable is, how it is written, and which others state its error.
+
+    ``short`` is what it is called where there is no room for ``long_name``.
+    """
 
     dims: tuple[str, ...]
     units: str
@@ -33,6 +38,13 @@ class Variable:
     comment: str = ""
     dtype: str = "float64"
     ancillary: tuple[str, ...] = ()
+    short: str = ""
+
+    @property
+    def label(self) -> str:
+        """Short name as it stands on an axis or in a table, capitalised."""
+        text = self.short or self.long_name
+        return text[:1].upper() + text[1:]
 
     def attributes(self) -> dict[str, Any]:
         """CF attributes of this variable."""
@@ -60,6 +72,7 @@ VARIABLES: dict[str, Variable] = {
         "m",
         "height of the rigid profile, peaks up",
         "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
+        short="height",
     ),
     "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
@@ -69,18 +82,21 @@ VARIABLES: dict[str, Variable] = {
         "contact pressure",
         "zero outside the contact and where the profile is absent",
         ancillary=("pressure_error",),
+        short="pressure",
     ),
     "gap": Variable(
         _FRAME,
         "m",
         "gap between the surfaces",
         "zero inside the contact; missing where the profile is absent",
+        short="gap",
     ),
     "displacement": Variable(
         _FRAME,
         "m",
         "normal displacement of the half-space's surface",
         "positive into the half-space; with periodic boundaries its mean is zero",
+        short="displacement",
     ),
     # histories
     "force": Variable(
@@ -89,6 +105,7 @@ VARIABLES: dict[str, Variable] = {
         "normal force",
         "prescribed under load control, found under approach control",
         ancillary=("force_error",),
+        short="force",
     ),
     "approach": Variable(
         _SERIES,
@@ -98,6 +115,7 @@ VARIABLES: dict[str, Variable] = {
         "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
         "absent; while the contact is open: the value at which it would just close",
         ancillary=("approach_error",),
+        short="approach",
     ),
     "work": Variable(
         _SERIES,
@@ -106,6 +124,7 @@ VARIABLES: dict[str, Variable] = {
         "over every accepted step, kept or not, as that of the pressure on the displacement: stored_energy plus "
         "dissipated_energy; a jump is quasi-static; with periodic boundaries without the uniform displacement",
         ancillary=("work_error",),
+        short="work",
     ),
     "stored_energy": Variable(
         _SERIES,
@@ -126,6 +145,7 @@ VARIABLES: dict[str, Variable] = {
         "real contact area",
         "cells that carry pressure, counted",
         ancillary=("contact_area_lower", "contact_area_upper"),
+        short="contact area",
     ),
     "contact_area_corrected": Variable(
         _SERIES,
@@ -133,9 +153,12 @@ VARIABLES: dict[str, Variable] = {
         "real contact area, corrected for the grid",
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
+        short="contact area",
     ),
-    "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area"),
-    "mean_gap": Variable(_SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",)),
+    "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area", short="contact fraction"),
+    "mean_gap": Variable(
+        _SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",), short="mean gap"
+    ),
     # accuracy and cost
     "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32"),
     "convolutions": Variable(
@@ -201,7 +224,63 @@ VARIABLES: dict[str, Variable] = {
         "as grid_error, and from the number of faces at the contact's edge",
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
-    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run"),
+    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time"),
+    # derived from a result: see roughvisc.views.observables
+    "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
+    "cluster_area_mean": Variable(_SERIES, "m2", "mean area of a contact cluster"),
+    "cluster_area_largest": Variable(_SERIES, "m2", "area of the largest contact cluster"),
+    "cluster_area": Variable(
+        ("time", "cluster"), "m2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
+    ),
+    "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
+    "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
+    "pressure_density": Variable(
+        ("time", "pressure_bin"),
+        "Pa-1",
+        "probability density of the contact pressure",
+        "over the cells in contact: its integral is 1",
+    ),
+    "gap_density": Variable(
+        ("time", "gap_bin"),
+        "m-1",
+        "probability density of the gap",
+        "over the present cells out of contact: its integral is 1",
+    ),
+    "gap_mean": Variable(_SERIES, "m", "mean gap over the present cells", "cells in contact included"),
+    "gap_median": Variable(_SERIES, "m", "median gap over the present cells", "cells in contact included"),
+    "area_growth_exponent": Variable(
+        _SERIES, "1", "growth exponent of the contact area", "d ln(area) / d ln(time), local"
+    ),
+    "contact_stiffness": Variable(
+        _SERIES,
+        "N/m",
+        "slope of force over approach along the history",
+        "includes the creep between kept times; missing while the approach stands still",
+    ),
+    "trapezoidal_work": Variable(
+        _SERIES,
+        "J",
+        "work done by the force since the first kept time",
+        "trapezoidal integral of force over approach; over a closed loop it is the energy dissipated",
+    ),
+    "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
+    "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
+    "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
+    "cycle_closure": Variable(
+        ("cycle",),
+        "1",
+        "how far force and approach at the ends of the cycle are apart",
+        "over their ranges in the cycle; 0: the loop is closed",
+    ),
+    "cycle_dissipated_energy": Variable(
+        ("cycle",), "J", "energy dissipated in the cycle", "missing where the loop does not close"
+    ),
+    "percolates_x": Variable(
+        _SERIES, "1", "whether the region out of contact connects opposite sides along x", dtype="int8"
+    ),
+    "percolates_y": Variable(
+        _SERIES, "1", "whether the region out of contact connects opposite sides along y", dtype="int8"
+    ),
     # a trade of accuracy against speed: what was set, what it cost, how wrong it was
     "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
     "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
@@ -269,11 +348,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     """
     other = {}
     for name, variable in dataset.variables.items():
-        if name not in VARIABLES:
-            raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-        declared = VARIABLES[str(name)]
-        if variable.dims[-len(declared.dims) :] != declared.dims:
-            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {declared.dims}")
+        declared = _declared(str(name), variable.dims)
         if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
             other[name] = variable.astype(declared.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
@@ -288,3 +363,36 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
             flag_meanings=" ".join(STATUS_MEANINGS),
         )
     return annotated
+
+
+def describe(dataset: xr.Dataset) -> xr.Dataset:
+    """Dataset of derived variables alone, with the declared attributes and no others.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Holds declared variables only; coordinates that are not declared, such as ``case``, stay as they are.
+
+    Raises
+    ------
+    KeyError
+        If a variable is not declared.
+    ValueError
+        If a variable's dimensions do not end in the declared ones.
+    """
+    described = dataset.copy()
+    for name, variable in described.variables.items():
+        if name in described.coords and (name not in VARIABLES or name not in described.dims):
+            continue
+        variable.attrs = _declared(str(name), variable.dims).attributes()
+    described.attrs = {}
+    return described
+
+
+def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
+    if name not in VARIABLES:
+        raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
+    declared = VARIABLES[name]
+    if dims[-len(declared.dims) :] != declared.dims:
+        raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
+    return declared

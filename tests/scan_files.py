@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.topography.readers import open_scan
+from roughvisc.topography.scans import open_scan
 
 ROOT = Path(__file__).parents[1]
 SCANS = next((p for p in (ROOT.parent / "shared" / "scans", ROOT / "shared" / "scans") if p.exists()), None)

@@ -101,6 +101,8 @@ def test_reference__names_everything_public():
     listed = re.findall(r"^   (\w+)$", (DOCS / "reference.md").read_text(), re.M)
     public = {name for name in rv.__all__ if name != "__version__" and not inspect.ismodule(getattr(rv, name))}
     assert public <= set(listed)
+    functions = set(re.findall(r"^   (\w+\.\w+)$", (DOCS / "reference.md").read_text(), re.M))
+    assert functions == {f"{name}.{one}" for name in ("plot", "observables") for one in getattr(rv, name).__all__}
 
 
 def test_gallery__shows_every_study_as_it_is():

@@ -59,7 +59,7 @@ ALLOWED = {
         "views.sweep_figures",
         "views.plot",
     },
-    "views.console": {*_LABELS, "study.execution", "study.trade", "study.validation", "views.figures"},
+    "views.console": {*_LABELS, "topography", "study.execution", "study.trade", "study.validation", "views.figures"},
     "cli": {
         *_LABELS,
         "study.progress",
@@ -143,9 +143,25 @@ def test_imports__point_downward(path):
         assert room(module) == here or room(module) in ALLOWED[here], f"{here} imports {module}"
 
 
+def test_storage__is_the_one_door_to_result_files():
+    outside = [path for path in FILES if room(module_of(path)) != "study.storage"]
+    assert len(outside) < len(FILES)
+    for path in outside:
+        assert "netCDF4" not in {name.split(".")[0] for name in imports(path)}, path
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("glob", "rglob"):
+                assert ".nc" not in ast.unparse(node), f"{path} looks for results by name"
+
+
 def test_rooms__form_no_circle():
     order = TopologicalSorter(ALLOWED)
     assert set(ALLOWED) <= set(order.static_order())
+
+
+def test_modules__form_no_circle():
+    """Not even through imports inside functions."""
+    graph = {module_of(path): {one for one in modules(path) if one != "__init__"} for path in FILES}
+    TopologicalSorter({one: uses - {one} for one, uses in graph.items()}).prepare()
 
 
 @pytest.mark.parametrize("folder", MOST_ENTRIES)

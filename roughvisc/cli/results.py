@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from roughvisc.cli.output import draw, say
-from roughvisc.errors import InputError
 
 
 @click.command()
@@ -25,14 +24,14 @@ def plot(result: Path, out: Path | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.storage.store import no_results, open_result, result_files
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
     from roughvisc.views.sweep_figures.files import results_of
 
-    paths = sorted(p for p in result.glob("*.nc") if not p.name.startswith(".")) if result.is_dir() else [result]
+    paths = result_files(result) if result.is_dir() else [result]
     if not paths:
-        raise InputError(f"{result}: holds no results: expected files .nc, as roughvisc run writes them")
+        raise no_results(result)
     console = Console()
     for path in paths:
         if path.is_file() and is_trade(path):

@@ -51,7 +51,8 @@ def scan(
     from roughvisc.study.storage.store import whole_file
     from roughvisc.topography.bandwidth import level
     from roughvisc.topography.parameters import parameters
-    from roughvisc.topography.readers import list_channels, open_scan
+    from roughvisc.topography.readers import list_channels
+    from roughvisc.topography.scans import open_scan
     from roughvisc.topography.writers import card_text, known_suffix, save_scan
     from roughvisc.views.console.tables import scan_table
     from roughvisc.views.plot import surface

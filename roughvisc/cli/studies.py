@@ -208,7 +208,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)
     with reporting(True, console) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, budget=time, progress=bar.reached)
+        dataset = measured(case, budget=time, progress=report)
     console.print(trade_table(dataset))
     say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
     draw(figure(dataset), folder / "trade.png")

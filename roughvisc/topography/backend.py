@@ -48,7 +48,7 @@ class ScanArray(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._read)
 
     def _read(self, key: tuple[int | slice, ...]) -> np.ndarray:
-        from roughvisc.topography.readers import open_scan
+        from roughvisc.topography.scans import open_scan
 
         h = open_scan(self.path, **self.options)
         if h.attrs["source_sha256"] != self.checksum:
@@ -94,7 +94,7 @@ class RoughviscBackend(BackendEntrypoint):
         InputError
             As :func:`roughvisc.open_scan`; what is wrong with the heights themselves shows when they are read.
         """
-        from roughvisc.topography.readers import outline
+        from roughvisc.topography.scans import outline
 
         options = {"format": format, "channel": channel, "unit": unit, "spacing": spacing}
         h = outline(filename_or_obj, **options)

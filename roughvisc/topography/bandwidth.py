@@ -38,10 +38,21 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     if order not in (0, 1, 2, 3) or isinstance(order, bool):
         raise InputError(f"level: order is {order!r}: expected 0 (mean), 1 (plane), 2 or 3")
     valid_values(h, "level")
-    heights = h.values - np.nanmean(h.values)  # absolute heights of instruments would cost digits
+    return noted(like(h, less_polynomial(h.values, order)), f"levelled: polynomial of order {order} removed")
+
+
+def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
+    """Heights less their least-squares polynomial of total degree `order` over the finite points; of a strip too. [m]
+
+    Raises
+    ------
+    InputError
+        If the points present do not determine the polynomial.
+    """
+    heights = heights - np.nanmean(heights)  # absolute heights of instruments would cost digits
     for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
         heights = heights - _polynomial(heights, order)
-    return noted(like(h, heights), f"levelled: polynomial of order {order} removed")
+    return heights
 
 
 def gaussian_filter(
@@ -143,7 +154,8 @@ def _polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     """Least-squares polynomial over the finite points, from moments, so that no design matrix is stored."""
     present = np.isfinite(heights)
     bases = [np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order) for n in heights.shape]
-    terms = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+    degrees = [order if n > 1 else 0 for n in heights.shape]  # heights do not vary across a strip
+    terms = [(i, j) for i in range(degrees[0] + 1) for j in range(min(degrees[1], order - i) + 1)]
     products = [(b[:, :, None] * b[:, None, :]).reshape(len(b), -1) for b in bases]
     moments = (products[0].T @ present.astype(float) @ products[1]).reshape([order + 1] * 4)
     normal = np.array([[moments[i, k, j, m] for k, m in terms] for i, j in terms])

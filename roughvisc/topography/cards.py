@@ -15,33 +15,21 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography import conditioning, synthesis
-from roughvisc.topography.readers import open_scan, sha256
+from roughvisc.topography import conditioning
+from roughvisc.topography.readers import existing, read_file, sha256
+from roughvisc.topography.recipes import RECIPES, UNITS, make
 from roughvisc.units import quantity
 
 _PROVENANCE = ("title", "description", "licence", "source")
 _FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "spacing")
-#: recipe -> unit of each parameter that is a quantity; None: taken as it is
-_LATERAL: dict[str, str | None] = {"size": "m", "shape": None}
-RECIPES: dict[str, dict[str, str | None]] = {
-    "sphere": {"radius": "m", "exact": None, **_LATERAL},
-    "cone": {"slope": "1", **_LATERAL},
-    "flat_punch": {"radius": "m", **_LATERAL},
-    "wavy": {"amplitude": "m", "wavelength": "m", "waves": None, **_LATERAL},
-    "self_affine": {
-        "hurst": "1",
-        "rms_slope": "1",
-        "rms_height": "m",
-        "rolloff": "m",
-        "shortcut": "m",
-        "anisotropy": "1",
-        "seed": None,
-        **_LATERAL,
-    },
-}
 
 
-def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
+def is_card(path: Path, format: str | None) -> bool:
+    """Whether a file is a surface card: by its suffix, unless the format is given."""
+    return format == "card" or (format is None and path.suffix.lower() == ".toml")
+
+
+def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.DataArray:
     """Height over (x, y) as a surface card describes it, conditioned. [m]
 
     Parameters
@@ -50,6 +38,8 @@ def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
         The card; its ``file`` is relative to the card's folder.
     conditioned : bool
         Whether its conditioning is done; if not, the heights are as measured or made.
+    **options
+        Of :func:`roughvisc.open_scan`, to be refused: they belong in the card.
 
     Returns
     -------
@@ -59,9 +49,12 @@ def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
     Raises
     ------
     InputError
-        If the card is no TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
+        If an option is given beside the card, the card is no TOML, has unknown or missing keys or wrong values, or
+        the checksum of the file differs.
     """
     path = Path(path)
+    if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
+        raise InputError(f"{path}: found {named} beside a surface card: expected it in the card")
     try:
         card = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
@@ -99,14 +92,10 @@ def generate(table: Mapping[str, Any]) -> xr.DataArray:
     name = table["generate"]
     if name not in RECIPES:
         raise InputError(f"generate is {name!r}: expected one of {', '.join(RECIPES)}")
-    units = RECIPES[name]
     given = {key: value for key, value in table.items() if key != "generate"}
-    _known(given, units, f"{name} takes")
-    parameters = {
-        key: value if units[key] is None else _quantities(value, units[key], key) for key, value in given.items()
-    }
+    _known(given, RECIPES[name], f"{name} takes")
     try:
-        return getattr(synthesis, name)(**parameters)
+        return make(name, {key: _quantities(value, UNITS.get(key), key) for key, value in given.items()})
     except TypeError as error:  # "missing 1 required positional argument: 'radius'"
         raise InputError(f"{name}: {str(error).partition('() ')[2] or error}") from error
 
@@ -159,7 +148,9 @@ def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
     options = {key: card[key] for key in ("format", "channel", "unit") if key in card}
     if "spacing" in card:
         options["spacing"] = _quantities(card["spacing"], "m", "spacing")
-    return open_scan(path, **options)
+    if is_card(path, options.get("format")):
+        return open_card(path, **{key: value for key, value in options.items() if key != "format"})
+    return read_file(existing(path), **options)
 
 
 def _text(card: Mapping[str, Any], key: str) -> str:

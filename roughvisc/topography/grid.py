@@ -47,14 +47,23 @@ def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] |
     )
 
 
-def checked(h: Any, step: str) -> xr.DataArray:
+def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     """The grid as float64 over ``("x", "y")``, after a check that it is one.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Heights over x and y. [m]
+    step : str
+        Who asks, for the message.
+    least : int
+        Points that there have to be in each direction.
 
     Raises
     ------
     InputError
-        If `h` is no DataArray over exactly the dimensions x and y, has fewer than two points in a direction, no
-        numeric coordinates, or unequal steps; the message names the `step` that asked.
+        If `h` is no DataArray over exactly the dimensions x and y, has fewer than `least` points in a direction,
+        no numeric coordinates, or unequal steps; the message names the `step` that asked.
     """
     if not isinstance(h, xr.DataArray):
         raise InputError(f"{step}: found {type(h).__name__}: expected an xarray.DataArray of heights (see from_array)")
@@ -64,29 +73,79 @@ def checked(h: Any, step: str) -> xr.DataArray:
         )
     h = h.transpose("x", "y").astype(float, copy=False)
     spacing(h, step)
+    for axis in ("x", "y"):
+        if h.sizes[axis] < least:
+            raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
     return h
 
 
-def spacing(h: xr.DataArray, step: str = "spacing") -> tuple[float, float]:
+def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
     """Cell sides (dx, dy) of a grid [m]; an :class:`InputError` if the steps along a coordinate are not equal."""
     return axis_step(h, "x", step), axis_step(h, "y", step)
 
 
-def axis_step(h: xr.DataArray, axis: str, step: str) -> float:
-    """The equal step along one coordinate [m], ascending."""
+def axis_step(h: xr.DataArray | xr.Dataset, axis: str, step: str) -> float:
+    """Side of the cells along one axis of a grid [m], as :func:`cell_side` gives it."""
     if axis not in h.coords:
         raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
-    at = np.asarray(h[axis].values)
-    if at.dtype.kind not in "fiu" or at.size < 2 or not np.isfinite(at).all():
-        raise InputError(f"{step}: coordinate {axis!r} has {at.size} point(s): expected at least 2 finite numbers")
+    return cell_side(h[axis].values, f"{step}: coordinate {axis!r}")
+
+
+def cell_side(centres: Any, name: str = "the coordinate") -> float:
+    """Side of the equal cells of an axis: the step between their centres; a lone cell begins at zero.
+
+    Parameters
+    ----------
+    centres : array_like, shape (n,)
+        Centres of the cells, ascending. [m]
+    name : str
+        What they are, for the message.
+
+    Returns
+    -------
+    float
+        The side. [m]
+
+    Raises
+    ------
+    InputError
+        If there is no centre, a number is not finite, the steps are not equal and positive, or the centre of a lone
+        cell is not above zero.
+
+    Examples
+    --------
+    >>> cell_side([1.0, 3.0, 5.0]), cell_side([1.0])
+    (2.0, 2.0)
+    """
+    at = np.asarray(centres)
+    if at.dtype.kind not in "fiu" or at.ndim != 1 or not at.size or not np.isfinite(at).all():
+        raise InputError(f"{name} has {at.size} point(s) of {at.dtype}: expected finite numbers")
+    if at.size == 1:
+        if not at[0] > 0:
+            raise InputError(f"{name} has its only cell centred at {at[0]:g} m: expected half its side")
+        return 2 * float(at[0])
     d = float(at[-1] - at[0]) / (at.size - 1)
     if not d > 0 or np.abs(np.diff(at) - d).max() > 1e-4 * d:
         steps = np.diff(at)
         raise InputError(
-            f"{step}: coordinate {axis!r} has steps from {steps.min():.6g} to {steps.max():.6g} m: "
-            "expected a uniform, ascending grid"
+            f"{name} has steps from {steps.min():.6g} to {steps.max():.6g} m: expected a uniform, ascending grid"
         )
     return float(f"{d:.15g}")
+
+
+def cell_edges(centres: Any) -> np.ndarray:
+    """Borders of the equal cells of an axis, one more than there are cells. [m]
+
+    Examples
+    --------
+    >>> cell_edges([1.0, 3.0]), cell_edges([1.0])
+    (array([0., 2., 4.]), array([0., 2.]))
+    """
+    at = np.asarray(centres, dtype=float)
+    side = cell_side(at)
+    edges = np.append(at - side / 2, at[-1] + side / 2)
+    edges[np.abs(edges) < 1e-9 * side] = 0.0  # where grids begin; rounding
+    return edges
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:

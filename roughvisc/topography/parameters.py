@@ -43,7 +43,7 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     xarray.Dataset
         Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr, rms_slope, rms_slope_x, rms_slope_y [-], rms_curvature [1/m] and
         missing_fraction [-], each with units and a name. Missing points take no part, nor do differences that would
-        need them; a parameter that no point is left for is NaN.
+        need them; a parameter that no point is left for is NaN. Across a strip, one cell wide, heights do not vary.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     ----------
     .. [1] ISO 25178-2:2021, Surface texture: Areal, terms, definitions and parameters.
     """
-    h = checked(h, "parameters")
+    h = checked(h, "parameters", least=1)
     z = valid_values(h, "parameters")
     z = z - z.mean()
     square = np.mean(z**2)
@@ -117,7 +117,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     ----------
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     """
-    h = checked(h, "psd")
+    h = checked(h, "psd", least=1)
     if np.isnan(h.values).any():
         raise InputError(f"psd: {int(np.isnan(h.values).sum())} points are missing: expected none (fill them first)")
     if window not in (None, "hann"):
@@ -136,7 +136,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     if shape[1] % 2 == 0:
         twice[-1] = 1
     twice = np.broadcast_to(twice, q.shape).ravel()
-    step = 2 * np.pi / min(n * d for n, d in zip(shape, cells, strict=True))
+    step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)
     ring = np.maximum(np.round(q.ravel() / step).astype(int), 1) - 1
     ring[0] = -1  # the mean
     counted, at, total = (
@@ -162,7 +162,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
 def _slopes(h: xr.DataArray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
     """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1)."""
     dx, dy = spacing(h)
-    z = np.pad(h.values, (0, 1), mode="wrap") if periodic else h.values
+    z = np.pad(h.values, [(0, int(periodic or n == 1)) for n in h.shape], mode="wrap")
     slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
     both = np.isfinite(slope_x) & np.isfinite(slope_y)
     return slope_x[both], slope_y[both]
@@ -171,7 +171,7 @@ def _slopes(h: xr.DataArray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
 def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:
     """Sum of the second differences along x and y where all five points are there."""
     dx, dy = spacing(h)
-    z = np.pad(h.values, 1, mode="wrap") if periodic else h.values
+    z = np.pad(h.values, [(w := int(periodic or n == 1), w) for n in h.shape], mode="wrap")
     middle = z[1:-1, 1:-1]
     laplacian = (z[2:, 1:-1] - 2 * middle + z[:-2, 1:-1]) / dx**2 + (z[1:-1, 2:] - 2 * middle + z[1:-1, :-2]) / dy**2
     return laplacian[np.isfinite(laplacian)]

@@ -1,4 +1,4 @@
-"""Scans in: an instrument file, a grid file or a surface card becomes a labelled grid of heights.
+"""Files in: an instrument file or a grid file becomes a labelled grid of heights.
 
 The libraries parse; here is dispatch, labelling and checking. Whatever goes wrong is one
 :class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.
@@ -31,75 +31,19 @@ WIDEST, FINEST, FARTHEST = 1.0, 1e-11, 1e3
 _READER = threading.RLock()
 
 
-def open_scan(
-    path: str | os.PathLike[str],
+def read_file(
+    path: Path,
     *,
+    heights: bool = True,
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
-    """Heights of a scanned surface, from an instrument file, a grid file or a surface card.
+    """Grid of an instrument or grid file; without `heights` they are NaN that take no memory, where a header tells all.
 
-    Parameters
-    ----------
-    path : path
-        X3P, SDF, NetCDF, a surface card (``.toml``), or any format that SurfaceTopography reads.
-    format : str, optional
-        A key of :func:`supported_formats`; ``"auto"`` has the format guessed from the content. Default: by the suffix.
-    channel : int or str, optional
-        Number or name of the channel, see :func:`list_channels`. Default: the height channel, or the one that the
-        library prefers where there are several; the others are then listed in the attribute ``other_channels``.
-    unit : str, optional
-        Unit of length in a file that states none, as ``"um"``.
-    spacing : float or pair of float, optional
-        Cell sides (dx, dy), in place of what the file says. [m]
-
-    Returns
-    -------
-    xarray.DataArray
-        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
-        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel
-        and ``history``.
-
-    Raises
-    ------
-    InputError
-        If the file is absent, damaged, of unknown format, no areal height scan, without unit or size, or implausible:
-        wider than 1 m, finer than 10 pm, heights beyond 1 km.
-
-    Warns
-    -----
-    UserWarning
-        If the checksum in an X3P file is wrong.
+    The options are those of :func:`roughvisc.open_scan`.
     """
-    h = outline(path, heights=True, format=format, channel=channel, unit=unit, spacing=spacing)
-    finite(h, str(path))
-    return h
-
-
-def outline(
-    path: str | os.PathLike[str],
-    *,
-    heights: bool = False,
-    format: str | None = None,
-    channel: int | str | None = None,
-    unit: str | None = None,
-    spacing: float | tuple[float, float] | None = None,
-) -> xr.DataArray:
-    """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
-
-    The heights are NaN that take no memory. A surface card is conditioned, which needs its heights: they are there.
-    """
-    path = _existing(path)
-    if format == "card" or (format is None and path.suffix.lower() == ".toml"):
-        from roughvisc.topography.cards import open_card  # which opens scans in turn
-
-        given = {"channel": channel, "unit": unit, "spacing": spacing}
-        if set(given.values()) != {None}:
-            named = ", ".join(f"{key}=" for key, value in given.items() if value is not None)
-            raise InputError(f"{path}: found {named} beside a surface card: expected it in the card")
-        return open_card(path)
     metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     sides = None if spacing is None else pair("spacing", spacing)
     read = _from_grid if _is_grid(path, format) else _from_instrument
@@ -111,7 +55,10 @@ def outline(
     attrs |= {"other_channels": ", ".join(others)} if others else {}
     how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
     how += f", unit {unit} as given" if unit else ""
-    return noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
+    h = noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
+    if heights:
+        finite(h, str(path))
+    return h
 
 
 def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArray:
@@ -153,7 +100,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     path : path
         Instrument or grid file.
     format : str, optional
-        As for :func:`open_scan`.
+        As for :func:`roughvisc.open_scan`.
 
     Returns
     -------
@@ -165,7 +112,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     InputError
         If the file is absent, damaged or of unknown format.
     """
-    path = _existing(path)
+    path = existing(path)
     with _reading(path):
         if _is_grid(path, format):
             return gridfiles.grid_channels(path)
@@ -213,7 +160,7 @@ def _from_instrument(
             raise InputError("it states no size: pass spacing=(dx, dy) [m]")
         h = labelled(values, sides or found)
     for complaint in opened.complaints:
-        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=4)
+        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     return h, opened, chosen
 
 
@@ -260,7 +207,8 @@ def _unit_known(chosen: Channel, unit: float | None) -> None:
             raise InputError(f"it states its unit as {chosen.unit!r}: leave unit= out, or scale the heights afterwards")
 
 
-def _existing(path: Any) -> Path:
+def existing(path: Any) -> Path:
+    """The path of a file that is there; an :class:`~roughvisc.errors.InputError` otherwise."""
     try:
         path = Path(path)
     except TypeError as error:

@@ -45,6 +45,11 @@ __all__ = [
     "trade",
 ]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 #: What :func:`save_figures` draws: name -> (function, variables of which all, variables of which one is needed).
 FIGURES = {
     "history": (history, (), ("force", "approach", "contact_area")),

@@ -17,7 +17,8 @@ from scan_files import CELL, SCANS, TABLE, card, file_card, real, tilted, write_
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography.backend import UNAMBIGUOUS, RoughviscBackend
-from roughvisc.topography.readers import from_array, open_scan, outline, supported_formats
+from roughvisc.topography.readers import from_array, supported_formats
+from roughvisc.topography.scans import open_scan, outline
 
 
 def lazily(path, **options):

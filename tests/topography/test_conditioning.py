@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roughvisc.errors import InputError
+from roughvisc.topography.bandwidth import less_polynomial
 from roughvisc.topography.conditioning import (
     combine,
     crop,
@@ -23,7 +24,8 @@ from roughvisc.topography.conditioning import (
     taper,
 )
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, open_scan
+from roughvisc.topography.readers import from_array
+from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
 
 SCANS = Path(__file__).parents[3] / "shared" / "scans"
@@ -396,6 +398,14 @@ def test_filled__of_either_face_stays_in_the_combination():
     assert both.attrs["fill_method"] == "harmonic, nearest"
     np.testing.assert_array_equal(combine(a.fillna(0), fill(b))["filled"], np.isnan(b))
     assert "filled" not in combine(a, b).coords
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_less_polynomial__of_a_strip_is_that_of_a_line(order):
+    values = np.random.default_rng(order).normal(size=41)
+    rest = values - np.polynomial.Polynomial.fit(np.arange(41), values, order)(np.arange(41))
+    np.testing.assert_allclose(less_polynomial(values[:, None], order)[:, 0], rest, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(less_polynomial(values[None, :], order)[0], rest, rtol=0, atol=1e-12)
 
 
 def test_level__cubic_takes_off_what_quadratic_leaves():

@@ -15,7 +15,8 @@ from scan_files import CELL, SHAPE, damaged, refusal, survive, tilted, write_sdf
 from roughvisc.errors import InputError
 from roughvisc.topography.backend import RoughviscBackend
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, list_channels, open_scan
+from roughvisc.topography.readers import from_array, list_channels
+from roughvisc.topography.scans import open_scan
 
 
 def write_xyz(path, heights=None, shuffled=True):

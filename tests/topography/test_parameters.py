@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import spacing
+from roughvisc.topography.grid import cell_side, labelled, spacing
 from roughvisc.topography.parameters import PARAMETERS, parameters, psd
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.synthesis import self_affine, wavy
@@ -142,6 +142,38 @@ def test_psd__window_keeps_the_level_of_noise_and_stops_leakage():
     tilted = ROUGH * 0 + xr.DataArray(np.sin(2 * np.pi * 2.5 * ROUGH.x / SIZE[0]), dims="x")
     far = {"wavevector": slice(4e5, None)}
     assert float(psd(tilted, "hann")["psd"].sel(far).max()) < 1e-2 * float(psd(tilted)["psd"].sel(far).max())
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_strip__is_uniform_across(along):
+    """A strip, one cell wide, has the numbers of the same profile drawn out in the other direction."""
+    values, cell = 1e-6 * np.random.default_rng(3).normal(size=(61, 1)), (5e-6, 4e-6)
+    wave = wavy(1e-6, 1e-4, (3e-4, 5e-6), (61, 1), waves=1)
+    profile, wide = labelled(values, cell), labelled(np.tile(values, 7), cell)
+    if along == "y":
+        profile, wide, wave = (labelled(h.values.T, spacing(h)[::-1]) for h in (profile, wide, wave))
+    for periodic in (False, True):
+        found, wanted = parameters(profile, periodic), parameters(wide, periodic)
+        for name in PARAMETERS:
+            np.testing.assert_allclose(found[name], wanted[name], rtol=1e-9, atol=1e-20, err_msg=name)
+    spectrum = psd(wave)
+    assert spectrum.area == pytest.approx(3e-4 * 5e-6)
+    ring = spectrum.sel(wavevector=2 * np.pi / 1e-4, method="nearest")
+    assert float(ring["psd"] * ring["modes"]) == pytest.approx(2 * 1e-12 / 4 * spectrum.area, rel=1e-10)
+    assert float((spectrum["psd"] * spectrum["modes"]).sum() / spectrum.area) == pytest.approx(0.5e-12, rel=1e-9)
+
+
+def test_lone_cell__has_no_wave_and_no_slope():
+    alone = labelled([[1e-6]], (2e-6, 3e-6))
+    assert spacing(alone) == (2e-6, 3e-6)
+    assert float(parameters(alone, periodic=True)["Sq"]) == 0
+    assert psd(alone).sizes["wavevector"] == 0
+
+
+@pytest.mark.parametrize("centre", [0.0, -1e-6, np.nan])
+def test_cell_side__of_a_lone_cell_begins_at_zero(centre):
+    with pytest.raises(InputError, match="finite numbers" if np.isnan(centre) else "expected half its side"):
+        cell_side([centre])
 
 
 def test_psd__refuses():

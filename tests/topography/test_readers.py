@@ -29,7 +29,8 @@ from roughvisc.errors import InputError
 from roughvisc.topography import conditioning, synthesis
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import parameters
-from roughvisc.topography.readers import from_array, list_channels, open_scan, supported_formats
+from roughvisc.topography.readers import from_array, list_channels, supported_formats
+from roughvisc.topography.scans import open_scan
 
 # -- every row of the table beside the real files ----------------------------------------------------------------------
 

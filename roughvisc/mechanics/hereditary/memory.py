@@ -253,5 +253,9 @@ def stiff_ratio(material: Material, step: float) -> float:
 
     ``C(h) / mean C - 1``: zero for an elastic material, one for a dashpot or a Kelvin-Voigt solid.
     """
-    mean = mean_compliance(material, step)
-    return float(material.contact_compliance(step)) / mean - 1 if mean > 0 else math.inf
+    return old_weight(float(material.contact_compliance(step)), mean_compliance(material, step))
+
+
+def old_weight(compliance: float, mean: float) -> float:
+    """The ratio of :func:`stiff_ratio` from the compliance at the end of a step and its mean over it. [1/Pa]"""
+    return compliance / mean - 1 if mean > 0 else math.inf

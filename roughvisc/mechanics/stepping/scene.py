@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance
+from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
@@ -86,8 +86,7 @@ class Scene:
 
     def stiff_ratio(self, step: float) -> float:
         """As :func:`~roughvisc.mechanics.hereditary.memory.stiff_ratio`, no longer than the program."""
-        mean = self.mean_compliance(step)
-        return self.compliance(step) / mean - 1 if mean > 0 else math.inf
+        return old_weight(self.compliance(step), self.mean_compliance(step))
 
     @cached_property
     def _known(self) -> tuple[Callable[[float], float], Callable[[float], float]]:

@@ -24,8 +24,8 @@ from roughvisc.study.simulation.simulate import press
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, write_result
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.study.storage.store import open_result, result_path, torn_files, write_result
+from roughvisc.variables import NOT_CONVERGED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +203,7 @@ def run_case(
         If the disk is full; the last checkpoint stays.
     """
     folder = Path(folder)
-    path = folder / f"{case.key}.nc"
+    path = result_path(folder, case.key)
     if is_result_of(case, path) and not _leftovers(path):
         return path
     made = [place for place in (folder, *folder.parents) if not place.exists()]
@@ -211,7 +211,7 @@ def run_case(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with held(folder / f".{case.key}.lock") as lock:
-            for torn in folder.glob(f".{case.key}.*.part.nc"):
+            for torn in torn_files(path):
                 torn.unlink()
             keeper = Keeper(
                 folder / f".{case.key}.unfinished",
@@ -277,7 +277,7 @@ def _leftovers(path: Path) -> bool:
 
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
-    path = write_result(dataset, folder / f"{case.key}.nc", precision=case.settings.keep.precision)
+    path = write_result(dataset, result_path(folder, case.key), precision=case.settings.keep.precision)
     dataset.encoding["source"] = str(path)
     complaint = unconverged(dataset)
     if complaint:
@@ -288,7 +288,7 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
     """What to tell about steps that did not converge; empty if all did."""
     status = np.asarray(histories["status"])
-    bad = np.flatnonzero(status == STATUS_MEANINGS.index("not_converged"))
+    bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
     left = np.asarray(histories["residual"], dtype=float)[bad]

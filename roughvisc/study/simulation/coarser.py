@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.topography.bandwidth import resample
+from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import remade
 
 Array = NDArray[np.float64]
@@ -36,12 +37,6 @@ def coarser(height: xr.DataArray, factor: float) -> xr.DataArray:
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
     return resample(height, coarser_shape(shape, factor, False)) if few is None else few
-
-
-def edges_of(centres: NDArray[np.float64]) -> Array:
-    """Borders of the cells of an even axis; a single cell begins at zero. [m]"""
-    side = float(centres[1] - centres[0]) if len(centres) > 1 else 2 * float(centres[0])
-    return np.append(centres - side / 2, centres[-1] + side / 2)
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:
@@ -77,7 +72,7 @@ def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
     ndarray, shape (time,)
         The integral of the absolute difference (L1).
     """
-    grids = [tuple(edges_of(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
+    grids = [tuple(cell_edges(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
     fields = [ds["pressure"].values for ds in (found, wanted)]
     sides = [np.diff(grid[0])[0] for grid in grids]
     common = grids[int(np.argmax(sides))]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import RoughviscError
 from roughvisc.study.simulation.coarser import coarser, pressure_distance
 from roughvisc.study.simulation.grid_convergence import grid_uncertainty
+from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.topography.indenters import grown
 
 log = logging.getLogger("roughvisc")
@@ -162,14 +163,9 @@ def _left_open(dataset: xr.Dataset, time: int) -> tuple[float, float]:
 def _edge(contact: Mask, free: Mask, periodic: bool) -> tuple[Mask, Mask, int]:
     """Cells in contact beside present cells out of contact, and beside none at all; faces to the former."""
     at_edge, at_end, faces = np.zeros_like(contact), np.zeros_like(contact), 0
-    width = [(1, 1), (1, 1)]
-    mode = "wrap" if periodic else "constant"
-    beside, material = np.pad(free, width, mode), np.pad(free | contact, width, mode)  # type: ignore[call-overload]
-    nx, ny = contact.shape
-    for i, j in ((0, 1), (2, 1), (1, 0), (1, 2)):
-        neighbours = slice(i, i + nx), slice(j, j + ny)
-        here = contact & beside[neighbours]
+    for beside, material in zip(neighbours(free, periodic), neighbours(free | contact, periodic), strict=True):
+        here = contact & beside
         faces += int(np.count_nonzero(here))
         at_edge |= here
-        at_end |= contact & ~material[neighbours]
+        at_end |= contact & ~material
     return at_edge, at_end, faces

@@ -9,6 +9,7 @@ import xarray as xr
 
 from roughvisc.mechanics.hereditary.choice import Engine
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.topography.grid import axis_step
 from roughvisc.variables import FIELDS
 
 #: What a result says of a material without instantaneous compliance.
@@ -109,6 +110,6 @@ def loaded_slope(height: xr.DataArray, depth: float) -> float:
         first, second = np.delete(values, -1, axis), np.delete(values, 0, axis)
         loaded = np.fmax(first, second) >= highest - depth
         steps = (second - first)[loaded & np.isfinite(first) & np.isfinite(second)]
-        side = float(height[name][1] - height[name][0])
+        side = axis_step(height, name, "height")
         squares += float(np.mean((steps / side) ** 2)) if steps.size else 0.0
     return float(np.sqrt(squares))

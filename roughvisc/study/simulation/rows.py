@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.mirror import quarter, unfold
+from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.storage.records import RowStore
 from roughvisc.variables import STATUS_MEANINGS, annotate
@@ -309,17 +310,10 @@ def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
     cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
     """
     free = ~contact if scene.present is None else scene.present & ~contact
+    periodic, mirrored = scene.halfspace.boundary == "periodic", scene.halfspace.mirrored
+    goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
+    # beyond a mirror a cell's neighbour is its image
+    seen = neighbours(free, periodic and not mirrored, before=goes_on and not mirrored, beyond=goes_on)
+    faces = sum(np.count_nonzero(contact & beside) for beside in seen)
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    faces = sum(_faces(np.moveaxis(contact, axis, 0), np.moveaxis(free, axis, 0), scene) for axis in (0, 1))
     return PERIMETER_CORRECTION * scene.halfspace.cell_area * faces
-
-
-def _faces(contact: NDArray[np.bool_], free: NDArray[np.bool_], scene: Scene) -> int:
-    """Number of faces across the first axis between cells in contact and present cells out of contact."""
-    faces = np.count_nonzero(contact[1:] & free[:-1]) + np.count_nonzero(contact[:-1] & free[1:])
-    mirrored = scene.halfspace.mirrored  # beyond a mirror a cell's neighbour is its image
-    if scene.halfspace.boundary == "periodic" and not mirrored:
-        faces += np.count_nonzero(contact[0] & free[-1]) + np.count_nonzero(contact[-1] & free[0])
-    elif scene.outside < math.inf:  # the surface goes on beyond the window, and nothing touches there
-        faces += np.count_nonzero(contact[-1]) + (0 if mirrored else np.count_nonzero(contact[0]))
-    return int(faces)

@@ -22,7 +22,7 @@ from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
-from roughvisc.topography.grid import axis_step
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
@@ -86,7 +86,7 @@ class Ground:
         self.gap[~self.present] = 0.0
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
-        self.spacing = (_side(self.height, "x"), _side(self.height, "y"))
+        self.spacing = spacing(self.height, "height")
         self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
 
     @property
@@ -227,21 +227,10 @@ def _checked(height: xr.DataArray) -> xr.DataArray:
     if 0 in height.shape:
         raise InputError(f"height has {height.shape[0]} x {height.shape[1]} cells: expected at least one each way")
     height = height.astype(float, copy=False)
-    for axis in ("x", "y"):
-        _side(height, axis)
+    spacing(height, "height")
     if np.isinf(height.values).any():
         raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
     return height
-
-
-def _side(height: xr.DataArray, axis: str) -> float:
-    """Side of the cells along one axis, [m]; a single cell begins at zero."""
-    if height.sizes[axis] > 1:
-        return axis_step(height, axis, "height")
-    centre = float(height[axis].values[0]) if axis in height.coords else math.nan
-    if not 0 < centre < math.inf:
-        raise InputError(f"height: the only cell along {axis!r} is centred at {centre:g} m: expected half its side")
-    return 2 * centre
 
 
 def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:

@@ -46,10 +46,10 @@ def treatment(dataset: xr.Dataset) -> Treatment:
 
 def measures(height: xr.DataArray) -> xr.Dataset:
     """Areal parameters of heights less their mean plane; see :func:`roughvisc.parameters`."""
-    from roughvisc.topography.conditioning import level
+    from roughvisc.topography.bandwidth import less_polynomial
     from roughvisc.topography.parameters import parameters
 
-    return parameters(level(height))
+    return parameters(height.copy(data=less_polynomial(height.values, 1)))
 
 
 def _measured(dataset: xr.Dataset) -> xr.DataArray | None:

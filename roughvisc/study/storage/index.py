@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.store import NETCDF, whole_file
+from roughvisc.study.storage.store import NETCDF, result_files, whole_file
 from roughvisc.variables import VARIABLES
 
 log = logging.getLogger("roughvisc")
@@ -137,9 +137,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
     stored = _load(folder / INDEX)
     before = {entry.file: entry for entry in (*stored.entries.values(), *known)}
     entries: dict[str, Entry] = {}
-    for path in sorted(folder.glob("*.nc")):
-        if path.name.startswith("."):
-            continue
+    for path in result_files(folder):
         try:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):

@@ -15,6 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.setting_units import unit_of
 from roughvisc.study.storage.index import NETCDF, Entry, index_of, save_index
+from roughvisc.study.storage.store import no_results
 from roughvisc.variables import VARIABLES, annotate
 
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
@@ -70,7 +71,7 @@ def open_results(out, *, cases="last", ragged=False):
     save_index(folder, index)
     entries = _chosen(index.entries, index.sweep, cases)
     if not entries:
-        raise InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
+        raise no_results(folder)
     parameters = parameters_of([entry.case for entry in entries])
     if ragged:
         return _tree(folder, entries, parameters)

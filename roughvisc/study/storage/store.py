@@ -59,6 +59,26 @@ _TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the 
 _NEARLY_FULL = 1 << 20
 
 
+def result_path(folder: Path, name: str) -> Path:
+    """File of a result in a folder; that of a case is named by its key."""
+    return folder / f"{name}.nc"
+
+
+def result_files(folder: Path) -> list[Path]:
+    """Files of a folder that may be results, in order of their names; none that is being written."""
+    return sorted(path for path in folder.glob("*.nc") if not path.name.startswith("."))
+
+
+def torn_files(path: Path) -> list[Path]:
+    """What writes of a result that did not end have left beside it."""
+    return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
+
+
+def no_results(folder: Path) -> InputError:
+    """What to tell of a folder without a result."""
+    return InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
+
+
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.

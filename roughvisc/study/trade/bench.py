@@ -16,7 +16,7 @@ from roughvisc.study.cost.estimate import March, Stopwatch, march_of, memory, so
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.simulation.scene import Ground, follows, kept_times, shortest_age
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
 
 Report = Callable[[str, float, float], None]
@@ -83,7 +83,7 @@ class Bench:
 
     def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
-        self._path, self._report = folder / "run.nc", report
+        self._path, self._report = result_path(folder, "run"), report
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         solve = case.settings.solve

@@ -24,6 +24,7 @@ from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import is_data
+from roughvisc.topography.grid import spacing
 
 Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]
@@ -82,7 +83,7 @@ class ClosedForm:
 
     def _pressure_error(self, dataset: xr.Dataset, x: Array, y: Array) -> float:
         assert self.pressure is not None
-        sides = [2 * float(d[0]) if len(d) == 1 else float(d[1] - d[0]) for d in (dataset["x"], dataset["y"])]
+        sides = spacing(dataset)
         distance, back = np.unique(np.round(np.hypot(x, y) / sides[0], 9), return_inverse=True)
         distance, back = distance * sides[0], back.reshape(x.shape)
         worst = 0.0

@@ -12,6 +12,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.trade.exact import QUANTITIES
 from roughvisc.study.trade.ladder import step_text
 from roughvisc.units import quantity as quantity_in
+from roughvisc.variables import VARIABLES
 
 #: The accuracies that are advised on unasked.
 TARGETS = (1e-2, 1e-3)
@@ -19,11 +20,8 @@ TARGETS = (1e-2, 1e-3)
 _ALIKE = 1.1
 #: What quantities are called in words; the area meant where none is named is the corrected one.
 WORDS = {
-    "contact_area_corrected": "contact area",
-    "pressure": "pressure",
-    "approach": "approach",
-    "contact_area": "contact area as counted",
-    "mean_gap": "mean gap",
+    name: VARIABLES[name].short + (" as counted" if name == "contact_area" else "")
+    for name in ("contact_area_corrected", "pressure", "approach", "contact_area", "mean_gap")
 }
 
 

@@ -19,6 +19,7 @@ neutral to units. Each case yields rows ``(what is compared, error, expected err
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -39,6 +40,7 @@ from roughvisc.mechanics.materials.models import (
 )
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.simulation.simulate import simulate
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.synthesis import cone, flat_punch, sphere, wavy
 
 Array = NDArray[np.float64]
@@ -70,7 +72,7 @@ def _pressure_error(dataset: xr.Dataset, exact: Callable[[Array, float], Array],
     """Largest L1 error over the largest force, outside of a distance from the axis."""
     distance = _distance(dataset)
     here = distance > beyond
-    cell = float((dataset.x[1] - dataset.x[0]) * (dataset.y[1] - dataset.y[0]))
+    cell = math.prod(spacing(dataset))
     # many cells are as far from the axis as others, and a closed form may take its time
     radii, which = np.unique(np.round(distance[here] / np.sqrt(cell), 9), return_inverse=True)
     errors = [

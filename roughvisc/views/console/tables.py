@@ -11,6 +11,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
 
 if TYPE_CHECKING:
@@ -259,7 +260,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     channels : sequence, optional
         Of :func:`roughvisc.list_channels`; told where there are several.
     """
-    sides = [float(height[axis][1] - height[axis][0]) for axis in ("x", "y")]
+    sides = spacing(height)
     counts = [height.sizes[axis] for axis in ("x", "y")]
     missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
     rows = [

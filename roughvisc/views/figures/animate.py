@@ -13,12 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.variables import VARIABLES
+from roughvisc.topography.grid import cell_edges
+from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     TimeAxis,
-    edges,
     fullest_frame,
     letter_panels,
     new_figure,
@@ -29,7 +29,6 @@ from roughvisc.views.figures.axes import (
     unit_for,
 )
 from roughvisc.views.figures.fields import (
-    NAMES,
     draw_map,
     draw_outline,
     outline_colour,
@@ -40,7 +39,7 @@ from roughvisc.views.figures.fields import (
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 from roughvisc.views.observables import contact
 
-_LONG_NAMES = {"force": "Force", "approach": "Approach", "contact_area": "Contact area"}
+_HISTORIES = ("force", "approach", "contact_area")
 
 
 def _writer(path: Path, rate: float):
@@ -106,12 +105,12 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
     """Figure, and an iterator that draws the next frame into it each time it is advanced."""
     require(dataset, "time", "x", "y")
     field = field or ("pressure" if "pressure" in dataset else "gap")
-    if field not in NAMES or field == "height":
+    if field not in FIELDS:
         raise InputError(f"field is {field!r}: expected 'pressure', 'gap' or 'displacement'")
     require(dataset, field)
     chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
     figure = new_figure(7.6, 4.2)
-    histories = [name for name in _LONG_NAMES if name in dataset]
+    histories = [name for name in _HISTORIES if name in dataset]
     columns = figure.add_gridspec(1, 2 if histories else 1, width_ratios=[1.15, 1] if histories else [1])
     upper, lower = columns[0].subgridspec(2, 1, height_ratios=[2, 1]).subplots()
     right = list(columns[1].subgridspec(len(histories), 1).subplots(squeeze=False)[:, 0]) if histories else []
@@ -150,7 +149,7 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
     first = present(dataset, field, chosen[0])
     image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
     side = "right" if plane_ratio(dataset) > 0.4 else "top"
-    figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(NAMES[field]))
+    figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(VARIABLES[field].label))
     ax.set_xlabel(plane.label("x"))
     ax.set_ylabel(plane.label("y"))
     ax.tick_params(direction="out")
@@ -182,7 +181,7 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
     plane, unit = plane_unit(dataset), unit_for(np.ptp(known), "m")
-    x, limits = plane(dataset["x"]), plane(edges(dataset["x"]))
+    x, limits = plane(dataset["x"]), plane(cell_edges(dataset["x"]))
     low, high = float(unit(known.min())), float(unit(known.max()))
     margin = 0.1 * ((high - low) or 1.0)
     top = high + 2 * margin
@@ -222,7 +221,7 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
         ax.tick_params(labelbottom=False)
     top = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
     ax.set_ylim(min(float(np.nanmin(shown, initial=0.0)) * 1.1, -0.05 * top), 1.15 * top)
-    ax.set_ylabel(unit.label(_LONG_NAMES[name]))
+    ax.set_ylabel(unit.label(VARIABLES[name].label))
     ax.grid(color="0.9", lw=0.5)
 
     def move(frame):

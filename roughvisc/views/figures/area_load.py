@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
 from roughvisc.views.figures.histories import leave_room, marker_of
 
@@ -95,8 +96,8 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     else:
         leave_room(ax, *(up(one["contact_area"]) for one in cases.values()))
         ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
-    ax.set_xlabel(across.label("Force"))
-    ax.set_ylabel(up.label("Contact area"))
+    ax.set_xlabel(across.label(VARIABLES["force"].label))
+    ax.set_ylabel(up.label(VARIABLES["contact_area"].label))
     ax.grid(color="0.9", lw=0.5)
     if len(ax.get_legend_handles_labels()[1]) > 1:
         figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(cases) < 6 else 2)

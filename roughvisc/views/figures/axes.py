@@ -290,10 +290,3 @@ def require(dataset: xr.Dataset, *names: str) -> None:
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
     if "time" in dataset.sizes and dataset.sizes["time"] == 0:
         raise InputError("the result holds no time at all: nothing to draw")
-
-
-def edges(centres) -> np.ndarray:
-    """Cell borders of evenly spaced cell centres; a lone cell gets unit width. [m]"""
-    centres = np.asarray(centres, dtype=float)
-    step = (centres[-1] - centres[0]) / (len(centres) - 1) if len(centres) > 1 else 1.0
-    return centres[0] - step / 2 + step * np.arange(len(centres) + 1)

@@ -70,11 +70,8 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     """
     require(dataset, "time")
     panels = [
-        (name, label, find)
-        for name, label, find in (
-            ("pressure", "Pressure", pressure_distribution),
-            ("gap", "Gap", gap_distribution),
-        )
+        (name, find)
+        for name, find in (("pressure", pressure_distribution), ("gap", gap_distribution))
         if name in dataset
     ]
     if not panels:
@@ -83,9 +80,9 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     chosen = dataset.isel(time=frames)
     figure = new_figure(2.9 * len(panels) + 0.2, 2.9)
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    for ax, (name, label, find) in zip(axes, panels, strict=True):
+    for ax, (name, find) in zip(axes, panels, strict=True):
         count = bins or _bin_count(chosen[name])
-        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name, label)
+        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name)
     by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     ordered = [label for label in map(time_text, chosen["time"].values) if label in by_label]
     figure.legend(
@@ -105,7 +102,7 @@ def _no_contact(ax: Axes, text: str = "no contact") -> None:
     ax.set_yticks([])
 
 
-def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str, label: str) -> None:
+def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str) -> None:
     centres = density[f"{name}_bin"].values
     width = 2 * centres[0]
     limits = width * np.arange(len(centres) + 1)
@@ -118,7 +115,7 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
         ax.stairs(values, unit(limits), color=colour, lw=1.2, label=text, baseline=None)
     ax.set_xlim(0, float(unit(limits[-1])))
     ax.set_ylim(bottom=0)
-    ax.set_xlabel(unit.label(label))
+    ax.set_xlabel(unit.label(VARIABLES[name].label))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
     if not density.notnull().any():
         _no_contact(ax, "no contact" if name == "pressure" else "full contact")

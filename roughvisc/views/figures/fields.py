@@ -14,11 +14,11 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from roughvisc.errors import InputError
+from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     ABSENT,
     Unit,
-    edges,
     frame_at,
     new_figure,
     require,
@@ -31,7 +31,6 @@ from roughvisc.views.observables import contact
 
 #: Perceptually even maps, the same order of lightness in grey: pressure darkens as it rises, gap as it closes.
 COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
-NAMES = {"pressure": "Pressure", "gap": "Gap", "displacement": "Displacement", "height": "Height"}
 _MOST_MAPS = 24
 
 
@@ -42,13 +41,13 @@ def colour_map(name: str) -> Colormap:
 
 def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
     """Unit for both sides of the map."""
-    sides = [np.ptp(edges(dataset[name])) for name in ("x", "y")]
+    sides = [np.ptp(cell_edges(dataset[name])) for name in ("x", "y")]
     return unit_for(max(sides), "m")
 
 
 def plane_ratio(dataset: xr.Dataset | xr.DataArray) -> float:
     """Side of the map along y over its side along x."""
-    return float(np.ptp(edges(dataset["y"])) / np.ptp(edges(dataset["x"])))
+    return float(np.ptp(cell_edges(dataset["y"])) / np.ptp(cell_edges(dataset["x"])))
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -> AxesImage:
@@ -68,7 +67,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -
     -------
     matplotlib.image.AxesImage
     """
-    x, y = plane(edges(field["x"])), plane(edges(field["y"]))
+    x, y = plane(cell_edges(field["x"])), plane(cell_edges(field["y"]))
     values = np.ma.masked_invalid(unit(field.transpose("y", "x")))
     image = ax.imshow(
         values,
@@ -96,7 +95,7 @@ def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
 
 
 def _with_rim(centres: np.ndarray) -> np.ndarray:
-    limits = edges(centres)
+    limits = cell_edges(centres)
     return np.concatenate([limits[:1], centres, limits[-1:]])
 
 
@@ -188,7 +187,7 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
             touching = contact(dataset.isel(time=frame)).load()
             draw_outline(ax, touching, plane, outline_colour(name))
     bar = figure.colorbar(image, ax=list(axes.ravel()), pad=0.02, aspect=max(15, 15 * len(axes)), fraction=0.06)
-    bar.set_label(unit.label(NAMES[name]))
+    bar.set_label(unit.label(VARIABLES[name].label))
     bar.locator = (
         MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
     )

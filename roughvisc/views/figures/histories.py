@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
-from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     GREEN,
@@ -29,11 +29,11 @@ from roughvisc.views.figures.axes import (
 )
 
 _PANELS = (
-    ("force", "Force", BLUE),
-    ("approach", "Approach", VERMILION),
-    ("contact_area", "Contact area", GREEN),
-    ("mean_gap", "Mean gap", PURPLE),
-    ("work", "Work", ORANGE),
+    ("force", BLUE),
+    ("approach", VERMILION),
+    ("contact_area", GREEN),
+    ("mean_gap", PURPLE),
+    ("work", ORANGE),
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
@@ -57,7 +57,6 @@ _COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", S
 _FAINTEST = 1e-5
 #: Panels up to which they stand in one column.
 _ONE_COLUMN = 3
-_NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
 def marker_of(count: int) -> str:
@@ -69,7 +68,7 @@ def failed_frames(dataset: xr.Dataset) -> np.ndarray:
     """Frames whose step did not converge."""
     if "status" not in dataset:
         return np.zeros(dataset.sizes["time"], dtype=bool)
-    return dataset["status"].values == _NOT_CONVERGED
+    return dataset["status"].values == NOT_CONVERGED
 
 
 def leave_room(ax: Axes, *values: np.ndarray) -> None:
@@ -81,7 +80,7 @@ def leave_room(ax: Axes, *values: np.ndarray) -> None:
     ax.set_ylim(lowest - 0.05 * span, highest + 0.15 * span)
 
 
-def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, label: str, colour: str) -> None:
+def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, colour: str) -> None:
     axis = TimeAxis.of(dataset["time"])
     times, values = axis.unit(dataset["time"]), dataset[name].values
     unit = unit_for(values, VARIABLES[name].units)
@@ -95,7 +94,7 @@ def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, label: str, colour: 
     for other, said, shade, dashes in beside:
         ax.plot(times, unit(dataset[other]), color=shade, ls=dashes, lw=0.9, label=said)
     leave_room(ax, *(unit(dataset[one]) for one in (name, *(one[0] for one in beside))))
-    ax.set_ylabel(unit.label(label))
+    ax.set_ylabel(unit.label(VARIABLES[name].label))
 
 
 def _fraction_axis(ax: Axes, dataset: xr.Dataset) -> None:
@@ -184,12 +183,12 @@ def history(dataset: xr.Dataset) -> Figure:
     require(dataset, "time")
     panels = [panel for panel in _PANELS if panel[0] in dataset]
     if not panels:
-        names = ", ".join(name for name, _, _ in _PANELS)
+        names = ", ".join(name for name, _ in _PANELS)
         raise InputError(f"the result holds none of {names}: nothing to draw over time")
     costs = any(name in dataset for name, _, _ in _COSTS)
     figure, axes = _history_panels(len(panels) + costs)
-    for ax, (name, label, colour) in zip(axes, panels, strict=False):
-        _draw_history(ax, dataset, name, label, colour)
+    for ax, (name, colour) in zip(axes, panels, strict=False):
+        _draw_history(ax, dataset, name, colour)
         if name == "contact_area":
             _fraction_axis(ax, dataset)
     if costs:

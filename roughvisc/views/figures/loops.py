@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import BLUE, VERMILION, new_figure, require, styled, unit_for
 from roughvisc.views.figures.histories import failed_frames, leave_room, marker_of
 from roughvisc.views.observables.cycles import cycle_energy, has_cycles
@@ -40,7 +41,7 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="first kept time")
     if len(x) > 1:
         ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=f"last: {energy.text(work[-1])} of work done")
-    lost = cycle_energy(dataset)["dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
+    lost = cycle_energy(dataset)["cycle_dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
     if len(lost):
         energy = unit_for([float(lost[-1])], "J")
         label = f"cycle {int(lost['cycle'][-1])}: {energy.text(float(lost[-1]))} dissipated"
@@ -48,8 +49,8 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     failed = failed_frames(dataset)
     if failed.any():
         ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
-    ax.set_xlabel(across.label("Approach"))
-    ax.set_ylabel(up.label("Force"))
+    ax.set_xlabel(across.label(VARIABLES["approach"].label))
+    ax.set_ylabel(up.label(VARIABLES["force"].label))
     leave_room(ax, y)
     ax.grid(color="0.9", lw=0.5)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2, handlelength=1.2)

@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.topography.grid import cell_edges
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     Unit,
-    edges,
     frame_at,
     letter_panels,
     new_figure,
@@ -95,7 +96,7 @@ def draw_section(top: Axes, bottom: Axes, dataset: xr.Dataset, frame: int, axis:
     """Draw the two panels of a section at the ``index`` of the other axis; returns the unit of heights."""
     across = "y" if axis == "x" else "x"
     plane = plane_unit(dataset)
-    x = plane(edges(dataset[axis]))
+    x = plane(cell_edges(dataset[axis]))
     _draw_pressure(top, dataset, frame, across, index, x)
     unit = _draw_surfaces(bottom, dataset, frame, across, index, x)
     bottom.set_xlabel(plane.label(axis))
@@ -114,7 +115,7 @@ def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.stairs(unit(pressure), x, color=VERMILION, lw=1)
     top = float(unit(np.nanmax(pressure, initial=0.0))) or 1.0
     ax.set_ylim(0, 1.12 * top)
-    ax.set_ylabel(unit.label("Pressure"))
+    ax.set_ylabel(unit.label(VARIABLES["pressure"].label))
 
 
 def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, limits: np.ndarray) -> Unit:
@@ -142,7 +143,7 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
     if low - margin < unit(level) < high + 2 * margin:
         ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
-    ax.set_ylabel(unit.label("Height"))
+    ax.set_ylabel(unit.label(VARIABLES["height"].label))
     return unit
 
 

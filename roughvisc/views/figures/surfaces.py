@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.topography.grid import cell_edges
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     Unit,
-    edges,
     letter_panels,
     new_figure,
     spread_axis,
@@ -65,7 +66,7 @@ def surface(height: xr.DataArray) -> Figure:
     image = draw_map(on_map, height, unit, plane)
     flat = plane_ratio(height) < 0.4
     bar = figure.colorbar(image, ax=on_map, location="top" if flat else "right", pad=0.02, aspect=50 if flat else 20)
-    bar.set_label(unit.label("Height"))
+    bar.set_label(unit.label(VARIABLES["height"].label))
     on_map.set_xlabel(plane.label("x"))
     on_map.set_ylabel(plane.label("y"))
     on_map.tick_params(direction="out")
@@ -100,11 +101,11 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
     ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=BLUE, lw=0.9)
     place = float(height["y"][middle])
     on_map.axhline(plane(place), color="w", lw=0.8, ls=(0, (4, 2)))
-    limits = plane(edges(height["x"]))
+    limits = plane(cell_edges(height["x"]))
     ax.set_xlim(limits[0], limits[-1])
     ax.set_title(f"y = {plane.text(place)}", loc="right")
     ax.set_xlabel(plane.label("x"))
-    ax.set_ylabel(unit.label("Height"))
+    ax.set_ylabel(unit.label(VARIABLES["height"].label))
     ax.grid(color="0.9", lw=0.5)
 
 
@@ -114,7 +115,7 @@ def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
     bins = int(np.clip(math.sqrt(values.size) / 1.5, 8, 100))
     if deviation == 0:
         ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
-        ax.set_xlabel(unit.label("Height"))
+        ax.set_xlabel(unit.label(VARIABLES["height"].label))
         ax.set_yticks([])
         return
     ax.hist(values, bins=bins, density=True, color=BLUE, alpha=0.45, histtype="stepfilled", label="measured")
@@ -123,7 +124,7 @@ def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
     ax.legend(loc="upper right", handlelength=1.2)
-    ax.set_xlabel(unit.label("Height"))
+    ax.set_xlabel(unit.label(VARIABLES["height"].label))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
 
@@ -142,7 +143,7 @@ def radial_spectrum(height: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
     density : ndarray
         ``C(q)`` with ``sum(C dqx dqy) / (4 pi^2)`` the mean square of the heights. [m4]
     """
-    (nx, ny), sides = height.shape, [edges(height[name]) for name in ("x", "y")]
+    (nx, ny), sides = height.shape, [cell_edges(height[name]) for name in ("x", "y")]
     steps = [side[1] - side[0] for side in sides]
     values = _less_its_plane(height.values)
     window = np.outer(np.hanning(nx + 2)[1:-1], np.hanning(ny + 2)[1:-1])

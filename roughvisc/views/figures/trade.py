@@ -16,6 +16,7 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.trade.ladder import short, step_text
 from roughvisc.study.trade.recommend import WORDS, front, uncertainty
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, letter_panels, new_figure, styled
 
 #: family of settings -> marker and colour, told apart by either
@@ -129,7 +130,7 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < most * low else (1.0,), numticks=20))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
-    ax.set_xlabel("Wall time [s]")
+    ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {WORDS[quantity]} [%]")
     ax.grid(color="0.9", lw=0.5)
     where = np.flatnonzero(known)

@@ -2,7 +2,8 @@
 
 Every function takes a result and returns a Dataset of the new variables alone (``xarray.merge`` or
 ``Dataset.update`` puts them beside the others). Leading dimensions other than time, such as ``case``, pass through;
-fields on Dask are worked on frame by frame, lazily unless a docstring says otherwise.
+fields on Dask are worked on frame by frame, lazily unless a docstring says otherwise. Names and units are declared in
+:mod:`roughvisc.variables`.
 """
 
 from __future__ import annotations
@@ -11,18 +12,15 @@ import xarray as xr
 
 from roughvisc.views.observables.cycles import cycle_energy
 from roughvisc.views.observables.densities import gap_distribution, gap_statistics, pressure_distribution
-from roughvisc.views.observables.derived import OBSERVABLES, describe
 from roughvisc.views.observables.response import area_growth, stiffness, work
 from roughvisc.views.observables.spots import cluster_areas, clusters, contact, percolation
 
 __all__ = [
-    "OBSERVABLES",
     "area_growth",
     "cluster_areas",
     "clusters",
     "contact",
     "cycle_energy",
-    "describe",
     "gap_distribution",
     "gap_statistics",
     "observe",
@@ -31,6 +29,10 @@ __all__ = [
     "stiffness",
     "work",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 def observe(dataset: xr.Dataset) -> xr.Dataset:
@@ -44,7 +46,13 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Clusters, percolation, gap statistics, growth exponent, stiffness and work over time.
+        Clusters, percolation, gap statistics, growth exponent, stiffness and work over time, each with its unit;
+        ``xarray.merge([dataset, observe(dataset)])`` holds them beside the result.
+
+    Raises
+    ------
+    InputError
+        If the cells of the grid are not equal.
     """
     found = []
     if "pressure" in dataset or "gap" in dataset:

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.views.observables.derived import describe, need
+from roughvisc.variables import describe
+from roughvisc.views.observables.derived import need
 
 #: Kept times in a cycle below which its loop is not known.
 _FEWEST = 8
@@ -35,7 +36,7 @@ def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.
     -------
     xarray.Dataset
         Over ``cycle``, counted from 1, of the cycles that the kept times cover: ``cycle_start`` [s], ``cycle_work``
-        [J], ``cycle_closure``, ``dissipated_energy`` [J].
+        [J], ``cycle_closure``, ``cycle_dissipated_energy`` [J].
 
     Raises
     ------
@@ -64,7 +65,7 @@ def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.
         "cycle_start": ("cycle", np.array([start for start, _ in covered])),
         "cycle_work": ("cycle", work),
         "cycle_closure": ("cycle", closure),
-        "dissipated_energy": ("cycle", np.where(closure <= closed, work, np.nan)),
+        "cycle_dissipated_energy": ("cycle", np.where(closure <= closed, work, np.nan)),
     }
     number = np.array([spans.index(span) + 1 for span in covered], dtype="int64")
     return describe(xr.Dataset(found).assign_coords(cycle=number))

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.views.observables.derived import describe, frame_by_frame, need
+from roughvisc.variables import describe
+from roughvisc.views.observables.derived import frame_by_frame, need
 
 
 def _bin_edges(field: xr.DataArray, bins) -> np.ndarray:
@@ -59,6 +60,11 @@ def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     -------
     xarray.Dataset
         ``pressure_density`` over time and ``pressure_bin``; missing while there is no contact. [1/Pa]
+
+    Raises
+    ------
+    InputError
+        If the result holds no ``pressure``, or edges do not increase.
     """
     need(dataset, "pressure")
     return _density(dataset["pressure"], bins, "pressure")
@@ -79,6 +85,11 @@ def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     -------
     xarray.Dataset
         ``gap_density`` over time and ``gap_bin``; missing in full contact. [1/m]
+
+    Raises
+    ------
+    InputError
+        If the result holds no ``gap``, or edges do not increase.
     """
     need(dataset, "gap")
     return _density(dataset["gap"], bins, "gap")
@@ -96,6 +107,11 @@ def gap_statistics(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         ``gap_mean`` and ``gap_median`` over time. [m]
+
+    Raises
+    ------
+    InputError
+        If the result holds no ``gap``.
     """
     need(dataset, "gap")
 

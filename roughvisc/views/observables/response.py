@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from roughvisc.views.observables.derived import along_time, describe, need
+from roughvisc.variables import describe
+from roughvisc.views.observables.derived import along_time, need
 
 
 def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:
@@ -38,7 +39,12 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``area_growth_exponent`` over time; missing up to ``since`` and while there is no contact.
+        ``area_growth_exponent`` over time; missing up to ``since`` and while there is no contact. [1]
+
+    Raises
+    ------
+    InputError
+        If the result holds no contact area.
     """
     name = "contact_area_corrected" if "contact_area_corrected" in dataset else "contact_area"
     need(dataset, name)
@@ -65,6 +71,11 @@ def stiffness(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         ``contact_stiffness`` over time: central differences where the approach runs on, the last secant where it
         turns; missing while it stands still. [N/m]
+
+    Raises
+    ------
+    InputError
+        If the result holds no force or no approach.
     """
     need(dataset, "force", "approach")
     return describe(xr.Dataset({"contact_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
@@ -73,7 +84,8 @@ def stiffness(dataset: xr.Dataset) -> xr.Dataset:
 def work(dataset: xr.Dataset) -> xr.Dataset:
     """Work done by the force since the first kept time: the trapezoidal integral of force over approach.
 
-    Over a loop that closes in force and approach its change is the energy dissipated.
+    Over a loop that closes in force and approach its change is the energy dissipated. A result's own ``work`` counts
+    every accepted step.
 
     Parameters
     ----------
@@ -83,7 +95,12 @@ def work(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``work`` over time. [J]
+        ``trapezoidal_work`` over time. [J]
+
+    Raises
+    ------
+    InputError
+        If the result holds no force or no approach.
     """
     need(dataset, "force", "approach")
 
@@ -91,4 +108,4 @@ def work(dataset: xr.Dataset) -> xr.Dataset:
         done = np.diff(approach) * (force[1:] + force[:-1]) / 2
         return np.concatenate([np.zeros(min(len(force), 1)), np.cumsum(done)])
 
-    return describe(xr.Dataset({"work": along_time(measure, dataset["force"], dataset["approach"])}))
+    return describe(xr.Dataset({"trapezoidal_work": along_time(measure, dataset["force"], dataset["approach"])}))

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.grid import spacing
+from roughvisc.variables import describe
 from roughvisc.views.observables.connectivity import cluster_sizes, percolates
-from roughvisc.views.observables.derived import describe, frame_by_frame, need
-
-
-def _cell_area(dataset: xr.Dataset) -> float:
-    sides = [float(dataset[name][-1] - dataset[name][0]) / max(dataset.sizes[name] - 1, 1) for name in ("x", "y")]
-    return sides[0] * sides[1]
+from roughvisc.views.observables.derived import frame_by_frame, need
 
 
 def _is_periodic(dataset: xr.Dataset) -> bool:
@@ -30,6 +29,11 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray of bool, dims (time, x, y)
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``.
     """
     if "pressure" in dataset:
         return dataset["pressure"] > 0
@@ -53,13 +57,18 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     xarray.Dataset
         ``cluster_count``, ``cluster_area_mean`` and ``cluster_area_largest`` over time; areas are missing while
         there is no contact. [1], [m2], [m2]
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
     """
 
     def measure(mask):
         sizes = cluster_sizes(mask, _is_periodic(dataset), connectivity)
         return (len(sizes), sizes.mean(), sizes[0]) if len(sizes) else (0.0, np.nan, np.nan)
 
-    cell = _cell_area(dataset)
+    cell = math.prod(spacing(dataset, "clusters"))
     count, mean, largest = frame_by_frame(measure, contact(dataset), outputs=3)
     return describe(
         xr.Dataset(
@@ -86,6 +95,11 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     -------
     xarray.Dataset
         ``cluster_area`` with dimensions ``(time, cluster)``, largest first, missing beyond the number of clusters. [m2]
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or is not of one case.
     """
     touching = contact(dataset)
     if touching.dims != ("time", "x", "y"):
@@ -96,7 +110,7 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     ]
     areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
     for row, found in zip(areas, sizes, strict=True):
-        row[: len(found)] = found * _cell_area(dataset)
+        row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
     return describe(xr.Dataset({"cluster_area": (("time", "cluster"), areas)}, coords={"time": dataset["time"]}))
 
 
@@ -114,7 +128,12 @@ def percolation(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``percolates_x`` and ``percolates_y`` over time, 1 or 0.
+        ``percolates_x`` and ``percolates_y`` over time, 1 or 0. [1]
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``.
     """
     along_x, along_y = frame_by_frame(
         lambda touching: percolates(~touching, _is_periodic(dataset), connectivity),

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 from PIL import Image
 
+from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
-from roughvisc.views.figures.fields import NAMES, colour_map, plane_ratio, plane_unit, present
+from roughvisc.views.figures.fields import colour_map, plane_ratio, plane_unit, present
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 from roughvisc.views.observables import contact
 
@@ -125,7 +126,7 @@ def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
 def _scale_text(scale: _Scale) -> dict[str, str]:
     return {
         "name": scale.name,
-        "label": scale.unit.label(NAMES[scale.name]),
+        "label": scale.unit.label(VARIABLES[scale.name].label),
         "low": f"{float(scale.unit(scale.low)):.3g}",
         "high": f"{float(scale.unit(scale.high)):.3g}",
     }
@@ -133,7 +134,7 @@ def _scale_text(scale: _Scale) -> dict[str, str]:
 
 def _extent(dataset: xr.Dataset) -> str:
     unit = plane_unit(dataset)
-    sides = [dataset.sizes[axis] * float(dataset[axis][1] - dataset[axis][0]) for axis in ("x", "y")]
+    sides = [dataset.sizes[axis] * side for axis, side in zip(("x", "y"), spacing(dataset), strict=True)]
     return " × ".join(f"{float(unit(side)):.4g}" for side in sides) + f" {unit.symbol}"
 
 
@@ -219,7 +220,7 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
 
 def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
     """Each run of cells in contact as one line; a lone cell as one of its width."""
-    half = (x[1] - x[0]) / 2 if len(x) > 1 else 1.0
+    half = _SECTION[0] / len(x) / 2
     borders = np.flatnonzero(np.diff(np.pad(touching.astype(int), 1)))
     parts = []
     for first, past in borders.reshape(-1, 2):
@@ -237,8 +238,9 @@ def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
 def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
     """Histories as lines in a unit of their own, and where each frame lies on them."""
     charts = []
-    for name, label in (("force", "Force"), ("approach", "Approach"), ("contact_area", "Contact area")):
+    for name in ("force", "approach", "contact_area"):
         if name in dataset:
+            label = VARIABLES[name].label
             values = dataset[name].values.astype(float)
             unit = unit_for(values, VARIABLES[name].units)
             charts.append(_chart(dataset, unit.label(label), {label: unit(values)}, chosen))
@@ -329,13 +331,13 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
     one = dataset.isel(time=frame)
     time = float(one["time"])
     rows = [
-        (label, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
-        for name, label in (
-            ("force", "Force"),
-            ("approach", "Approach"),
-            ("contact_area", "Contact area, counted"),
-            ("contact_area_corrected", "Contact area, corrected"),
-            ("mean_gap", "Mean gap"),
+        (VARIABLES[name].label + apart, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
+        for name, apart in (
+            ("force", ""),
+            ("approach", ""),
+            ("contact_area", ", counted"),
+            ("contact_area_corrected", ", corrected"),
+            ("mean_gap", ""),
         )
         if name in dataset
     ]

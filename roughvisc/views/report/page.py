@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.treatment import Treatment, measures, treatment
-from roughvisc.study.storage.store import open_result, whole_file
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.fields import draw_map, plane_unit
 from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
@@ -88,9 +88,9 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
 def _files(source: Path) -> list[Path]:
     if not source.is_dir():
         return [source]
-    found = sorted(p for p in source.glob("*.nc") if not p.name.startswith("."))
+    found = result_files(source)
     if not found and not list(source.glob("*.failed.json")):
-        raise InputError(f"{source}: holds no results: expected files .nc, as roughvisc run writes them")
+        raise no_results(source)
     return found
 
 
@@ -222,7 +222,7 @@ def _row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     varied = {key: readable_setting(key, value) for key, value in case.get("varied", {}).items()}
     last = dataset.isel(time=-1)
     status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
-    bad = int((status == STATUS_MEANINGS.index("not_converged")).sum())
+    bad = int((status == NOT_CONVERGED).sum())
     return {
         "title": title,
         "name": title + _varied(case) if varied or case else str(dataset.attrs.get("title", title)),

@@ -1,4 +1,4 @@
-"""Names and units of the quantities of many cases, as figures show them."""
+"""Labels and units of the quantities of many cases, as figures show them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,6 @@ import numpy as np
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import Unit, unit_for
 from roughvisc.views.sweep_figures.cases import Cases, middle_of_decades
-
-NAMES = {
-    "force": "Force",
-    "approach": "Approach",
-    "contact_area": "Contact area",
-    "contact_area_corrected": "Contact area",
-    "contact_fraction": "Contact fraction",
-    "mean_gap": "Mean gap",
-    "work": "Work of the force",
-    "wall_time": "Wall time",
-}
 
 
 def quantity_unit(cases: Cases, quantity: str, values) -> Unit:
@@ -30,5 +19,7 @@ def quantity_unit(cases: Cases, quantity: str, values) -> Unit:
 
 def label_of(cases: Cases, quantity: str, unit: Unit) -> str:
     """Axis label of a quantity."""
+    if quantity in VARIABLES:
+        return unit.label(VARIABLES[quantity].label)
     said = str(cases.members[0][quantity].attrs.get("long_name", quantity)).replace("_", " ")
-    return unit.label(NAMES.get(quantity) or said[:1].upper() + said[1:])
+    return unit.label(said[:1].upper() + said[1:])

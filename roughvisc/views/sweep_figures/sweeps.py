@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import (
     frame_at,
     letter_panels,
@@ -30,7 +30,6 @@ from roughvisc.views.sweep_figures.quantities import label_of, quantity_unit
 #: Parameters with so many values or more make a map by default.
 _MAP_FROM = 4
 _MOST_PANELS = 6
-_NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
 @styled
@@ -139,7 +138,7 @@ def _title(cases: Cases, frames: list[int]) -> str:
 
 def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
     pairs = zip(cases.members, frames, strict=True)
-    return np.array(["status" in m and int(m["status"][f]) == _NOT_CONVERGED for m, f in pairs])
+    return np.array(["status" in m and int(m["status"][f]) == NOT_CONVERGED for m, f in pairs])
 
 
 # ------------------------------------------------------------------------------------------------------- lines

@@ -8,8 +8,9 @@ from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.study.simulation import grid_error
-from roughvisc.study.simulation.coarser import block_means, coarser, edges_of, pressure_distance
+from roughvisc.study.simulation.coarser import block_means, coarser, pressure_distance
 from roughvisc.study.statement.case import Case, read_study
+from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import grown
 
 
@@ -162,7 +163,7 @@ def test_block_means__conserve_the_force_on_any_grid():
     means = block_means(field, cells, onto)
     area = np.diff(onto[0])[:, None] * np.diff(onto[1])
     assert (means * area).sum((-2, -1)) == pytest.approx(field.sum((-2, -1)) * 1 * 2, rel=1e-12)
-    assert edges_of(np.array([0.5, 1.5, 2.5])).tolist() == [0, 1, 2, 3]
+    assert cell_edges(np.array([0.5, 1.5, 2.5])).tolist() == [0, 1, 2, 3]
 
 
 def test_pressure_distance__counts_what_lies_outside_the_other_grid():

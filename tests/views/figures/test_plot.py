@@ -1,5 +1,6 @@
 """Figures by their artists: what is drawn, in which units, and that no label covers another."""
 
+import inspect
 import itertools
 import sys
 
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from support import labels, lines, text_boxes
 
+import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.views import plot
 from roughvisc.views.figures import animate as animation
@@ -532,3 +534,10 @@ def test_stability_map__hatches_what_was_refused_and_frames_what_is_beyond():
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["refused, with a reason", "beyond 0.001"]
     with pytest.raises(InputError, match="expected errors over two parameters"):
         plot.stability_map(found.isel(time=0))
+
+
+def test_plot__shows_figures_only():
+    assert dir(rv.plot) == sorted(rv.plot.__all__)
+    for name in rv.plot.__all__:
+        assert inspect.isfunction(getattr(rv.plot, name))
+        assert getattr(rv.plot, name).__module__.startswith("roughvisc.views")

@@ -35,7 +35,7 @@ def test_cycle_energy__of_an_ellipse_converges_at_order_two():
         assert found["cycle"].values.tolist() == [1, 2, 3]
         np.testing.assert_allclose(found["cycle_closure"], 0, atol=1e-12)
         np.testing.assert_allclose(found["cycle_start"], [0, PERIOD, 2 * PERIOD])
-        return np.abs(found["dissipated_energy"].values / np.pi - 1).max()
+        return np.abs(found["cycle_dissipated_energy"].values / np.pi - 1).max()
 
     assert 1.9 < np.log2(error(32) / error(64)) < 2.1
     assert error(64) < 2e-3
@@ -51,8 +51,8 @@ def test_cycle_energy__of_a_punch_is_the_closed_form():
     program = rv.Program.cycle(mean, amplitude, PERIOD, cycles, control="approach")
     found = observables.cycle_energy(histories(times, force, approach), program=program)
     exact = rv.closed_forms.punch_dissipation(RADIUS, RUBBER, amplitude, PERIOD)
-    np.testing.assert_allclose(found["dissipated_energy"][-1], exact, rtol=2e-3)
-    assert np.isnan(found["dissipated_energy"][0]), "the first loop is not closed: its work is no dissipation"
+    np.testing.assert_allclose(found["cycle_dissipated_energy"][-1], exact, rtol=2e-3)
+    assert np.isnan(found["cycle_dissipated_energy"][0]), "the first loop is not closed: its work is no dissipation"
     assert np.isfinite(found["cycle_work"][0])
     assert found["cycle_closure"][-1] < 1e-9 < 1e-3 < found["cycle_closure"][0], "it settles"
 
@@ -61,7 +61,7 @@ def test_cycle_energy__of_an_elastic_loop_is_nothing():
     approach = 2 + np.sin(np.linspace(0.0, 4 * np.pi, 65))
     ds = histories(np.linspace(0.0, 2 * PERIOD, 65), 3 * approach, approach)
     found = observables.cycle_energy(ds, program=rv.Program.cycle(2.0, 1.0, PERIOD, 2))
-    np.testing.assert_allclose(found["dissipated_energy"], 0, atol=1e-12)
+    np.testing.assert_allclose(found["cycle_dissipated_energy"], 0, atol=1e-12)
 
 
 def test_cycle_energy__ends_between_kept_times_and_cycles_after_a_ramp():
@@ -70,7 +70,7 @@ def test_cycle_energy__ends_between_kept_times_and_cycles_after_a_ramp():
     found = observables.cycle_energy(ds, program=program)
     assert found["cycle"].values.tolist() == [2, 3], "those that the kept times cover"
     np.testing.assert_allclose(found["cycle_start"], [0.1 + PERIOD, 0.1 + 2 * PERIOD])
-    np.testing.assert_allclose(found["dissipated_energy"], np.pi, rtol=1e-3)
+    np.testing.assert_allclose(found["cycle_dissipated_energy"], np.pi, rtol=1e-3)
 
 
 def test_cycle_energy__takes_the_work_of_every_step_where_the_result_has_it():
@@ -78,15 +78,16 @@ def test_cycle_energy__takes_the_work_of_every_step_where_the_result_has_it():
     work = np.linspace(5.0, 5.0 + 2 * np.pi, ds.sizes["time"])
     program = rv.Program.cycle(2.0, 1.0, PERIOD, 2)
     exact = observables.cycle_energy(ds.assign(work=("time", work)), program=program)
-    np.testing.assert_allclose(exact["dissipated_energy"], np.pi, rtol=1e-12)
+    np.testing.assert_allclose(exact["cycle_dissipated_energy"], np.pi, rtol=1e-12)
     kept = observables.cycle_energy(ds, program=program)
-    np.testing.assert_allclose(kept["dissipated_energy"], 6 * np.sin(np.pi / 6), rtol=1e-12)  # a regular polygon's area
+    polygon = 6 * np.sin(np.pi / 6)  # area of a regular one
+    np.testing.assert_allclose(kept["cycle_dissipated_energy"], polygon, rtol=1e-12)
 
 
 def test_cycle_energy__of_too_few_kept_times_is_not_known():
     found = observables.cycle_energy(ellipse(4), program=rv.Program.cycle(2.0, 1.0, PERIOD, 3))
     assert np.isnan(found["cycle_work"]).all()
-    assert np.isnan(found["dissipated_energy"]).all()
+    assert np.isnan(found["cycle_dissipated_energy"]).all()
 
 
 def test_cycle_energy__refuses_what_has_no_cycles():
@@ -132,13 +133,13 @@ def test_cycle_energy__of_a_run_by_the_program_in_its_case(punch):
     found = observables.cycle_energy(punch, closed=0.02)
     exact = rv.closed_forms.punch_dissipation(RADIUS, RUBBER, 1e-6, PERIOD)
     assert found["cycle"].values.tolist() == [1, 2, 3, 4]
-    np.testing.assert_allclose(found["dissipated_energy"][-1], exact, rtol=0.04)  # the circle is made of 40 cells
+    np.testing.assert_allclose(found["cycle_dissipated_energy"][-1], exact, rtol=0.04)  # the circle is made of 40 cells
     for name in found.variables:
         assert found[name].attrs["long_name"]
 
 
 def test_hysteresis__states_what_the_last_closed_cycle_dissipates(punch):
-    energy = float(observables.cycle_energy(punch)["dissipated_energy"][-1])
+    energy = float(observables.cycle_energy(punch)["cycle_dissipated_energy"][-1])
     named = [text.get_text() for text in plot.hysteresis(punch).legends[0].get_texts()]
     assert f"cycle 4: {1e9 * energy:.3g} nJ dissipated" in named
     assert not any(

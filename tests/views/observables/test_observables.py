@@ -1,12 +1,17 @@
 """Derived quantities against cases small enough to count by hand."""
 
+import inspect
+import re
+
 import dask.array
 import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
 
+import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.variables import VARIABLES
 from roughvisc.views import observables
 from roughvisc.views.observables import connectivity
 
@@ -217,9 +222,9 @@ def test_stiffness__turning_and_standing_still():
 
 def test_work__of_a_closed_loop_is_the_area_in_it():
     ds = histories(np.arange(5), force=[0.0, 0.0, 2.0, 2.0, 0.0], approach=[0.0, 3.0, 3.0, 0.0, 0.0])
-    np.testing.assert_allclose(observables.work(ds)["work"], [0.0, 0.0, 0.0, -6.0, -6.0])
+    np.testing.assert_allclose(observables.work(ds)["trapezoidal_work"], [0.0, 0.0, 0.0, -6.0, -6.0])
     ramp = histories(np.arange(3), force=[0.0, 1.0, 2.0], approach=[0.0, 1.0, 2.0])
-    np.testing.assert_allclose(observables.work(ramp)["work"], [0.0, 0.5, 2.0])
+    np.testing.assert_allclose(observables.work(ramp)["trapezoidal_work"], [0.0, 0.5, 2.0])
 
 
 @pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.hertz_cycle, made.one_frame])
@@ -229,9 +234,55 @@ def test_observe__everything_lazily_and_alike_on_dask(make):
     lazy = observables.observe(ds.chunk(time=2, x=20))
     assert all(isinstance(lazy[name].data, dask.array.Array) for name in lazy.data_vars)
     xr.testing.assert_allclose(lazy.compute(scheduler="synchronous"), eager)
-    assert {"cluster_count", "percolates_x", "gap_median", "contact_stiffness", "work"} <= set(eager.data_vars)
+    expected = {"cluster_count", "percolates_x", "gap_median", "contact_stiffness", "trapezoidal_work"}
+    assert expected <= set(eager.data_vars)
     for name in eager.data_vars:
         assert eager[name].attrs["long_name"]
+
+
+ROUGH = rv.self_affine(1e-3, (20, 17), hurst=0.8, rms_slope=0.1, seed=1)
+CYCLES = rv.Program.cycle(mean=0.02, amplitude=0.01, period=0.1, cycles=1)
+RUBBER = rv.zener(3e6, 1e6, 1e5)
+PRESSED = {
+    "elastic": (rv.sphere(1e-2, 2e-3, (16, 15)), rv.elastic(3e6), {}),
+    "viscoelastic": (rv.sphere(1e-2, 2e-3, (16, 15)), RUBBER, {}),
+    "periodic": (ROUGH, RUBBER, {"boundary": "periodic"}),
+    "absent": (rv.flat_punch(5e-4, 2e-3, (16, 15)), RUBBER, {"missing": "absent"}),
+}
+
+
+@pytest.mark.parametrize("kind", PRESSED)
+def test_observables__merge_with_their_result(kind):
+    height, material, options = PRESSED[kind]
+    ds = rv.simulate(height, material, CYCLES, times=11, tolerance=1e-2, progress=False, **options)
+    found = [
+        rv.observables.observe(ds),
+        rv.observables.cycle_energy(ds, program=CYCLES),
+        rv.observables.cluster_areas(ds),
+        rv.observables.pressure_distribution(ds),
+        rv.observables.gap_distribution(ds),
+    ]
+    assert set(ds.variables) < set(xr.merge([ds, found[0]]).variables), "as the docstring says, without options"
+    merged = xr.merge([ds, *found], compat="no_conflicts", join="exact", combine_attrs="override")
+    for name in ds.variables:
+        xr.testing.assert_identical(merged[name].variable, ds[name].variable)
+    for one in found:
+        assert not set(one.data_vars) & set(ds.data_vars), "a name means one thing"
+        for name in one.data_vars:
+            assert merged[name].attrs == VARIABLES[str(name)].attributes()
+            assert merged[name].dims == VARIABLES[str(name)].dims
+    assert float(merged.cluster_count.max()) >= 1
+
+
+def test_observables__are_public_functions_with_docstrings():
+    assert "observables" in dir(rv)
+    assert dir(rv.observables) == sorted(rv.observables.__all__)
+    for name in rv.observables.__all__:
+        function = getattr(rv.observables, name)
+        assert inspect.isfunction(function)
+        assert function.__module__.startswith("roughvisc.views.observables")
+        for section in ("Parameters", "Returns", "Raises"):
+            assert re.search(rf"^ *{section}\n *-+$", function.__doc__, re.MULTILINE), f"{name}: no {section}"
 
 
 def test_observe__passes_a_leading_dimension_through():

@@ -12,31 +12,36 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, either
 from roughvisc.study.statement.schema.entries import FilePath, Flag, Text, measured, optional, paired, shown, whole
 from roughvisc.study.statement.schema.section import close, nearest, refuse
+from roughvisc.topography import recipes
+from roughvisc.topography.recipes import UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PURE = measured("1", above=0)
-#: One cell along an axis is a strip; self-affine roughness needs waves both ways.
-_GRID = {"size": (SIZE, ...), "shape": (paired(whole(1), "a whole number of cells"), ...)}
+_LENGTH_OR_RATIO = {"m": LENGTH, "1": PURE}
+#: kinds of the arguments of recipes whose unit does not say it all
+_KINDS = {
+    "size": SIZE,
+    "shape": paired(whole(1), "a whole number of cells"),  # one cell along an axis is a strip
+    "exact": Flag,
+    "waves": whole(1, 2),
+    "hurst": measured("1", above=0, most=1),
+    "seed": whole(0),
+}
 
-#: name of a recipe in ``roughvisc.topography`` -> the kind of each of its keys, and its default (``...``: none)
+
+def _kind(recipe: str, key: str, default: Any) -> Any:
+    if recipe == "self_affine" and key == "shape":
+        return SHAPE  # roughness needs waves both ways
+    kind = _KINDS[key] if key in _KINDS else _LENGTH_OR_RATIO[UNITS[key]]
+    return optional(kind) if default is None else kind
+
+
+#: name of a recipe -> the kind of each of its keys, and its default (``...``: none)
 RECIPES: dict[str, dict[str, Any]] = {
-    "sphere": {"radius": (LENGTH, ...), **_GRID, "exact": (Flag, False)},
-    "cone": {"slope": (PURE, ...), **_GRID},
-    "flat_punch": {"radius": (LENGTH, ...), **_GRID},
-    "wavy": {"amplitude": (LENGTH, ...), "wavelength": (LENGTH, ...), **_GRID, "waves": (whole(1, 2), 2)},
-    "self_affine": {
-        **_GRID,
-        "shape": (SHAPE, ...),
-        "hurst": (measured("1", above=0, most=1), ...),
-        "rms_slope": (optional(PURE), None),
-        "rms_height": (optional(LENGTH), None),
-        "rolloff": (optional(LENGTH), None),
-        "shortcut": (optional(LENGTH), None),
-        "anisotropy": (PURE, 1.0),
-        "seed": (whole(0), ...),
-    },
+    name: {key: (_kind(name, key, default), default) for key, default in arguments.items()}
+    for name, arguments in recipes.RECIPES.items()
 }
 
 
@@ -71,7 +76,7 @@ class FileSurface(SurfaceSection):
     spacing: optional(SIZE) = None
 
     def raw(self) -> xr.DataArray:
-        from roughvisc.topography.readers import open_scan
+        from roughvisc.topography.scans import open_scan
 
         return open_scan(self.file, format=self.format, channel=self.channel, unit=self.unit, spacing=self.spacing)
 
@@ -82,9 +87,7 @@ class RecipeSurface(SurfaceSection):
     generate: str
 
     def raw(self) -> xr.DataArray:
-        from roughvisc.topography import synthesis
-
-        return getattr(synthesis, self.generate)(**{key: getattr(self, key) for key in RECIPES[self.generate]})
+        return recipes.make(self.generate, {key: getattr(self, key) for key in RECIPES[self.generate]})
 
 
 GENERATED = {

@@ -1,0 +1,79 @@
+"""Scans in: the one door to instrument files, grid files and surface cards."""
+
+from __future__ import annotations
+
+import os
+
+import xarray as xr
+
+from roughvisc.topography.cards import is_card, open_card
+from roughvisc.topography.readers import existing, finite, read_file
+
+
+def open_scan(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    spacing: float | tuple[float, float] | None = None,
+) -> xr.DataArray:
+    """Heights of a scanned surface, from an instrument file, a grid file or a surface card.
+
+    Parameters
+    ----------
+    path : path
+        X3P, SDF, NetCDF, a surface card (``.toml``), or any format that SurfaceTopography reads.
+    format : str, optional
+        A key of :func:`~roughvisc.supported_formats`; ``"auto"`` has the format guessed from the content. Default: by
+        the suffix.
+    channel : int or str, optional
+        Number or name of the channel, see :func:`~roughvisc.list_channels`. Default: the height channel, or the one
+        that the library prefers where there are several; the others are then listed in the attribute
+        ``other_channels``.
+    unit : str, optional
+        Unit of length in a file that states none, as ``"um"``.
+    spacing : float or pair of float, optional
+        Cell sides (dx, dy), in place of what the file says. [m]
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
+        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel
+        and ``history``.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, of unknown format, no areal height scan, without unit or size, or implausible:
+        wider than 1 m, finer than 10 pm, heights beyond 1 km.
+
+    Warns
+    -----
+    UserWarning
+        If the checksum in an X3P file is wrong.
+    """
+    return outline(path, heights=True, format=format, channel=channel, unit=unit, spacing=spacing)
+
+
+def outline(
+    path: str | os.PathLike[str],
+    *,
+    heights: bool = False,
+    format: str | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    spacing: float | tuple[float, float] | None = None,
+) -> xr.DataArray:
+    """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
+
+    The heights are NaN that take no memory. A surface card is conditioned, which needs its heights: they are there.
+    """
+    path = existing(path)
+    if is_card(path, format):
+        h = open_card(path, channel=channel, unit=unit, spacing=spacing)
+        if heights:
+            finite(h, str(path))
+        return h
+    return read_file(path, heights=heights, format=format, channel=channel, unit=unit, spacing=spacing)
