@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, optional, paired, shown, whole
 from roughvisc.study.statement.schema.section import Section
+from roughvisc.study.statement.settings import WORDS, Settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +101,7 @@ class Conditioned(Section):
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None
     mirror: Flag = False
-    missing: choice("refuse", "absent") = "refuse"
+    missing: choice(*WORDS["missing"]) = Settings.missing
 
     def conditioned(self, height: xr.DataArray) -> xr.DataArray:
         """Heights after the steps asked for. [m]"""

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, shown, whole
 from roughvisc.study.statement.schema.section import Section, nearest
+from roughvisc.study.statement.settings import WORDS, Settings
 from roughvisc.variables import FIELDS
 
 _STEP = measured("s", above=0)
@@ -54,18 +55,18 @@ def _fields(value: Any) -> Any:
 class SolveSection(Section):
     """How it is computed."""
 
-    boundary: choice("free", "periodic") = "free"
-    tolerance: measured("1", above=0, below=1) = 1e-3
+    boundary: choice(*WORDS["boundary"]) = Settings.boundary
+    tolerance: measured("1", above=0, below=1) = Settings.tolerance
     time_step: Annotated[
         Any,
         BeforeValidator(_step),
         WithJsonSchema({"type": ["number", "string"]}),
         Field(description=_STEP_WANTED),
-    ] = "auto"
-    method: choice("fast", "seed") = "fast"
-    edge: choice("error", "accept") = "error"
-    memory: choice("auto", "direct") = "auto"
-    grid_error: Flag = False
+    ] = Settings.time_step
+    method: choice(*WORDS["method"]) = Settings.method
+    edge: choice(*WORDS["edge"]) = Settings.edge
+    memory: choice(*WORDS["memory"]) = Settings.memory
+    grid_error: Flag = Settings.grid_error
 
 
 class KeepSection(Section):
@@ -76,7 +77,7 @@ class KeepSection(Section):
         BeforeValidator(_fields),
         WithJsonSchema({"type": "array", "items": {"enum": list(FIELDS)}}),
         Field(description=f"a list of fields out of {', '.join(FIELDS)}"),
-    ] = ("pressure", "gap")
+    ] = Settings.fields
     times: Annotated[
         Any,
         BeforeValidator(_times),
