@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, optional, paired, shown, whole
@@ -18,9 +18,18 @@ LENGTH = measured("m", above=0)
 SIZE = paired(LENGTH, "a length")
 SHAPE = paired(whole(2), "a whole number of cells")
 _LIMITS = "a list of two lengths, the lower and the upper limit"
+
+
+def _ascending(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise InputError(f"found {limits[0]:g} and {limits[1]:g} m: expected {_LIMITS}")
+    return limits
+
+
 LIMITS = Annotated[
     tuple[measured("m"), measured("m")],
     BeforeValidator(lambda value: a_list(value, _LIMITS, 2)),
+    AfterValidator(_ascending),
     Field(description=_LIMITS),
 ]
 
@@ -35,7 +44,7 @@ class Crop(Section):
 class Outliers(Section):
     """Points masked that lie far from the median of their neighbours."""
 
-    window: whole(3) = 9
+    window: whole(3, odd=True) = 9
     threshold: measured("1", above=0) = 8.0
 
 

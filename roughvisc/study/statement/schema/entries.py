@@ -65,17 +65,18 @@ def measured(
     return Annotated[float, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
 
 
-def whole(least: int, most: int | None = None) -> Any:
+def whole(least: int, most: int | None = None, *, odd: bool = False) -> Any:
     """Kind: a whole number; ``true`` and ``2.0`` are none."""
-    wanted = f"a whole number{range_in_words(None, least, most, None)}"
+    wanted = f"{'an odd' if odd else 'a'} whole number{range_in_words(None, least, most, None)}"
 
     def check(value: Any) -> int:
-        good = isinstance(value, int) and not isinstance(value, bool)
+        good = isinstance(value, int) and not isinstance(value, bool) and not (odd and value % 2 == 0)
         if not good or value < least or (most is not None and value > most):
             raise InputError(f"found {shown(value)}: expected {wanted}")
         return int(value)
 
-    schema = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+    schema: dict[str, Any] = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+    schema |= {"not": {"multipleOf": 2}} if odd else {}
     return Annotated[int, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
 
 
