@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
@@ -56,9 +56,10 @@ class Filter(Section):
     periodic: Flag = False
 
 
-def either(check: Any, kinds: list[str], wanted: str) -> Any:
-    """Kind: several types of value, told apart by a check."""
-    return Annotated[Any, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
+def either(check: Any, kinds: list[str], wanted: str, table: Any = Any) -> Any:
+    """Kind: several types of value, told apart by a check; ``table``: what the check makes of one, or false."""
+    made = table if table is Any else table | Literal[False]
+    return Annotated[made, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
 
 
 _LEVEL = "true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3"
@@ -104,9 +105,9 @@ class Conditioned(Section):
     rotate90: optional(whole(0, 3)) = None
     invert: Flag = False
     level: either(_level, ["boolean", "integer"], _LEVEL) = False
-    outliers: either(_outliers, ["boolean", "object"], _OUTLIERS) = False
+    outliers: either(_outliers, ["boolean", "object"], _OUTLIERS, Outliers) = False
     fill: either(_fill, ["boolean", "string"], _FILL) = False
-    filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER) = False
+    filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER, Filter) = False
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None
     mirror: Flag = False
