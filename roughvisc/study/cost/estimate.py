@@ -6,7 +6,7 @@ import itertools
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -21,6 +21,7 @@ from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.scene import Ground, prepare
 from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import axis_step
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
@@ -99,9 +100,10 @@ def march_of(case: Case, height: xr.DataArray) -> March:
         "steps": second.steps * _growth(first.steps, second.steps, _STEPS_GROW) ** octaves,
         "convolutions": second.convolutions * _growth(first.convolutions, second.convolutions, _WORK_GROWS) ** octaves,
     }
-    if case.settings.solve.time_step != "auto":
+    settings = case.solving()
+    if settings.time_step != "auto":
         grown["steps"] = second.steps
-    rows = grown["steps"] if case.settings.keep.times == "all" else second.rows
+    rows = grown["steps"] if settings.times is None else second.rows
     return March(**{**vars(second), **grown, "rows": rows, "whole": first.whole and second.whole})
 
 
@@ -110,29 +112,17 @@ def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
 
 
 def _march(case: Case, height: xr.DataArray) -> March:
-    settings = case.settings
-    times = None if settings.keep.times == "all" else settings.keep.times
-    program = case.program()
-    scene, _ = prepare(
-        Ground(height, "absent"),
-        case.material(),
-        program,
-        boundary=settings.solve.boundary,
-        tolerance=settings.solve.tolerance,
-        time_step=settings.solve.time_step,
-        times=times,
-        edge="accept",
-        memory=settings.solve.memory,
-    )
+    settings, program = replace(case.solving(), missing="absent", edge="accept"), case.program()
+    scene, _ = prepare(Ground(height, settings.missing), case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = level = 0.0
     work, instants = 0, [0.0]
     until = time.perf_counter() + _MARCH
     kept = set(scene.times or ())
-    for step in march(scene) if settings.solve.method == "fast" else march_seed(scene):
+    for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
         steps += 1
-        rows += times is None or now in kept
+        rows += settings.times is None or now in kept
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, float(np.mean(step.shown.pressure > 0)))
         level = max(level, step.level)
@@ -220,23 +210,25 @@ def work(cells: float) -> float:
     return cells * math.log2(cells + 2)
 
 
-def wall_time(case: Case, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0) -> float:
+def wall_time(
+    settings: Settings, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0
+) -> float:
     """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
     convolution *= work(window * cells) / work(cells)
     modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
     past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
     stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
-    writing = found.rows * cells * 8 * len(case.settings.keep.fields) * _WRITE
-    again = _AGAIN if case.settings.solve.grid_error else 1.0
+    writing = found.rows * cells * 8 * len(settings.fields) * _WRITE
+    again = _AGAIN if settings.grid_error else 1.0
     return found.convolutions * convolution * again + stepping + writing
 
 
-def memory(case: Case, cells: int, found: March, engine: Engine, part: float = 1.0) -> float:
+def memory(settings: Settings, cells: int, found: March, engine: Engine, part: float = 1.0) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     field = 8.0 * cells
     surface, solver = 3.0, 14.0  # measured at 512 squared: together 13 to 18, as 5 to 45 % of the cells are in contact
     companion = 0.0  # measured there: 8 fields with one exponential
-    transforms = 4.3 if case.settings.solve.boundary == "free" else 1.4  # symbols, spectra
+    transforms = 4.3 if settings.boundary == "free" else 1.4  # symbols, spectra
     past = 0.0
     if isinstance(engine.memory, Modes):
         modes = len(engine.memory.material.times) + bool(engine.memory.material.fluidity)

@@ -19,8 +19,9 @@ from roughvisc.mechanics.hereditary.memory import Modes
 from roughvisc.study.cost.estimate import March, Stopwatch, disk, march_of, memory, solved_on, wall_time, windows
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.simulation.notes import left_out
-from roughvisc.study.simulation.scene import Ground, follows, kept_times, shortest_age
+from roughvisc.study.simulation.scene import Ground, engine_wanted, follows
 from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.results import parameters_of
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
@@ -194,15 +195,10 @@ class _Engines:
         self._found: dict[str, Engine] = {}
 
     def of(self, case: Case, grows: bool) -> Engine:
-        settings, program = case.settings, case.program()
-        duration = program.duration
-        kept = kept_times(program, None if settings.keep.times == "all" else settings.keep.times)
-        acts_on = "pressure" if grows else "displacement"
-        solve = settings.solve
-        shortest = shortest_age(program, kept, solve.tolerance)
-        name = f"{settings.material!r} {duration!r} {shortest!r} {solve.tolerance!r} {solve.memory} {acts_on}"
+        wanted = engine_wanted(case.program(), case.solving(), "pressure" if grows else "displacement")
+        name = f"{case.settings.material!r} {wanted!r}"
         if name not in self._found:
-            self._found[name] = engine_for(case.material(), duration, solve.tolerance, acts_on, solve.memory, shortest)
+            self._found[name] = engine_for(case.material(), **wanted)
         return self._found[name]
 
 
@@ -215,47 +211,45 @@ def _row(
     engines: _Engines,
     stopwatch: Stopwatch,
 ) -> dict[str, Any]:
-    solve = case.settings.solve
+    settings = case.solving()
     row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in _COLUMNS.items()}
-    free = solve.boundary == "free"
-    row |= {"boundary": solve.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
+    free = settings.boundary == "free"
+    row |= {"boundary": settings.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
     row |= {"exponentials": 0, "cells_x": 0, "cells_y": 0}
     if surface is None or surface.height is None:
         return row
-    height, grows = surface.height, surface.grows and free and solve.edge == "error"
-    window = len(surface.windows) > 1 and follows(solve.boundary, solve.edge, solve.method)
-    mirrored = surface.mirrored and solve.method == "fast"
+    height, grows = surface.height, surface.grows and free and settings.edge == "error"
+    window = len(surface.windows) > 1 and follows(settings)
+    mirrored = surface.mirrored and settings.method == "fast"
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
         engine = engines.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
     exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
-    keep = case.settings.keep
-    omitted = left_out(engine, solve.boundary, solve.method, keep.fields, keep.times == "all", window, mirrored)
+    omitted = left_out(engine, settings, window, mirrored)
     row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
-    cells, convolution = height.size, stopwatch.seconds(height, solve.boundary)
+    cells, convolution = height.size, stopwatch.seconds(height, settings.boundary)
     reachable = surface.windows if window else surface.windows[-1:]
-    part = solved_on(reachable, found.level) if solve.method == "fast" else 1.0
+    part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
     return row | {
-        "scheme": _scheme(case, engine, found),
+        "scheme": _scheme(settings, engine, found),
         "steps": found.steps,
         "rows": found.rows,
         "contact_fraction": found.contact,
         "convolutions": found.convolutions,
-        "wall_time": wall_time(case, cells, found, engine, convolution, part),
-        "memory": memory(case, cells, found, engine, part),
+        "wall_time": wall_time(settings, cells, found, engine, convolution, part),
+        "memory": memory(settings, cells, found, engine, part),
         "disk": disk(case, cells, found),
     }
 
 
-def _scheme(case: Case, engine: Engine, found: March) -> str:
-    solve = case.settings.solve
-    if solve.method == "seed":
+def _scheme(settings: Settings, engine: Engine, found: March) -> str:
+    if settings.method == "seed":
         return "the seed paper's: rectangle rule, first order"
-    steps = "chosen by the tolerance" if solve.time_step == "auto" else f"of {solve.time_step:g} s"
+    steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
     if engine.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"
     damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""

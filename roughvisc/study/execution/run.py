@@ -111,26 +111,9 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     InputError, ConvergenceError
         As :func:`roughvisc.simulate`, with the study's name in front.
     """
-    settings = case.settings
     height = case.height()
     try:
-        dataset = press(
-            height,
-            case.material(),
-            case.program(),
-            boundary=settings.solve.boundary,
-            tolerance=settings.solve.tolerance,
-            time_step=settings.solve.time_step,
-            times=None if settings.keep.times == "all" else settings.keep.times,
-            fields=settings.keep.fields,
-            method=settings.solve.method,
-            missing=settings.surface.missing,
-            edge=settings.solve.edge,
-            memory=settings.solve.memory,
-            grid_error=settings.solve.grid_error,
-            progress=progress,
-            keeper=keeper,
-        )
+        dataset = press(height, case.material(), case.program(), case.solving(), progress=progress, keeper=keeper)
     except InUseError:
         raise
     except (InputError, ConvergenceError) as error:

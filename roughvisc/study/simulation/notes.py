@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
 from roughvisc.mechanics.hereditary.choice import Engine
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import axis_step
 from roughvisc.variables import FIELDS
 
@@ -25,31 +24,23 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def left_out(
-    engine: Engine,
-    boundary: str,
-    method: str,
-    fields: Sequence[str],
-    every_step: bool,
-    window: bool = False,
-    mirrored: bool = False,
-) -> str:
+def left_out(engine: Engine, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
     """What nothing asks for, and is therefore not modelled, computed or kept."""
     out = []
     if engine.note.startswith("no memory"):
         out.append("history (the material is elastic)")
-    elif engine.memory.acts_on != "pressure" and method == "fast":
+    elif engine.memory.acts_on != "pressure" and settings.method == "fast":
         out.append("convolutions of the past")
-    if boundary == "periodic":
+    if settings.boundary == "periodic":
         out.append("padding")
     if window:
         out.append("what lies too deep to be touched")
     if mirrored:
         out.append("three quarters of the surface (they are its mirror images)")
-    absent = [name for name in FIELDS if name not in fields]
+    absent = [name for name in FIELDS if name not in settings.fields]
     if absent:
         out.append(f"{' and '.join(absent)} in the file")
-    if not every_step:
+    if settings.times is not None:
         out.append("steps between kept times in the file")
     return ", ".join(out)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -16,6 +15,7 @@ from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.mirror import quarter, unfold
 from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.study.simulation.scene import Ground
+from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.variables import STATUS_MEANINGS, annotate
 
@@ -45,24 +45,21 @@ class Rows:
     ----------
     ground : Ground
         The surface, which may grow meanwhile.
-    fields : sequence of str
-        Fields to keep.
+    settings : Settings
+        Of the march: which fields are kept; and where the tolerance leaves room for single precision, what lies beyond
+        a window is computed so.
     store : RowStore
         Where the rows are kept; what is in it counts as rows of an earlier part of the march.
-    tolerance : float
-        Of the march: where it leaves room for single precision, what lies beyond a window is computed so.
     series_error : float
         Relative error of the series that stands for the material.
     """
 
-    def __init__(
-        self, ground: Ground, fields: Sequence[str], store: RowStore, tolerance: float, series_error: float = 0.0
-    ) -> None:
+    def __init__(self, ground: Ground, settings: Settings, store: RowStore, series_error: float = 0.0) -> None:
         self._ground = ground
-        self._fields = tuple(fields)
+        self._settings = settings
         self._store = store
-        self._series_error = series_error
-        single = tolerance >= _SINGLE
+        self.series_error = series_error
+        single = settings.tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, single=single))
         self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
 
@@ -81,7 +78,7 @@ class Rows:
             gap[contact] = 0.0
             mean_gap = float(np.nanmean(gap))
             fields = {"pressure": shown.pressure, "gap": gap, "displacement": step.displacement}
-            arrays = {name: fields[name] for name in self._fields}
+            arrays = {name: fields[name] for name in self._settings.fields}
         else:
             assert step.effective is not None, "a window asks for a memory of pressures"
             mean_gap = self._mean_gap(window, step.effective, step.level)
@@ -91,7 +88,7 @@ class Rows:
             "time": shown.time,
             "force": shown.force,
             "approach": shown.approach,
-            **stated(step, self._series_error, touching),
+            **stated(step, self.series_error, touching),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
             "status": self._status(step, converged, contact),
@@ -104,7 +101,7 @@ class Rows:
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
         self._store.append({"row": row, "grid": grid}, _of_their_own(arrays))
 
-    def dataset(self, scene: Scene, method: str) -> xr.Dataset:
+    def dataset(self) -> xr.Dataset:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
         height = self._ground.height
         rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
@@ -113,7 +110,7 @@ class Rows:
             columns[counter] = np.diff(columns[counter], prepend=0)
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
-        for name in self._fields:
+        for name in self._settings.fields:
             frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)
         highest = {"highest": self._ground.highest}
@@ -125,9 +122,7 @@ class Rows:
             coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values},
             attrs={
                 "Conventions": "CF-1.11",
-                "boundary": scene.halfspace.boundary,
-                "tolerance": scene.tolerance,
-                "method": method,
+                **self._settings.told(),
                 "history": str(height.attrs.get("history", "")),
             },
         )

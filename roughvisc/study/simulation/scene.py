@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,13 +15,15 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, Kind, engine_for
+from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, engine_for
+from roughvisc.mechanics.hereditary.memory import ActsOn
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
+from roughvisc.study.statement.settings import Missing, Settings
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import grown, highest
 
@@ -54,7 +56,7 @@ class Ground:
     def __init__(
         self,
         height: xr.DataArray,
-        missing: Literal["refuse", "absent"] = "refuse",
+        missing: Missing = Settings.missing,
         *,
         follow: bool = False,
         mirror: bool = False,
@@ -143,61 +145,42 @@ class Ground:
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
-def follows(boundary: str, edge: str, method: str) -> bool:
+def follows(settings: Settings) -> bool:
     """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
-    return boundary == "free" and edge == "error" and method == "fast"
+    return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
 
 
-def prepare(
-    ground: Ground,
-    material: Material,
-    program: Program,
-    *,
-    boundary: Boundary,
-    tolerance: float,
-    time_step: float | Literal["auto"],
-    times: int | Sequence[float] | None,
-    edge: Literal["error", "accept"],
-    memory: Kind = "auto",
-) -> tuple[Scene, Engine]:
-    """Scene of a case and what models its material; see :func:`roughvisc.simulate` for the parameters.
+def prepare(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Engine]:
+    """Scene of a case and what models its material.
 
     Raises
     ------
     InputError
-        If any of it is wrong; nothing has been computed then.
+        If surface, material, program and settings do not go together; nothing has been computed then.
     """
-    if edge not in ("error", "accept"):
-        raise InputError(f"edge is {edge!r}: expected 'error' or 'accept'")
-    if not (isinstance(tolerance, int | float) and 0 < tolerance < 1):
-        raise InputError(f"tolerance is {tolerance!r}: expected a number between 0 and 1")
-    if time_step != "auto" and not (isinstance(time_step, int | float) and 0 < time_step < math.inf):
-        raise InputError(f"time_step is {time_step!r}: expected 'auto' or a positive number [s]")
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
-    check_times(program, time_step)
+    check_times(program, settings.time_step)
     if not hasattr(material, "mean_contact_compliance"):
         raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
-    check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
-    if boundary == "periodic" and ground.present.all():
+    check_loads(program, material, settings.boundary, (nx * dx, ny * dy), ground.gap[ground.present])
+    if settings.boundary == "periodic" and ground.present.all():
         _check_approach(program, ground.mean_gap)
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
         ground.widen()
-    grows = not ground.window.whole or (boundary == "free" and edge == "error" and ground.can_grow())
-    kept = kept_times(program, times)
-    acts_on: Literal["pressure", "displacement"] = "pressure" if grows else "displacement"
-    engine = engine_for(material, program.duration, tolerance, acts_on, memory, shortest_age(program, kept, tolerance))
+    grows = not ground.window.whole or (settings.boundary == "free" and settings.edge == "error" and ground.can_grow())
+    engine = engine_for(material, **engine_wanted(program, settings, "pressure" if grows else "displacement"))
     scene = Scene(
-        halfspace=ground.halfspace(boundary),
+        halfspace=ground.halfspace(settings.boundary),
         material=engine.material,
         memory=engine.memory,
         program=program,
-        times=kept,
-        tolerance=float(tolerance),
-        time_step=None if time_step == "auto" else float(time_step),
-        accept_edge=edge == "accept",
+        times=kept_times(program, settings.times),
+        tolerance=settings.tolerance,
+        time_step=None if settings.time_step == "auto" else settings.time_step,
+        accept_edge=settings.edge == "accept",
         enlarge=ground.enlarge if grows else None,
         **ground.shown(),
     )
@@ -234,8 +217,6 @@ def _checked(height: xr.DataArray) -> xr.DataArray:
 
 
 def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:
-    if missing not in ("refuse", "absent"):
-        raise InputError(f"missing is {missing!r}: expected 'refuse' or 'absent'")
     if not present.any():
         raise InputError("height is missing everywhere: expected at least one finite height")
     absent = missing == "absent" or height.attrs.get("missing") == "absent"
@@ -260,6 +241,17 @@ def _check_approach(program: Program, full: float) -> None:
                 f"program.{i}: approach goes to {largest:.6g} m, and with periodic boundaries contact is full at "
                 f"{full:.6g} m: expected less"
             )
+
+
+def engine_wanted(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
+    """What :func:`~roughvisc.mechanics.hereditary.choice.engine_for` is to be asked for, whatever the material."""
+    return {
+        "duration": program.duration,
+        "tolerance": settings.tolerance,
+        "acts_on": acts_on,
+        "kind": settings.memory,
+        "shortest": shortest_age(program, kept_times(program, settings.times), settings.tolerance),
+    }
 
 
 def shortest_age(program: Program, kept: Sequence[float] | None, tolerance: float) -> float:
@@ -310,14 +302,12 @@ def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[f
     Raises
     ------
     InputError
-        If a time lies outside the program, or the count is not positive.
+        If a time lies outside the program.
     """
     if times is None:
         return None
     duration = program.duration
-    if isinstance(times, int | np.integer):
-        if times < 1:
-            raise InputError(f"times is {times}: expected a positive count, a list, or None")
+    if isinstance(times, int):
         listed = np.linspace(0, duration, times) if times > 1 else np.array([duration])
     else:
         listed = np.unique(np.asarray(times, dtype=float))

@@ -6,30 +6,30 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal
+from dataclasses import replace
 
 import xarray as xr
 
-from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.halfspace.operator import Boundary
-from roughvisc.mechanics.hereditary.choice import Kind
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
 from roughvisc.study.simulation.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.simulation.rows import Rows, keeps_its_word
 from roughvisc.study.simulation.scene import Ground, follows, prepare
+from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
-from roughvisc.variables import FIELDS, annotate
+from roughvisc.variables import annotate
 
 log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
-Method = Literal["fast", "seed"]
 
 
 def simulate(
@@ -37,16 +37,16 @@ def simulate(
     material: Material,
     program: Program,
     *,
-    boundary: Boundary = "free",
-    tolerance: float = 1e-3,
-    time_step: float | Literal["auto"] = "auto",
-    times: int | Sequence[float] | None = None,
-    fields: Sequence[str] = ("pressure", "gap"),
-    method: Method = "fast",
-    missing: Literal["refuse", "absent"] = "refuse",
-    edge: Literal["error", "accept"] = "error",
-    memory: Kind = "auto",
-    grid_error: bool = False,
+    boundary: Boundary = Settings.boundary,
+    tolerance: float = Settings.tolerance,
+    time_step: TimeStep = Settings.time_step,
+    times: int | Sequence[float] | None = Settings.times,
+    fields: Sequence[str] = Settings.fields,
+    method: Method = Settings.method,
+    missing: Missing = Settings.missing,
+    edge: Edge = Settings.edge,
+    memory: Memory = Settings.memory,
+    grid_error: bool = Settings.grid_error,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
     """Press a rigid profile on a linear viscoelastic half-space.
@@ -113,10 +113,7 @@ def simulate(
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """
-    return press(
-        height,
-        material,
-        program,
+    settings = Settings(
         boundary=boundary,
         tolerance=tolerance,
         time_step=time_step,
@@ -127,34 +124,31 @@ def simulate(
         edge=edge,
         memory=memory,
         grid_error=grid_error,
-        progress=progress,
     )
+    return press(height, material, program, settings, progress=progress)
 
 
 def press(
     height: xr.DataArray,
     material: Material,
     program: Program,
+    settings: Settings,
     *,
-    fields: Sequence[str],
-    grid_error: bool,
     progress: bool | Progress,
     keeper: Keeper | None = None,
-    **settings: Any,
 ) -> xr.Dataset:
     """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
 
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
-    needed = ("pressure",) if grid_error and "pressure" not in fields else ()
-    given = {"fields": (*fields, *needed), "keeper": keeper, "progress": progress}
-    dataset = _press(height, material, program, **given, **settings)
-    if not grid_error:
+    needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
+    with_needed = replace(settings, fields=(*settings.fields, *needed))
+    dataset = _press(height, material, program, with_needed, progress, keeper)
+    if not settings.grid_error:
         return dataset
 
     def again(few: xr.DataArray, times: list[float]) -> xr.Dataset:
-        given = {"fields": ("pressure",), "keeper": None, "progress": False}
-        return _press(few, material, program, **given, **{**settings, "times": times})
+        return _press(few, material, program, replace(settings, times=times, fields=("pressure",)), False, None)
 
     return annotate(with_grid_error(dataset, height, again)).drop_vars(needed)
 
@@ -163,81 +157,83 @@ def _press(
     height: xr.DataArray,
     material: Material,
     program: Program,
-    *,
-    boundary: Boundary,
-    tolerance: float,
-    time_step: float | Literal["auto"],
-    times: int | Sequence[float] | None,
-    fields: Sequence[str],
-    method: Method,
-    missing: Literal["refuse", "absent"],
-    edge: Literal["error", "accept"],
-    memory: Kind,
+    settings: Settings,
     progress: bool | Progress,
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    ground = Ground(height, missing, follow=follows(boundary, edge, method), mirror=method == "fast")
+    ground = Ground(height, settings.missing, follow=follows(settings), mirror=settings.method == "fast")
     expect_arrays(ground.gap.nbytes)
-    scene, engine = prepare(
-        ground,
-        material,
-        program,
-        boundary=boundary,
-        tolerance=tolerance,
-        time_step=time_step,
-        times=times,
-        edge=edge,
-        memory=memory,
-    )
+    scene, engine = prepare(ground, material, program, settings)
     followed = not ground.window.whole
-    unknown = [name for name in fields if name not in FIELDS]
-    if unknown:
-        raise InputError(f"fields holds {unknown[0]!r}: expected some of {', '.join(FIELDS)}")
-    if method not in ("fast", "seed"):
-        raise InputError(f"method is {method!r}: expected 'fast' or 'seed'")
     log.info("memory: %s", engine.note)
-    reached = Reached() if keeper is None else keeper.saved
-    for _ in range(reached.growths):
-        larger = ground.enlarge(scene)
-        assert larger is not None, "it grew before"
-        scene = larger[0]
-    rows = Rows(ground, fields, RowsInMemory() if keeper is None else keeper.rows, tolerance, engine.series_error)
-    spent = reached.wall_time - began
-    kept = set(program.corners if scene.times is None else scene.times)
-    every = scene.times is None
+    if keeper is not None:
+        scene = _grown(scene, ground, keeper.saved.growths)
+    rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, engine.series_error)
     with _reporting(progress) as report:
-        for step in march(scene, reached.state) if method == "fast" else march_seed(scene):
-            scene = step.scene
-            reached = reached.after(step, ground.growths, spent + time.perf_counter())
-            # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-            if step.shown.time in kept or (every and keeps_its_word(step, engine.series_error)):
-                rows.add(step, reached.converged, reached.wall_time)
-                reached = reached.kept()
-            report(step.shown.time, scene.program.duration)
-            if keeper is not None and method == "fast":
-                keeper.passed(reached)
-            del step  # its fields are not needed while the next one is computed
+        _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-    dataset = rows.dataset(scene, method)
-    deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
+    dataset = rows.dataset()
     described = {
         "memory": engine.note,
         "series_error": engine.series_error,
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
-        "slope_note": slope_note(ground.domain[ground.window.cells], boundary, deepest),
-        "left_out": left_out(engine, boundary, method, fields, times is None, followed, ground.mirrored),
+        "slope_note": _slope_note(ground, settings, dataset),
+        "left_out": left_out(engine, settings, followed, ground.mirrored),
     }
-    if described["slope_note"]:
-        log.warning("%s", described["slope_note"])
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset
 
 
+def _grown(scene: Scene, ground: Ground, growths: int) -> Scene:
+    """The scene on the grid that an interrupted run had come to."""
+    for _ in range(growths):
+        larger = ground.enlarge(scene)
+        assert larger is not None, "it grew before"
+        scene = larger[0]
+    return scene
+
+
+def _march(
+    scene: Scene,
+    ground: Ground,
+    rows: Rows,
+    settings: Settings,
+    began: float,
+    report: Progress,
+    keeper: Keeper | None,
+) -> None:
+    """March to the end of the program; the rows take up what is kept, the keeper how far it has come."""
+    reached = Reached() if keeper is None else keeper.saved
+    spent = reached.wall_time - began
+    every = scene.times is None
+    kept = set(scene.program.corners if scene.times is None else scene.times)
+    for step in march(scene, reached.state) if settings.method == "fast" else march_seed(scene):
+        reached = reached.after(step, ground.growths, spent + time.perf_counter())
+        # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
+        if step.shown.time in kept or (every and keeps_its_word(step, rows.series_error)):
+            rows.add(step, reached.converged, reached.wall_time)
+            reached = reached.kept()
+        report(step.shown.time, scene.program.duration)
+        if keeper is not None and settings.method == "fast":
+            keeper.passed(reached)
+        del step  # its fields are not needed while the next one is computed
+
+
+def _slope_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
+    """What to say of a surface that is too steep where it was loaded, in the log too."""
+    deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
+    note = slope_note(ground.domain[ground.window.cells], settings.boundary, deepest)
+    if note:
+        log.warning("%s", note)
+    return note
+
+
 @contextmanager
 def _reporting(progress: bool | Progress) -> Iterator[Progress]:
+    """What to call with the time reached and the program's length; a progress bar ends with the block."""
     if callable(progress):
         yield progress
     elif not progress:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
+    from roughvisc.study.statement.settings import Settings
 
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
@@ -82,6 +83,10 @@ class Case:
     def program(self) -> Program:
         """The loading program."""
         return self.settings.loading()
+
+    def solving(self) -> Settings:
+        """How it is computed and what is kept, as the solver takes it."""
+        return self.settings.solving()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # the classes of the tables are made at run time, so a case travels to another process as its text

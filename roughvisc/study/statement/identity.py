@@ -17,8 +17,8 @@ from roughvisc.topography.readers import sha256
 #: Raised by whoever changes the numbers that an unchanged case gives.
 NUMERICS_REVISION = 6
 
-#: Keys of ``[solve]`` that came later, with the value that changes nothing: it leaves a case's key as it was.
-_SINCE_ADDED = {"memory": "auto", "grid_error": False}
+#: Keys of ``[solve]`` that always count. Any other came later, and its usual value leaves a case's key as it was.
+_FROM_THE_START = {"boundary", "tolerance", "time_step", "method", "edge"}
 #: Keys of a surface card that say whence it came and change no height.
 _PROSE = {
     "title",
@@ -43,9 +43,10 @@ def case_key(settings: Study) -> str:
     stated = settings.model_dump(
         mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
     )
-    for name, usual in _SINCE_ADDED.items():
-        if stated["solve"][name] == usual:
-            del stated["solve"][name]
+    usual = type(settings.solve)().model_dump(mode="json")
+    stated["solve"] = {
+        key: value for key, value in stated["solve"].items() if key in _FROM_THE_START or value != usual[key]
+    }
     stated["program"] = [
         [segment.control, segment.duration, segment.end, segment.amplitude, segment.period]
         for segment in settings.loading().segments

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.index import NETCDF, Entry, index_of, save_index
 from roughvisc.study.storage.store import no_results
 from roughvisc.variables import VARIABLES, annotate

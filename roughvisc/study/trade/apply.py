@@ -14,11 +14,12 @@ from tomlkit.items import Float, Table, Trivia
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
+from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.store import whole_file
 from roughvisc.study.trade.ladder import short
 
 #: What keys are that a study does not state, where they are to be as if it did not.
-_USUAL = {"time_step": "auto", "method": "fast", "memory": "auto"}
+_USUAL = {"time_step": Settings.time_step, "method": Settings.method, "memory": Settings.memory}
 
 
 def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import xarray as xr
@@ -14,7 +14,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.hereditary.choice import engine_for
 from roughvisc.study.cost.estimate import March, Stopwatch, march_of, memory, solved_on, windows, work
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.simulation.scene import Ground, follows, kept_times, shortest_age
+from roughvisc.study.simulation.scene import Ground, engine_wanted, follows
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
@@ -86,9 +86,9 @@ class Bench:
         self._path, self._report = result_path(folder, "run"), report
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
-        solve = case.settings.solve
-        self._convolution = Stopwatch().seconds(height, solve.boundary)
-        ground = Ground(height, "absent", follow=follows(solve.boundary, solve.edge, "fast"), mirror=True)
+        settings = replace(case.solving(), method="fast", missing="absent")
+        self._convolution = Stopwatch().seconds(height, settings.boundary)
+        ground = Ground(height, settings.missing, follow=follows(settings), mirror=True)
         self._part = solved_on(windows(ground), self._found.level)  # of the cells
         self._calibration = 1.0
 
@@ -161,13 +161,10 @@ class Bench:
 
     def _memory(self, case: Case, dataset: xr.Dataset, steps: int) -> float:
         """As a plan counts it, with the steps that were taken. [byte]"""
-        solve, cells = case.settings.solve, dataset.sizes["x"] * dataset.sizes["y"]
+        settings, cells = case.solving(), dataset.sizes["x"] * dataset.sizes["y"]
         contact, rows = float(dataset["contact_fraction"].max()), dataset.sizes["time"]
-        program, keep = case.program(), case.settings.keep
-        kept = kept_times(program, None if keep.times == "all" else keep.times)
-        shortest = shortest_age(program, kept, solve.tolerance)
-        engine = engine_for(case.material(), program.duration, solve.tolerance, kind=solve.memory, shortest=shortest)
+        engine = engine_for(case.material(), **engine_wanted(case.program(), settings))
         found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
-        increments = 8.0 * cells * steps if solve.method == "seed" else 0.0
-        part = 1.0 if solve.method == "seed" else self._part
-        return memory(case, cells, found, engine, part) + increments
+        increments = 8.0 * cells * steps if settings.method == "seed" else 0.0
+        part = 1.0 if settings.method == "seed" else self._part
+        return memory(settings, cells, found, engine, part) + increments

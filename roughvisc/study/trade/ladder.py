@@ -10,6 +10,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.simulation.coarser import coarser_shape
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.surface import FileSurface
+from roughvisc.study.statement.settings import Memory, Method, Settings
 
 #: Relative precision of a float with 23 bits of fraction.
 FLOAT32 = 2.0**-24
@@ -41,16 +42,18 @@ class Setting:
         Relative precision of the fields in the file; None: that of the study.
     """
 
-    tolerance: float = 1e-3
+    tolerance: float = Settings.tolerance
     time_step: float | None = None
     coarsening: float = 1.0
-    method: str = "fast"
-    memory: str = "auto"
+    method: Method = Settings.method
+    memory: Memory = Settings.memory
     precision: float | None = None
 
     def __post_init__(self) -> None:
-        if not (0 < self.tolerance < 1):
-            raise InputError(f"setting: tolerance is {self.tolerance!r}: expected a number between 0 and 1")
+        try:
+            Settings(tolerance=self.tolerance, method=self.method, memory=self.memory)
+        except InputError as error:
+            raise InputError(f"setting: {error}") from error
         if self.time_step is not None and not (0 < self.time_step < math.inf):
             raise InputError(f"setting: time_step is {self.time_step!r}: expected a positive number [s], or None")
         if not (0 < self.coarsening < math.inf):

@@ -85,7 +85,7 @@ def trade(
     if not rungs:
         raise InputError("settings is empty: expected at least one Setting")
     program = case.program()
-    times = np.array(kept_times(program, case.settings.keep.times))
+    times = np.array(kept_times(program, case.solving().times))
     exact = closed_form(case, times) if reference == "auto" else None
     with tempfile.TemporaryDirectory() as folder, reporting(progress) as report:
         bench = Bench(case, height, Path(folder), budget, report)

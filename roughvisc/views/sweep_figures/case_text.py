@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views.figures.axes import Unit, unit_for
 
 
@@ -64,6 +64,8 @@ def setting_unit(values: Any, si: str) -> Unit:
     if si == "Pa s":
         unit = unit_for(values, "Pa")
         return Unit(unit.factor, f"{unit.symbol} s")
+    if si.startswith("1/"):
+        return Unit(1.0, si)  # no prefix: 3e-07 1/Pa
     return unit_for(values, si)
 
 
@@ -83,7 +85,7 @@ def readable_setting(key: str, value: Any) -> str:
 def material_words(material: Mapping[str, Any]) -> str:
     """Material of a case in one line."""
     rest = [
-        f"{key.replace('_', ' ')} {readable_setting(key, value)}"
+        f"{key.replace('_', ' ')} {readable_setting(f'material.{key}', value)}"
         for key, value in material.items()
         if key != "model" and not isinstance(value, list | dict)
     ]
@@ -95,8 +97,10 @@ def program_words(segments: list[Mapping[str, Any]]) -> list[str]:
     """Loading program of a case, a line a segment."""
     return [
         ", ".join(
-            f"{key} {readable_setting(key, value)}" if not isinstance(value, dict | list) else f"{key} {_value(value)}"
+            f"{key} {_value(value)}"
+            if isinstance(value, dict | list)
+            else f"{key} {readable_setting(f'program.{number}.{key}', value)}"
             for key, value in segment.items()
         )
-        for segment in segments
+        for number, segment in enumerate(segments)
     ]

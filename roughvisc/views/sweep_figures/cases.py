@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views.figures.axes import Unit
 from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
 

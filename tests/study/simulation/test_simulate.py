@@ -337,7 +337,7 @@ def test_freed_memory__is_used_again(tmp_path):
     script.write_text(
         "import resource, sys\n"
         "import roughvisc as rv\n"
-        "from roughvisc.study import simulate\n"
+        "from roughvisc.study.simulation import simulate\n"
         "if sys.argv[1] == 'without':\n"
         "    simulate.expect_arrays = lambda size: None\n"
         "rough = rv.self_affine(1.0, (511, 513), hurst=0.8, rms_slope=0.1, rolloff=0.2, shortcut=0.05, seed=1)\n"

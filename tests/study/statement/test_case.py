@@ -452,6 +452,30 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 [material]  =>  outliers = { treshold = 5 }\n[material]
 | surface.outliers.treshold: unknown key; did you mean 'threshold'?
 
+[material]  =>  outliers = { window = 4 }\n[material]
+| surface.outliers.window: found 4: expected an odd whole number at least 3
+
+[material]  =>  outliers = { window = 1 }\n[material]
+| surface.outliers.window: found 1: expected an odd whole number at least 3
+
+[material]  =>  outliers = { threshold = 0 }\n[material]
+| surface.outliers.threshold: found 0: expected a number above 0
+
+[material]  =>  filter = { cutoff = "9 um", keep = "medium" }\n[material]
+| surface.filter.keep: found 'medium': expected 'long' or 'short'
+
+[material]  =>  crop = { y = ["0.9 mm", "100 um"] }\n[material]
+| surface.crop.y: found 0.0009 and 0.0001 m: expected a list of two lengths, the lower and the upper limit
+
+[material]  =>  rotate90 = 4\n[material]
+| surface.rotate90: found 4: expected a whole number at least 0 and up to 3
+
+[material]  =>  resample = [1, 9]\n[material]
+| surface.resample.0: found 1: expected a whole number at least 2
+
+[material]  =>  mirror = "x"\n[material]
+| surface.mirror: found 'x': expected true or false
+
 [material]  =>  filter = "5 N"\n[material]
 | surface.filter.cutoff: found '5 N', which is in newton: expected a number in m, or a string with a unit of its kind
 

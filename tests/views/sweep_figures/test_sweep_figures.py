@@ -12,8 +12,9 @@ from support import labels, lines, text_boxes
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.setting_units import unit_of
+from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views import plot
+from roughvisc.views.sweep_figures.case_text import material_words, readable_setting
 from roughvisc.views.sweep_figures.cases import cases_of
 from roughvisc.views.sweep_figures.colouring import even_in_log
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
@@ -343,3 +344,8 @@ def test_unit_of__cycles_by_what_they_control():
     assert [unit_of(f"program.{i}.cycle.mean", case) for i in range(3)] == ["N", "m", ""]
     assert unit_of("program.0.cycle.period", case) == "s"
     assert unit_of("surface.amplitude") == "m"
+
+
+def test_readable_setting__a_compliance_has_no_prefix():
+    assert readable_setting("material.glassy", 3e-7) == "3e-07 1/Pa"
+    assert material_words({"model": "power_law", "glassy": 3e-7, "time_scale": 60.0}).endswith("time scale 60 s")

@@ -13,6 +13,7 @@ from roughvisc.study.statement.schema.program import AnySegment
 from roughvisc.study.statement.schema.section import Section, refuse
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
 from roughvisc.study.statement.schema.surface import AnySurface
+from roughvisc.study.statement.settings import Settings
 
 _SEGMENTS = "a list of [[program]] tables, at least one"
 
@@ -37,6 +38,11 @@ class Study(Section):
         for segment in self.program:
             program = segment.extend(program)
         return program
+
+    def solving(self) -> Settings:
+        """How it is computed and what is kept, as the solver takes it."""
+        times = None if self.keep.times == "all" else self.keep.times
+        return Settings(**dict(self.solve), fields=self.keep.fields, times=times, missing=self.surface.missing)
 
     @model_validator(mode="after")
     def _keeps_times_of_the_program(self) -> Study:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, optional, paired, shown, whole
 from roughvisc.study.statement.schema.section import Section
+from roughvisc.study.statement.settings import WORDS, Settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,9 +18,18 @@ LENGTH = measured("m", above=0)
 SIZE = paired(LENGTH, "a length")
 SHAPE = paired(whole(2), "a whole number of cells")
 _LIMITS = "a list of two lengths, the lower and the upper limit"
+
+
+def _ascending(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise InputError(f"found {limits[0]:g} and {limits[1]:g} m: expected {_LIMITS}")
+    return limits
+
+
 LIMITS = Annotated[
     tuple[measured("m"), measured("m")],
     BeforeValidator(lambda value: a_list(value, _LIMITS, 2)),
+    AfterValidator(_ascending),
     Field(description=_LIMITS),
 ]
 
@@ -34,7 +44,7 @@ class Crop(Section):
 class Outliers(Section):
     """Points masked that lie far from the median of their neighbours."""
 
-    window: whole(3) = 9
+    window: whole(3, odd=True) = 9
     threshold: measured("1", above=0) = 8.0
 
 
@@ -46,9 +56,10 @@ class Filter(Section):
     periodic: Flag = False
 
 
-def either(check: Any, kinds: list[str], wanted: str) -> Any:
-    """Kind: several types of value, told apart by a check."""
-    return Annotated[Any, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
+def either(check: Any, kinds: list[str], wanted: str, table: Any = Any) -> Any:
+    """Kind: several types of value, told apart by a check; ``table``: what the check makes of one, or false."""
+    made = table if table is Any else table | Literal[False]
+    return Annotated[made, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
 
 
 _LEVEL = "true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3"
@@ -94,13 +105,13 @@ class Conditioned(Section):
     rotate90: optional(whole(0, 3)) = None
     invert: Flag = False
     level: either(_level, ["boolean", "integer"], _LEVEL) = False
-    outliers: either(_outliers, ["boolean", "object"], _OUTLIERS) = False
+    outliers: either(_outliers, ["boolean", "object"], _OUTLIERS, Outliers) = False
     fill: either(_fill, ["boolean", "string"], _FILL) = False
-    filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER) = False
+    filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER, Filter) = False
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None
     mirror: Flag = False
-    missing: choice("refuse", "absent") = "refuse"
+    missing: choice(*WORDS["missing"]) = Settings.missing
 
     def conditioned(self, height: xr.DataArray) -> xr.DataArray:
         """Heights after the steps asked for. [m]"""

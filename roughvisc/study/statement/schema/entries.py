@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +14,13 @@ from roughvisc.errors import InputError
 from roughvisc.units import quantity
 
 Check = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a kind says of its values beside their check: the SI unit; ``"1"`` of pure numbers."""
+
+    symbol: str
 
 
 def shown(value: Any) -> str:
@@ -62,20 +70,42 @@ def measured(
         return float(f"{number:.15g}") + 0.0  # no negative zero
 
     schema = {"type": "number"} if pure else {"type": ["number", "string"]}
-    return Annotated[float, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
+    return Annotated[float, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted), Unit(unit)]
 
 
-def whole(least: int, most: int | None = None) -> Any:
+def checked(kind: Any, value: Any) -> Any:
+    """The value as the check of a kind leaves it."""
+    return kind.__metadata__[0].func(value)
+
+
+def word_or(word: str, kind: Any, wanted: str) -> Any:
+    """Kind: a word, or a quantity of another kind."""
+
+    def check(value: Any) -> Any:
+        if value == word:
+            return value
+        try:
+            return checked(kind, value)
+        except InputError:
+            raise InputError(f"found {shown(value)}: expected {wanted}") from None
+
+    units = [one for one in kind.__metadata__ if isinstance(one, Unit)]
+    schema = WithJsonSchema({"type": ["number", "string"]})
+    return Annotated[Any, BeforeValidator(check), schema, Field(description=wanted), *units]
+
+
+def whole(least: int, most: int | None = None, *, odd: bool = False) -> Any:
     """Kind: a whole number; ``true`` and ``2.0`` are none."""
-    wanted = f"a whole number{range_in_words(None, least, most, None)}"
+    wanted = f"{'an odd' if odd else 'a'} whole number{range_in_words(None, least, most, None)}"
 
     def check(value: Any) -> int:
-        good = isinstance(value, int) and not isinstance(value, bool)
+        good = isinstance(value, int) and not isinstance(value, bool) and not (odd and value % 2 == 0)
         if not good or value < least or (most is not None and value > most):
             raise InputError(f"found {shown(value)}: expected {wanted}")
         return int(value)
 
-    schema = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+    schema: dict[str, Any] = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+    schema |= {"not": {"multipleOf": 2}} if odd else {}
     return Annotated[int, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
 
 
@@ -99,10 +129,9 @@ def paired(kind: Any, name: str) -> Any:
     def spread(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return a_list(value, wanted, 2)
-        check(value)  # so that a problem is told of the value that was written
+        checked(kind, value)  # so that a problem is told of the value that was written
         return (value, value)
 
-    check = kind.__metadata__[0].func
     return Annotated[tuple[kind, kind], BeforeValidator(spread), Field(description=wanted)]
 
 

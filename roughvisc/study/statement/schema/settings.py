@@ -7,39 +7,24 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, shown, whole
+from roughvisc.study.statement.schema.entries import Flag, a_list, checked, choice, measured, shown, whole, word_or
 from roughvisc.study.statement.schema.section import Section, nearest
+from roughvisc.study.statement.settings import WORDS, Settings
 from roughvisc.variables import FIELDS
 
-_STEP = measured("s", above=0)
 _INSTANT = measured("s", least=0)
-_STEP_WANTED = "'auto', or a time in s above 0"
 _TIMES_WANTED = "'all', a count, or a list of times in s"
-
-
-def _checked(kind: Any, value: Any) -> Any:
-    """The value as the check of a kind leaves it."""
-    return kind.__metadata__[0].func(value)
-
-
-def _step(value: Any) -> Any:
-    if value == "auto":
-        return value
-    try:
-        return _checked(_STEP, value)
-    except InputError:
-        raise InputError(f"found {shown(value)}: expected {_STEP_WANTED}") from None
 
 
 def _times(value: Any) -> Any:
     if value == "all":
         return value
     if isinstance(value, int) and not isinstance(value, bool):
-        return _checked(whole(1), value)
+        return checked(whole(1), value)
     instants = a_list(value, _TIMES_WANTED)
     if not instants:
         raise InputError(f"found an empty list: expected {_TIMES_WANTED}")
-    return tuple(sorted({_checked(_INSTANT, instant) for instant in instants}))
+    return tuple(sorted({checked(_INSTANT, instant) for instant in instants}))
 
 
 def _fields(value: Any) -> Any:
@@ -54,18 +39,13 @@ def _fields(value: Any) -> Any:
 class SolveSection(Section):
     """How it is computed."""
 
-    boundary: choice("free", "periodic") = "free"
-    tolerance: measured("1", above=0, below=1) = 1e-3
-    time_step: Annotated[
-        Any,
-        BeforeValidator(_step),
-        WithJsonSchema({"type": ["number", "string"]}),
-        Field(description=_STEP_WANTED),
-    ] = "auto"
-    method: choice("fast", "seed") = "fast"
-    edge: choice("error", "accept") = "error"
-    memory: choice("auto", "direct") = "auto"
-    grid_error: Flag = False
+    boundary: choice(*WORDS["boundary"]) = Settings.boundary
+    tolerance: measured("1", above=0, below=1) = Settings.tolerance
+    time_step: word_or("auto", measured("s", above=0), "'auto', or a time in s above 0") = Settings.time_step
+    method: choice(*WORDS["method"]) = Settings.method
+    edge: choice(*WORDS["edge"]) = Settings.edge
+    memory: choice(*WORDS["memory"]) = Settings.memory
+    grid_error: Flag = Settings.grid_error
 
 
 class KeepSection(Section):
@@ -76,7 +56,7 @@ class KeepSection(Section):
         BeforeValidator(_fields),
         WithJsonSchema({"type": "array", "items": {"enum": list(FIELDS)}}),
         Field(description=f"a list of fields out of {', '.join(FIELDS)}"),
-    ] = ("pressure", "gap")
+    ] = Settings.fields
     times: Annotated[
         Any,
         BeforeValidator(_times),

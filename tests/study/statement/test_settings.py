@@ -1,0 +1,129 @@
+"""How a contact is computed, as one value: its defaults, what it refuses, and that all its doors agree."""
+
+import inspect
+import json
+from dataclasses import FrozenInstanceError, fields
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.hereditary.choice import Kind
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.schema import study_schema
+from roughvisc.study.statement.schema.conditioning import Conditioned
+from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
+from roughvisc.study.statement.settings import WORDS, Settings
+from roughvisc.study.trade.ladder import Setting
+from roughvisc.variables import FIELDS
+
+USUAL = {
+    "boundary": "free",
+    "tolerance": 1e-3,
+    "time_step": "auto",
+    "times": None,
+    "fields": ("pressure", "gap"),
+    "method": "fast",
+    "missing": "refuse",
+    "edge": "error",
+    "memory": "auto",
+    "grid_error": False,
+}
+
+
+def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
+    assert {one.name: getattr(Settings(), one.name) for one in fields(Settings)} == USUAL
+    signature = inspect.signature(rv.simulate).parameters
+    given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
+    assert given == USUAL | {"progress": True}
+    solve, keep = SolveSection(), KeepSection()
+    assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
+    assert (keep.fields, keep.times) == (USUAL["fields"], "all")
+    assert Conditioned().missing == USUAL["missing"]
+    stated = {*dict(solve), "fields", "times", "missing"}
+    assert stated == set(USUAL), "a study states every setting"
+    assert all(getattr(Setting(), name) == USUAL[name] for name in ("tolerance", "method", "memory"))
+
+
+def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
+    assert WORDS["memory"] == get_args(Kind)
+    properties = study_schema()["$defs"]["SolveSection"]["properties"]
+    stated = {name: tuple(one["enum"]) for name, one in properties.items() if "enum" in one}
+    assert stated == {name: words for name, words in WORDS.items() if name != "missing"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"boundary": "open"}, "boundary is 'open': expected 'free' or 'periodic'"),
+        ({"method": "slow"}, "method is 'slow': expected 'fast' or 'seed'"),
+        ({"missing": None}, "missing is None: expected 'refuse' or 'absent'"),
+        ({"edge": "wrap"}, "edge is 'wrap': expected 'error' or 'accept'"),
+        ({"memory": "none"}, "memory is 'none': expected 'auto' or 'direct'"),
+        ({"tolerance": 1}, "tolerance is 1: expected a number between 0 and 1"),
+        ({"tolerance": "1e-3"}, "tolerance is '1e-3': expected a number between 0 and 1"),
+        ({"tolerance": float("nan")}, "tolerance is nan: expected a number between 0 and 1"),
+        ({"time_step": 0}, "time_step is 0: expected 'auto' or a positive number [s]"),
+        ({"time_step": float("inf")}, "time_step is inf: expected 'auto' or a positive number [s]"),
+        ({"time_step": "10 ms"}, "time_step is '10 ms': expected 'auto' or a positive number [s]"),
+        ({"times": 0}, "times is 0: expected a positive count, a list, or None"),
+        ({"times": "all"}, "times is 'all': expected a positive count, a list, or None"),
+        ({"times": [0.1, "soon"]}, "times is [0.1, 'soon']: expected a positive count, a list, or None"),
+        ({"fields": None}, "fields is None: expected some of pressure, gap, displacement"),
+        ({"fields": ("gap", "stress")}, "fields holds 'stress': expected some of pressure, gap, displacement"),
+    ],
+)
+def test_settings__refuse_with_what_was_found_and_what_was_expected(wrong, message):
+    with pytest.raises(InputError) as caught:
+        Settings(**wrong)
+    assert str(caught.value) == message
+
+
+def test_settings__are_one_frozen_value():
+    one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step=1)
+    assert one == Settings(times=(0.25, 0.5), fields=("gap",), time_step=1.0)
+    assert len({one, Settings(times=[0.25, 0.5], fields=iter(["gap"]), time_step=1.0)}) == 1
+    with pytest.raises(FrozenInstanceError):
+        one.tolerance = 0.1
+
+
+STUDY = Case.from_json(
+    json.dumps(
+        {
+            "surface": {"generate": "sphere", "radius": 1e-2, "size": 1e-3, "shape": 24},
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "program": [{"load": 1e-3, "over": 1.0}],
+        }
+    )
+)
+TABLES = {"fields": "keep", "times": "keep", "missing": "surface"}
+
+
+def decimal(least, most):
+    """Numbers of fifteen digits, as a study file has them."""
+    return st.floats(least, most).map(lambda value: float(f"{value:.15g}"))
+
+
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            **{name: st.sampled_from(words) for name, words in WORDS.items()},
+            "tolerance": decimal(1e-9, 0.5),
+            "time_step": st.one_of(st.just("auto"), decimal(1e-6, 1.0)),
+            "times": st.one_of(st.none(), st.integers(1, 9), st.lists(decimal(0.0, 1.0), min_size=1)),
+            "fields": st.lists(st.sampled_from(FIELDS), unique=True),
+            "grid_error": st.booleans(),
+        },
+    )
+)
+def test_study__states_the_settings_that_the_solver_gets(chosen):
+    wanted = Settings(**chosen)
+    written = chosen | ({"times": "all"} if wanted.times is None else {})
+    case = vary(STUDY, {f"{TABLES.get(name, 'solve')}.{name}": value for name, value in written.items()})
+    kept = tuple(name for name in FIELDS if name in wanted.fields)
+    assert case.solving() == Settings(**{**vars(wanted), "fields": kept})
