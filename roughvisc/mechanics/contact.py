@@ -173,7 +173,7 @@ def _guessed(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
         return None
     few = gap[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE]
     spacing = (_STRIDE * halfspace.spacing[0], _STRIDE * halfspace.spacing[1])
-    coarse = HalfSpace((few.shape[0], few.shape[1]), spacing, halfspace.boundary, mirrored=halfspace.mirrored)
+    coarse = halfspace.on((few.shape[0], few.shape[1]), spacing)
     found = solve_contact(coarse, few, load=load / _STRIDE**2, tolerance=0.03).pressure
     if np.count_nonzero(found) > _SPARSE * found.size:
         return None
@@ -212,7 +212,7 @@ class _Problem:
         gap /= self.length
         self.gap = gap
         # a uniform pressure displaces nothing, so that the energy does not see it
-        self.sees_load = load is not None or halfspace.boundary == "free"
+        self.sees_load = load is not None or halfspace.definite
         # the mean gap in contact, where it is known: periodic displacements have no mean
         known = not self.sees_load and present is None
         self.remaining = float(np.mean(gap)) - self.target if known else math.nan
@@ -449,7 +449,7 @@ class _Problem:
         excess = total.take(cells) - level
         weight = pressure.take(cells)
         full = math.inf
-        if self.halfspace.boundary == "periodic" and self.present is None:
+        if not self.halfspace.definite and self.present is None:
             mean = float(np.mean(self.gap))  # no gap is left at this approach: the displacement has no mean
             if mean - level < _NEARLY_FULL * mean:
                 full = mean
@@ -481,25 +481,29 @@ class _Problem:
         """The duality gap where the approach is given."""
         excess = float(np.sum(pressure * (here - self.target)))
         missing = max(0.0, self.target - lowest)
-        if self.halfspace.boundary == "free":
+        if self.halfspace.definite and self.uniform[0] > 0:
             # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform
             uniform, response = self.uniform
             gap = excess + missing * uniform * float(np.sum(displacement))
             return gap + 0.5 * missing**2 * uniform**2 * response
-        # The periodic kernel is singular, no such q exists. The pressure is certified under its own load, and its
-        # own approach must be the one asked for.
+        # No such q exists, as a half-space's periodic kernel is singular. The pressure is certified under its own load,
+        # and its own approach must be the one asked for.
         load = float(np.sum(pressure))
         own_gap = float(np.sum(pressure * (here - lowest)))
         return max(own_gap, abs(excess) + load * missing) if load > 0 else math.inf
 
     @property
     def uniform(self) -> tuple[float, float]:
-        """Uniform pressure that displaces every present cell by at least one length, and its total displacement."""
+        """Uniform pressure that displaces every present cell by at least one length, and the total displacement by one.
+
+        The pressure is zero where there is none: under a kernel that bulges.
+        """
         if not hasattr(self, "_uniform"):
             ones = np.ones(self.halfspace.shape) if self.present is None else self.present.astype(float)
             response = self.displacement(ones)
             inside = response if self.present is None else response[self.present]
-            self._uniform = (1 / float(np.min(inside)), float(np.sum(inside)))
+            least = float(np.min(inside))
+            self._uniform = (1 / least if least > 0 else 0.0, float(np.sum(inside)))
         return self._uniform
 
     def face(self, pressure: Array, total: Array, level: float) -> Cells:

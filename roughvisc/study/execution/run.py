@@ -128,6 +128,7 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
             edge=settings.solve.edge,
             memory=settings.solve.memory,
             grid_error=settings.solve.grid_error,
+            kernel=case.kernel(),
             progress=progress,
             keeper=keeper,
         )

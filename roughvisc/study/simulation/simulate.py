@@ -10,6 +10,8 @@ from typing import Any, Literal
 import xarray as xr
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Kind
 from roughvisc.mechanics.materials.models import Material
@@ -46,6 +48,7 @@ def simulate(
     edge: Literal["error", "accept"] = "error",
     memory: Kind = "auto",
     grid_error: bool = False,
+    kernel: Kernel = HALF_SPACE,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
     """Press a rigid profile on a linear viscoelastic half-space.
@@ -83,6 +86,8 @@ def simulate(
     grid_error : bool
         Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
         the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+    kernel : Kernel
+        Of the body that is pressed, if it is no half-space: see :class:`roughvisc.mechanics.halfspace.kernel.Kernel`.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -126,6 +131,7 @@ def simulate(
         edge=edge,
         memory=memory,
         grid_error=grid_error,
+        kernel=kernel,
         progress=progress,
     )
 
@@ -172,11 +178,12 @@ def _press(
     missing: Literal["refuse", "absent"],
     edge: Literal["error", "accept"],
     memory: Kind,
+    kernel: Kernel,
     progress: bool | Progress,
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    ground = Ground(height, missing, follow=follows(boundary, edge, method), mirror=method == "fast")
+    ground = Ground(height, missing, follow=follows(boundary, edge, method), mirror=method == "fast", kernel=kernel)
     expect_arrays(ground.gap.nbytes)
     scene, engine = prepare(
         ground,
@@ -227,6 +234,7 @@ def _press(
     described = {
         "memory": engine.note,
         "series_error": engine.series_error,
+        "kernel": "" if kernel == HALF_SPACE else repr(kernel),
         "material_note": material.note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": slope_note(ground.domain[ground.window.cells], boundary, deepest),

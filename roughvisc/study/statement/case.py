@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.study.statement.identity import case_key, surface_content
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
@@ -21,6 +22,7 @@ from roughvisc.study.statement.variation import expand, place
 if TYPE_CHECKING:
     import xarray as xr
 
+    from roughvisc.mechanics.halfspace.kernel import Kernel
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
 
@@ -78,6 +80,10 @@ class Case:
     def material(self) -> Material:
         """The material."""
         return self.settings.material.build()
+
+    def kernel(self) -> Kernel:
+        """What the surface of the body does under pressure: a half-space's."""
+        return HALF_SPACE
 
     def program(self) -> Program:
         """The loading program."""

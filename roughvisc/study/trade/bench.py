@@ -87,8 +87,9 @@ class Bench:
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         solve = case.settings.solve
-        self._convolution = Stopwatch().seconds(height, solve.boundary)
-        ground = Ground(height, "absent", follow=follows(solve.boundary, solve.edge, "fast"), mirror=True)
+        self._convolution = Stopwatch().seconds(height, solve.boundary, case.kernel())
+        followed = follows(solve.boundary, solve.edge, "fast")
+        ground = Ground(height, "absent", follow=followed, mirror=True, kernel=case.kernel())
         self._part = solved_on(windows(ground), self._found.level)  # of the cells
         self._calibration = 1.0
 
