@@ -18,6 +18,7 @@ from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, Kind, engine_for
+from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program
@@ -182,8 +183,7 @@ def prepare(
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, time_step)
-    if not hasattr(material, "mean_contact_compliance"):
-        raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    material = complete(material)
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, boundary, (nx * dx, ny * dy), ground.gap[ground.present])
     if boundary == "periodic" and ground.present.all() and not displaces_as_a_whole(ground.kernel):

@@ -14,6 +14,7 @@ from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Kind
+from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
@@ -59,7 +60,8 @@ def simulate(
         Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``; an indenter's
         counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Of the half-space.
+        Of the half-space: one of roughvisc's, or any object with the two functions that
+        :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
         Load or approach against time.
     boundary : {"free", "periodic"}
@@ -235,7 +237,7 @@ def _press(
         "memory": engine.note,
         "series_error": engine.series_error,
         "kernel": "" if kernel == HALF_SPACE else repr(kernel),
-        "material_note": material.note,
+        "material_note": complete(material).note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": slope_note(ground.domain[ground.window.cells], boundary, deepest),
         "left_out": left_out(engine, boundary, method, fields, times is None, followed, ground.mirrored),

@@ -168,6 +168,13 @@ def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeyp
         assert quick[name].values == pytest.approx(slow[name].values, abs=0.02 * largest, nan_ok=True), name
 
 
+def test_preconditioner__knows_the_mean():
+    body = HalfSpace((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
+    pressure = 1 + np.random.default_rng(1).random((12, 15))
+    back = body.approximate_inverse(body.displacement(pressure).astype(np.float32))
+    assert back == pytest.approx(pressure, rel=1e-5)
+
+
 def test_a_local_kernel__presses_springs():
     """Where 1/k is far smaller than the contact, u = (2/k) C p: springs, on which a ball has F = pi R d^2 k / (2 C)."""
     radius, depth, k, soft = 1e-3, 1e-6, 2e6, rv.elastic(1e6)
