@@ -5,7 +5,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.halfspace.kernel import love_kernel
+from roughvisc.mechanics.halfspace.love import love_kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.memory import Modes
 from roughvisc.mechanics.stepping.scene import Scene

@@ -14,6 +14,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.statement.case import read_cases
+from roughvisc.topography import instruments
 from roughvisc.views.sweep_figures.case_text import study_text
 
 ROOT = Path(__file__).parents[1]
@@ -52,8 +53,12 @@ def there(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
     for name, text in MEASURED.items():
         (tmp_path / name).write_text(text)
+    known = [(table, dict(table)) for table in (instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES)]
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+    yield tmp_path
+    for table, before in known:  # what a page has added
+        table.clear()
+        table.update(before)
 
 
 def completed(text):

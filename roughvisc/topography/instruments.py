@@ -8,7 +8,7 @@ SurfaceTopography turns it over; of plain text, row j of the file is ``y[j]``, a
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from pathlib import Path
@@ -19,7 +19,12 @@ import numpy as np
 from roughvisc.errors import InputError
 
 #: Formats that other libraries than SurfaceTopography read here.
-OWN_SUFFIXES = {"x3p": ("x3p",), "sdf": ("sdf",), "nc": ("nc", "nc4", "cdf", "hdf5", "zarr"), "card": ("toml",)}
+OWN_SUFFIXES: dict[str, tuple[str, ...]] = {
+    "x3p": ("x3p",),
+    "sdf": ("sdf",),
+    "nc": ("nc", "nc4", "cdf", "hdf5", "zarr"),
+    "card": ("toml",),
+}
 _TEXT = ("xyz", "asc")
 #: Where suffixes are shared by formats: those to try, in this order.
 _SHARED = {"txt": _TEXT, "asc": _TEXT, "csv": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
@@ -93,10 +98,10 @@ class Opened:
 def open_instrument(path: Path, format: str | None) -> Opened:
     """Header of an instrument file, by the format's name, ``"auto"``, or the suffix (None)."""
     format = _detected(path) if format == "auto" else format
-    if format == "x3p" or (format is None and path.suffix.lower() == ".x3p"):
-        return _x3p(path)
-    if format == "sdf" or (format is None and path.suffix.lower() == ".sdf"):
-        return _sdf(path)
+    suffix = path.suffix.lower().removeprefix(".")
+    for name, read in READERS.items():
+        if format == name or (format is None and suffix in OWN_SUFFIXES[name]):
+            return read(path)
     candidates = (format,) if format else formats_of(path)
     if candidates == ("npy",):  # SurfaceTopography does not close these
         return _npy(path)
@@ -110,6 +115,34 @@ def open_instrument(path: Path, format: str | None) -> Opened:
             forget(error)
             failures[candidate] = error
     raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
+
+
+def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Opened]) -> None:
+    """Make a format known to :func:`roughvisc.open_scan` in this process; one of the same name is replaced.
+
+    Parameters
+    ----------
+    format : str
+        Its name, as ``format=`` takes it.
+    suffixes : sequence of str
+        Of its files, without the dot: they are taken for this format from now on. May be none.
+    read : callable
+        ``read(path)`` reads the header and gives an :class:`Opened`. Whatever it raises is reported as one
+        :class:`~roughvisc.errors.InputError` that names the file.
+
+    Raises
+    ------
+    InputError
+        If the name or a suffix belongs to a format that roughvisc reads itself.
+    """
+    theirs = {suffix for name in _BUILT_IN for suffix in OWN_SUFFIXES[name]}
+    given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
+    if format in _BUILT_IN or theirs & set(given):
+        raise InputError(
+            f"format {format!r} with suffixes {', '.join(given) or 'none'}: expected others than the formats "
+            f"{', '.join(sorted(_BUILT_IN))} and their suffixes {', '.join(sorted(theirs))}"
+        )
+    READERS[format], OWN_SUFFIXES[format] = read, given
 
 
 def suffixes() -> dict[str, tuple[str, ...]]:
@@ -197,6 +230,11 @@ def _sdf(path: Path) -> Opened:
     cell = (content.header.x_scale, content.header.y_scale)
     maker = content.header.manufacturer_id.strip()
     return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), lambda *_: cell, 0, maker)
+
+
+#: Format -> what reads the header of its files; of those that SurfaceTopography does not read here.
+READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf}
+_BUILT_IN = frozenset(OWN_SUFFIXES)
 
 
 def _npy(path: Path) -> Opened:

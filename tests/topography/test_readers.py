@@ -26,7 +26,7 @@ from scan_files import (
 )
 
 from roughvisc.errors import InputError
-from roughvisc.topography import conditioning, synthesis
+from roughvisc.topography import conditioning, instruments, synthesis
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import parameters
 from roughvisc.topography.readers import from_array, list_channels, supported_formats
@@ -499,3 +499,24 @@ def test_ground_steel__script_writes_the_file_that_ships(tmp_path):
     again, shipped = open_scan(tmp_path / "again.x3p"), open_scan(ROOT / "surfaces" / "ground_steel.x3p")
     # other versions of the transform may differ in the last digits
     np.testing.assert_allclose(again, shipped, rtol=0, atol=1e-10)
+
+
+def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
+    for table in ("READERS", "OWN_SUFFIXES"):
+        monkeypatch.setattr(instruments, table, dict(getattr(instruments, table)))
+    heights = np.arange(12.0).reshape(4, 3) * 1e-6
+
+    def read(path):
+        channel = instruments.Channel(0, "height", True, heights.shape, "m")
+        return instruments.Opened("ours", (channel,), lambda *_: (heights, (1e-6, 2e-6)))
+
+    instruments.add_format("ours", [".TXT", "our"], read)
+    for name, format in (("a.our", None), ("a.txt", None), ("a.csv", "ours")):
+        (tmp_path / name).write_text("x")
+        assert np.array_equal(open_scan(tmp_path / name, format=format).values, heights)
+    assert supported_formats()["ours"] == ("txt", "our")
+    instruments.add_format("ours", [], read)
+    assert supported_formats()["ours"] == ()
+    for format, suffixes in (("x3p", ["a"]), ("mine", ["toml"])):
+        with pytest.raises(InputError, match="expected others than the formats"):
+            instruments.add_format(format, suffixes, read)

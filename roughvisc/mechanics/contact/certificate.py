@@ -90,13 +90,13 @@ def _under_approach(problem: Problem, pressure: Array, displacement: Array, here
     """The duality gap where the approach is given; pressure and separation are those of the contact's cells."""
     excess = float((pressure * (here - problem.target)).sum())
     missing = max(0.0, problem.target - lowest)
-    if not problem.periodic:
+    if problem.definite and problem.uniform[0] > 0:
         # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform
         uniform, response = problem.uniform
         duality_gap = excess + missing * uniform * float(displacement.sum())
         return duality_gap + 0.5 * missing**2 * uniform**2 * response
-    # The periodic kernel is singular, no such q exists. The pressure is certified under its own load, and its
-    # own approach must be the one asked for.
+    # No such q exists, as a half-space's periodic kernel is singular. The pressure is certified under its own load, and
+    # its own approach must be the one asked for.
     load = float(pressure.sum())
     own_duality_gap = float((pressure * (here - lowest)).sum())
     return max(own_duality_gap, abs(excess) + load * missing) if load > 0 else math.inf

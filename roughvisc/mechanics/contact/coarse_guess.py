@@ -25,7 +25,7 @@ def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
         return None
     few = np.array(gap[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE])
     spacing = (_STRIDE * halfspace.spacing[0], _STRIDE * halfspace.spacing[1])
-    coarse = HalfSpace((few.shape[0], few.shape[1]), spacing, halfspace.boundary, mirrored=halfspace.mirrored)
+    coarse = halfspace.on((few.shape[0], few.shape[1]), spacing)
     start = coarse_guess(coarse, few, load / _STRIDE**2)
     problem = Problem.scaled(coarse, few, load=load / _STRIDE**2, approach=None, tolerance=_TOLERANCE, present=None)
     found = solved(problem, start, None, max_iterations=_MAX_ITERATIONS, estimate_error=False).pressure

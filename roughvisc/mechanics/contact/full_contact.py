@@ -87,7 +87,7 @@ def approach_under_load(problem: Problem, pressure: Array, contact: Cells, separ
     excess = separation.take(contact) - level
     weight = pressure.take(contact)
     full = math.inf
-    if problem.periodic and problem.present is None:
+    if not problem.definite and problem.present is None:
         mean = float(np.mean(problem.gap))  # no gap is left at this approach: the displacement has no mean
         if mean - level < _NEARLY_FULL * mean:
             full = mean

@@ -73,7 +73,7 @@ class Problem:
         gap -= lowest
         gap /= length
         target = math.nan if approach is None else 1.0
-        known = load is None and halfspace.boundary == "periodic" and present is None
+        known = load is None and not halfspace.definite and present is None
         return cls(
             influence=Influence(halfspace, unit / length),
             gap=gap,
@@ -88,21 +88,26 @@ class Problem:
         )
 
     @property
-    def periodic(self) -> bool:
-        return self.influence.halfspace.boundary == "periodic"
+    def definite(self) -> bool:
+        """Whether every pressure displaces: with periodic boundaries a uniform one does not, on a half-space."""
+        return self.influence.halfspace.definite
 
     @property
     def sees_load(self) -> bool:
-        """Whether the energy knows the load: with periodic boundaries a uniform pressure displaces nothing."""
-        return self.load is not None or not self.periodic
+        """Whether the energy knows the load."""
+        return self.load is not None or self.definite
 
     @cached_property
     def uniform(self) -> tuple[float, float]:
-        """Uniform pressure that displaces every present cell by at least one length, and its total displacement."""
+        """Uniform pressure that displaces every present cell by at least one length, and the total displacement by one.
+
+        The pressure is zero where there is none: under a kernel that bulges.
+        """
         ones = np.ones(self.gap.shape) if self.present is None else self.present.astype(float)
         response = self.influence.displacement(ones)
         inside = response if self.present is None else response[self.present]
-        return 1 / float(inside.min()), float(inside.sum())
+        least = float(inside.min())
+        return 1 / least if least > 0 else 0.0, float(inside.sum())
 
     def separation(self, displacement: Array) -> Array:
         """Gap under pressure at zero approach, in the work array: there until that is used for something else."""

@@ -1,131 +1,120 @@
-r"""Influence of one uniformly loaded cell on the surface of a half-space of unit contact compliance.
+r"""The kernel of a body: what its surface does under pressure, for unit contact compliance; all that is asked of it.
 
-The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*`` and ``K = 1 / (pi r)`` averaged over the
-loaded cell (free space) or ``K_q = 2 / |q|`` (periodic).
+The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*``. A :class:`Kernel` is one value that
+everything built from it keeps: coarser, larger and mirrored grids, and windows.
 
-Fourier convention: ``p_q = sum_x p exp(-i q x)`` with ``q = 2 pi n / size``, as in ``scipy.fft``. Both kernels are real
-and even, hence so are their transforms: a *symbol* here holds the non-negative wave numbers of both axes, shape
-``(mx // 2 + 1, my // 2 + 1)`` for ``(mx, my)`` points, and the others follow by symmetry.
+Fourier convention: ``p_q = sum_x p exp(-i q x)`` with ``q = 2 pi n / size``, as in ``scipy.fft``. Kernels are real and
+even in x and in y, hence so are their transforms: a *symbol* here holds the non-negative wave numbers of both axes,
+shape ``(mx // 2 + 1, my // 2 + 1)`` for ``(mx, my)`` points, and the others follow by symmetry.
 """
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
-
-# Gauss points per side that give 1e-15 beyond a distance in units of the longer cell side. The closed form
-# cancels as eps (r / side)^2 (7e-8 at 16384 cells) and is used inside the first distance only.
-_GAUSS = ((4.0, 8), (16.0, 5), (40.0, 4), (200.0, 3))
+Counts = NDArray[np.intp]
 
 
-def _check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-    if any(int(n) != n or n < 1 for n in shape):
-        raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")
-    if not all(math.isfinite(side) and side > 0 for side in spacing):
-        raise InputError(f"spacing is {spacing}: expected two positive lengths [m]")
+class Kernel(Protocol):
+    """What the contact asks of a body whose surface is the same everywhere, and its own mirror image in x and y.
 
+    Two functions are required: :meth:`influence` for free space, :meth:`transfer` for periodic boundaries and for the
+    preconditioner. They are of one linear, symmetric and positive operator. A class that inherits from this one has
+    the rest, which holds for any body. A kernel is a value: frozen, and equal to another with the same parameters.
 
-def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    r"""Displacement of a half-space's surface under one uniformly loaded cell.
-
-    Parameters
+    Attributes
     ----------
-    shape : tuple of int
-        Number of cells ``(nx, ny)``.
-    spacing : tuple of float
-        Cell sides ``(dx, dy)``. [m]
-
-    Returns
-    -------
-    ndarray, shape (nx, ny)
-        Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
-        compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
-
-    Raises
-    ------
-    InputError
-        If a side is not positive and finite, or a number of cells is not positive.
-
-    Notes
-    -----
-    Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
-    alternating signs, loses digits far from the cell, where the corner terms cancel; Gauss quadrature of
-    ``1 / (pi r)`` over the cell takes over there.
-
-    References
-    ----------
-    .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
-    .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
+    bulges : bool
+        Whether pressure may raise the surface anywhere. Where it may not, nothing that lies deeper than the approach
+        touches, and the contact in free space is followed by a window. Default: it may.
     """
-    _check_grid(shape, spacing)
-    longer = max(spacing)
-    dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
-    x = np.arange(shape[0], dtype=float)[:, None] * dx
-    y = np.arange(shape[1], dtype=float)[None, :] * dy
-    distance = np.hypot(x, y)
-    kernel = np.empty(shape)
 
-    near = distance <= _GAUSS[0][0]
-    rows, columns = np.nonzero(near)
-    kernel[near] = _corner_sum(x[rows, 0], y[0, columns], dx, dy)
-    bounds = [start for start, _ in _GAUSS[1:]] + [math.inf]
-    for (start, points), end in zip(_GAUSS, bounds, strict=True):
-        ring = (distance > start) & (distance <= end)
-        if ring.any():
-            rows, columns = np.nonzero(ring)
-            kernel[ring] = _gauss_sum(x[rows, 0], y[0, columns], dx, dy, points)
-    return kernel * (longer / math.pi)
+    bulges: bool = True
+
+    @abstractmethod
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Displacement at cell centres due to unit pressure on the cell at the origin.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Number of cells ``(nx, ny)``, counted from the one at the origin.
+        spacing : tuple of float
+            Cell sides ``(dx, dy)``: any, as the same kernel is asked for on coarser cells too. [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            [m]
+        """
+
+    @abstractmethod
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """Displacement over pressure of a wave, the Fourier transform of the kernel.
+
+        Parameters
+        ----------
+        qx, qy : ndarray
+            Wave numbers, which broadcast. [1/m]
+
+        Returns
+        -------
+        ndarray
+            Positive; at ``q = 0`` the displacement by uniform pressure where that is finite, and zero where it is not:
+            the mean displacement is left out then, and approach with periodic boundaries counts without it. [m]
+        """
+
+    def under_rectangle(
+        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
+    ) -> Array:
+        """Displacement of cells in a rectangle of cells that all carry unit pressure.
+
+        Parameters
+        ----------
+        before, after : pair of ndarray of int, shapes (nx,) and (ny,)
+            How many cells of the rectangle lie on either side of each cell, along x and along y.
+        spacing : tuple of float
+            Cell sides. [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            [m]
+
+        Notes
+        -----
+        Sums of :meth:`influence`. A kernel that knows a closed form has one of its own.
+        """
+        reach = [max(int(np.max(a)), int(np.max(b))) + 1 for a, b in zip(before, after, strict=True)]
+        quadrant = np.array(self.influence((reach[0], reach[1]), spacing))
+        quadrant[0] /= 2  # a cell's own row and column are in two quadrants
+        quadrant[:, 0] /= 2
+        total = np.cumsum(np.cumsum(quadrant, axis=0), axis=1)
+        x, y = ((a, b) for a, b in zip(before, after, strict=True))
+        return np.asarray(sum(total[np.ix_(i, j)] for i in x for j in y))
 
 
-def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
-    total = np.zeros_like(x)
-    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
-        total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
-    return total
+def displaces_as_a_whole(kernel: Kernel) -> bool:
+    """Whether the mean displacement under uniform pressure is finite, and known."""
+    return float(kernel.transfer(0.0, 0.0)) > 0
 
 
-def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float, float]) -> Array:
-    """Displacement due to unit pressure on a rectangle and unit contact compliance, in closed form.
+def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Symbol of a kernel on a zero-padded grid.
 
     Parameters
     ----------
-    x, y : ndarray
-        Positions, which broadcast, from the rectangle's centre; none on its edges' lines. [m]
-    sides : tuple of float
-        Of the rectangle. [m]
-
-    Returns
-    -------
-    ndarray
-        Exact to rounding within the rectangle and near it. [m]
-    """
-    positions = np.broadcast_arrays(x, y)
-    return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
-
-
-def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    total = np.zeros_like(x)
-    for node_x, weight_x in zip(nodes, weights, strict=True):
-        x_squared = (x - node_x * dx / 2) ** 2
-        for node_y, weight_y in zip(nodes, weights, strict=True):
-            total += weight_x * weight_y / np.sqrt(x_squared + (y - node_y * dy / 2) ** 2)
-    return total * (dx * dy / 4)
-
-
-def free_space_symbol(padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    """Symbol of Love's kernel on a zero-padded grid.
-
-    Parameters
-    ----------
+    kernel : Kernel
+        Of the body.
     padded : tuple of int
         Even numbers of points, at least ``2 n - 1`` of the unpadded grid's along each axis.
     spacing : tuple of float
@@ -134,7 +123,7 @@ def free_space_symbol(padded: tuple[int, int], spacing: tuple[float, float]) -> 
     Returns
     -------
     ndarray, shape (padded[0] // 2 + 1, padded[1] // 2 + 1)
-        Real, positive. [m]
+        Real; positive for a half-space. [m]
 
     Notes
     -----
@@ -145,15 +134,17 @@ def free_space_symbol(padded: tuple[int, int], spacing: tuple[float, float]) -> 
     offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
     if padded[0] % 2 or padded[1] % 2:
         raise ValueError(f"padded is {padded}: expected even numbers of points")
-    symbol: Array = fft.dctn(love_kernel(offsets, spacing), type=1)  # the transform of the even extension
+    symbol: Array = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
     return symbol
 
 
-def periodic_symbol(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    """Symbol ``2 / |q|`` of the half-space under periodic pressure.
+def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Symbol of a kernel under periodic pressure.
 
     Parameters
     ----------
+    kernel : Kernel
+        Of the body.
     shape : tuple of int
         Number of cells ``(nx, ny)`` of one period.
     spacing : tuple of float
@@ -162,14 +153,30 @@ def periodic_symbol(shape: tuple[int, int], spacing: tuple[float, float]) -> Arr
     Returns
     -------
     ndarray, shape (nx // 2 + 1, ny // 2 + 1)
-        Zero at ``q = 0``: the mean displacement of a periodic half-space is undefined and left out. [m]
+        Positive, but zero at ``q = 0`` where the mean displacement is undefined and left out. [m]
 
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 13.2.
+    Raises
+    ------
+    InputError
+        If the grid is impossible, or the transfer function is not positive.
     """
-    _check_grid(shape, spacing)
+    check_grid(shape, spacing)
     qx, qy = (2 * math.pi / (n * side) * np.arange(n // 2 + 1) for n, side in zip(shape, spacing, strict=True))
-    magnitude = np.hypot(qx[:, None], qy[None, :])
-    magnitude[0, 0] = math.inf
-    return 2 / magnitude
+    symbol = np.array(kernel.transfer(qx[:, None], qy[None, :]), dtype=float)
+    amiss = ~(np.isfinite(symbol) & (symbol > 0))
+    amiss[0, 0] = not 0 <= symbol[0, 0] < math.inf
+    if amiss.any():
+        i, j = (int(n) for n in np.argwhere(amiss)[0])
+        raise InputError(
+            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {qx[i]:g} and {qy[j]:g} 1/m: "
+            "expected a positive number, or zero where both are zero"
+        )
+    return symbol
+
+
+def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
+    """Refuse an impossible grid."""
+    if any(int(n) != n or n < 1 for n in shape):
+        raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")
+    if not all(math.isfinite(side) and side > 0 for side in spacing):
+        raise InputError(f"spacing is {spacing}: expected two positive lengths [m]")

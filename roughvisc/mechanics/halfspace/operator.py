@@ -1,6 +1,7 @@
 """Half-space of unit contact compliance: pressure to surface displacement, and back approximately.
 
-A :class:`HalfSpace` knows a grid and its boundary. It knows neither material, time nor contact.
+A :class:`HalfSpace` knows a grid, its boundary and the kernel of the body, which is a half-space unless another is
+given. It knows neither material, time nor contact.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.kernel import free_space_symbol, periodic_symbol
+from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.transforms import transforms
 
 Array = NDArray[np.float64]
@@ -46,6 +48,8 @@ class HalfSpace:
     mirrored : bool
         Whether the cells are a quarter of the surface: beyond the first row and the first column their mirror images
         carry the same pressure. All of it is displaced by all of them.
+    kernel : Kernel
+        What the surface does under pressure.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class HalfSpace:
         workers: int | None = None,
         *,
         mirrored: bool = False,
+        kernel: Kernel = HALF_SPACE,
     ) -> None:
         if boundary not in ("free", "periodic"):
             raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
@@ -63,18 +68,25 @@ class HalfSpace:
         self.spacing = spacing
         self.boundary = boundary
         self.mirrored = mirrored
+        self.kernel = kernel
         self.workers = workers if shape[0] * shape[1] >= _THREADED else 1
         self._transforms = transforms(mirrored)
         #: Number of cells of the surface, mirror images included.
         self.surface_shape = (self._transforms.images * shape[0], self._transforms.images * shape[1])
         if boundary == "free":
             padded = [2 * fft.next_fast_len(n, real=True) for n in self.surface_shape]
-            symbol = free_space_symbol((padded[0], padded[1]), spacing)
+            symbol = free_space_symbol(kernel, (padded[0], padded[1]), spacing)
             self._points = (padded[0] // self._transforms.images, padded[1] // self._transforms.images)
         else:
-            symbol = periodic_symbol(self.surface_shape, spacing)
+            symbol = periodic_symbol(kernel, self.surface_shape, spacing)
             self._points = shape
+        #: Whether every pressure displaces the surface, a uniform one too.
+        self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
+
+    def on(self, shape: tuple[int, int], spacing: tuple[float, float]) -> HalfSpace:
+        """The same body, boundary and symmetry on another grid."""
+        return HalfSpace(shape, spacing, self.boundary, mirrored=self.mirrored, kernel=self.kernel)
 
     @property
     def cell_area(self) -> float:
@@ -104,7 +116,7 @@ class HalfSpace:
         Returns
         -------
         ndarray, shape (nx, ny)
-            Displacement; with periodic boundaries its mean is zero. [m]
+            Displacement; with periodic boundaries the mean of a half-space's is zero. [m]
         """
         return self._convolved(pressure, self._symbol)
 
@@ -180,8 +192,8 @@ class HalfSpace:
 
     @cached_property
     def _inverse_symbol(self) -> NDArray[np.float32]:
-        symbol = periodic_symbol(self.surface_shape, self.spacing)
-        symbol[0, 0] = np.max(symbol, initial=0.0, where=symbol > 0) or self.spacing[0]
+        symbol = periodic_symbol(self.kernel, self.surface_shape, self.spacing)
+        symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
         return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
 
     def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:

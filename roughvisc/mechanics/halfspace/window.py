@@ -1,7 +1,8 @@
 """The part of a free-space domain that the contact is solved on, and what it does to the rest.
 
-Pressure is not negative, and pushes the surface away everywhere: beyond the window the gap exceeds the undeformed gap
-less the approach. As long as that is positive at the lowest place outside, no contact there is missed.
+Pressure is not negative, and where the kernel does not bulge it pushes the surface away everywhere: beyond the window
+the gap exceeds the undeformed gap less the approach. As long as that is positive at the lowest place outside, no
+contact there is missed. Under a kernel that bulges there is no window.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.mechanics.halfspace.kernel import free_space_symbol, love_kernel, rectangle_displacement
+from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol
 from roughvisc.mechanics.halfspace.transforms import transforms
 
 Array = NDArray[np.float64]
@@ -121,20 +122,17 @@ def window_around(gap: Array, extent: int, mirrored: bool = False) -> Window:
     return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside, mirrored)
 
 
-def mean_influence(window: Window, spacing: tuple[float, float]) -> Array:
+def mean_influence(window: Window, spacing: tuple[float, float], kernel: Kernel) -> Array:
     """Mean displacement of the domain due to unit pressure on each cell of the window. [m]
 
-    The kernel is symmetric: it is the displacement of that cell under uniform pressure on the domain, which is a
-    rectangle and has a closed form.
+    The kernel is symmetric: it is the displacement of that cell under uniform pressure on the domain, a rectangle.
     """
-    images, middle = (2, 0.0) if window.mirrored else (1, 0.5)
-    centres = [
-        (np.arange(i, i + m) + 0.5 - middle * n) * side
-        for i, m, n, side in zip(window.first, window.shape, window.domain, spacing, strict=True)
-    ]
-    sides = (images * window.domain[0] * spacing[0], images * window.domain[1] * spacing[1])
+    axes = zip(window.first, window.shape, window.domain, strict=True)
+    # beyond a mirror lie as many cells again
+    before = [np.arange(i, i + m) + (n if window.mirrored else 0) for i, m, n in axes]
+    after = [(2 if window.mirrored else 1) * n - 1 - cells for cells, n in zip(before, window.domain, strict=True)]
     count = window.domain[0] * window.domain[1]
-    return rectangle_displacement(centres[0][:, None], centres[1], sides) / count
+    return kernel.under_rectangle((before[0], before[1]), (after[0], after[1]), spacing) / count
 
 
 class Reach:
@@ -146,19 +144,21 @@ class Reach:
         Where pressure is.
     spacing : tuple of float
         Cell sides. [m]
+    kernel : Kernel
+        What the surface does under pressure.
     single : bool
         Whether single precision does: 1e-6 of the largest displacement, in half the time.
     """
 
-    def __init__(self, window: Window, spacing: tuple[float, float], *, single: bool = False) -> None:
+    def __init__(self, window: Window, spacing: tuple[float, float], kernel: Kernel, *, single: bool = False) -> None:
         self._window = window
         self._type = np.float32 if single else np.float64
         self._scale = max(spacing)  # the range of single precision is small
         self._transforms = transforms(window.mirrored)
         symbol_of = self._mirrored_symbol if window.mirrored else self._general_symbol
-        self._points, self._symbol = symbol_of(spacing)
+        self._points, self._symbol = symbol_of(spacing, kernel)
 
-    def _general_symbol(self, spacing: tuple[float, float]) -> tuple[tuple[int, int], NDArray[Any]]:
+    def _general_symbol(self, spacing: tuple[float, float], kernel: Kernel) -> tuple[tuple[int, int], NDArray[Any]]:
         """Points of the transforms, and the kernel's."""
         window = self._window
         mx, my = (fft.next_fast_len(n + m - 1, real=True) for n, m in zip(window.domain, window.shape, strict=True))
@@ -168,14 +168,14 @@ class Reach:
             steps = np.arange(length)
             steps[steps >= n] -= length  # from n - 1 down to 1 - m; what lies between is never read
             distances.append(np.abs(np.clip(steps, 1 - m, n - 1) - first))
-        quadrant = love_kernel((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
+        quadrant = kernel.influence((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
         return (mx, my), fft.rfft2((quadrant[np.ix_(*distances)] / self._scale).astype(self._type))
 
-    def _mirrored_symbol(self, spacing: tuple[float, float]) -> tuple[tuple[int, int], NDArray[Any]]:
+    def _mirrored_symbol(self, spacing: tuple[float, float], kernel: Kernel) -> tuple[tuple[int, int], NDArray[Any]]:
         """The same for a window in the middle of a surface."""
         window = self._window
         mx, my = (fft.next_fast_len(n + m, real=True) for n, m in zip(window.domain, window.shape, strict=True))
-        symbol = free_space_symbol((2 * mx, 2 * my), spacing) / self._scale
+        symbol = free_space_symbol(kernel, (2 * mx, 2 * my), spacing) / self._scale
         return (mx, my), self._transforms.cropped(symbol, (mx, my)).astype(self._type)
 
     def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:

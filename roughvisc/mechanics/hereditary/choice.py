@@ -11,9 +11,11 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.memory import ActsOn, Modes, stiff_ratio
-from roughvisc.mechanics.materials.models import Material, Pair, Prony, Tabulated
+from roughvisc.mechanics.materials.completed import check_creep, complete
+from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
 from roughvisc.mechanics.materials.series import series_of
+from roughvisc.mechanics.materials.spectrum import lattice
 
 #: Part of the tolerance that a series in place of a material may take.
 SERIES_SHARE = 0.1
@@ -26,6 +28,8 @@ _MOST_TWICE = 3
 _RINGING = 1.45
 #: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
 _SHORTEST_STEP = 1e-3
+#: Instants in a decade at which a material of the user's own is looked at.
+_SAMPLES = 100
 
 
 #: Which memory to take: the cheapest that is accurate enough, or every past pressure.
@@ -70,7 +74,7 @@ def engine_for(
     Parameters
     ----------
     material : Material
-        Any material.
+        Any material, of the user's own too.
     duration : float
         Length of the program. [s]
     tolerance : float
@@ -97,7 +101,10 @@ def engine_for(
     """
     if kind not in ("auto", "direct"):
         raise InputError(f"memory is {kind!r}: expected 'auto' or 'direct'")
+    material = complete(material)
     if kind == "direct":
+        if duration > 0 and not isinstance(material, Prony | PowerLaw | Tabulated | Pair):
+            check_creep(material, lattice(SHORTEST_AGE * duration, duration, _SAMPLES))
         if duration > 0 and not _direct_is_accurate(material, duration):
             raise InputError(
                 "memory='direct' takes the pressure as linear in each step, which rings on this material: "

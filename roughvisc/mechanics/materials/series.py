@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.completed import check_creep, complete
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated, pair
 from roughvisc.mechanics.materials.passive import first_time, nearest_series
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -80,7 +81,7 @@ def series_of(material: Material, shortest: float, longest: float, tolerance: fl
     ------
     InputError
         If the times are not positive and in order, the tolerance is not positive, a table ends before the longest
-        time, or the material is of an unknown kind.
+        time, or an object of another kind has no creep compliance.
     """
     _check_range(shortest, longest, tolerance)
     if isinstance(material, Prony):
@@ -102,7 +103,7 @@ def series_of(material: Material, shortest: float, longest: float, tolerance: fl
         error = measured_error(pressed, joined, _instants(pressed, shortest, longest))
         repair = "; ".join(f"{name}: {part.repair}" for name, part in zip("ab", parts, strict=True) if part.repair)
         return Series(joined, error, shortest, pressed, repair)
-    raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    return sampled_series(complete(material), shortest, longest, tolerance)
 
 
 def power_law_series(material: PowerLaw, shortest: float, longest: float, tolerance: float) -> Series:
@@ -145,7 +146,41 @@ def table_series(material: Tabulated, shortest: float, longest: float, tolerance
     compliance of zero at a time within the range has no series: the error is infinite.
     """
     _check_range(shortest, longest, tolerance)
-    shortest = min(max(shortest, first_time(material)), longest)
+    return _fitted(material, min(max(shortest, first_time(material)), longest), longest, tolerance)
+
+
+def sampled_series(material: Material, shortest: float, longest: float, tolerance: float) -> Series:
+    """Series for any creep compliance, fitted as a table's to as many samples as its error is measured at.
+
+    Parameters and errors as in :func:`series_of`.
+    """
+    _check_range(shortest, longest, tolerance)
+    check_creep(material, _instants(material, shortest, longest))
+    found = _fitted(_Sampled(material), shortest, longest, tolerance)
+    if found.error > tolerance:
+        return replace(found, repair="no positive series comes nearer: the material is not passive")
+    return found
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """A material by its contact compliance alone."""
+
+    material: Material
+
+    @property
+    def poisson(self) -> float:
+        return self.material.poisson
+
+    def creep_compliance(self, t: ArrayLike) -> Array:
+        return np.asarray(2 / (1 - self.poisson) * self.contact_compliance(t))
+
+    def contact_compliance(self, t: ArrayLike) -> Array:
+        return self.material.contact_compliance(t)
+
+
+def _fitted(material: Tabulated | _Sampled, shortest: float, longest: float, tolerance: float) -> Series:
+    """Non-negative least squares on ever finer lattices of retardation times."""
     times = _instants(material, shortest, longest)
     exact = np.asarray(material.creep_compliance(times))
     glassy = float(material.creep_compliance(0.0))
@@ -170,7 +205,7 @@ def table_series(material: Tabulated, shortest: float, longest: float, tolerance
     return best
 
 
-def measured_error(material: Material, prony: Prony, times: Array) -> float:
+def measured_error(material: Material | _Sampled, prony: Prony, times: Array) -> float:
     """Largest ``|C~ - C| / C`` at the times, infinite where only the series is not zero. [s]"""
     exact = np.asarray(material.contact_compliance(times))
     deviation = np.abs(np.asarray(prony.contact_compliance(times)) - exact)
@@ -179,13 +214,15 @@ def measured_error(material: Material, prony: Prony, times: Array) -> float:
     return float(relative.max())
 
 
-def _measured(material: Material, prony: Prony, times: Array) -> Series:
-    return Series(prony, measured_error(material, prony, times), float(times[0]), material)
+def _measured(material: Material | _Sampled, prony: Prony, times: Array) -> Series:
+    pressed = material.material if isinstance(material, _Sampled) else material
+    return Series(prony, measured_error(material, prony, times), float(times[0]), pressed)
 
 
-def _unfit(material: PowerLaw | Tabulated, longest: float) -> Series:
+def _unfit(material: PowerLaw | Tabulated | _Sampled, longest: float) -> Series:
     """What any series is better than."""
-    return Series(Prony(max(float(material.creep_compliance(longest)), 1e-300)), math.inf, longest, material)
+    pressed = material.material if isinstance(material, _Sampled) else material
+    return Series(Prony(max(float(material.creep_compliance(longest)), 1e-300)), math.inf, longest, pressed)
 
 
 def _better(found: Series, best: Series, tolerance: float) -> bool:
@@ -195,13 +232,13 @@ def _better(found: Series, best: Series, tolerance: float) -> bool:
     return found.error < best.error
 
 
-def _instants(material: Material, shortest: float, longest: float) -> Array:
+def _instants(material: Material | _Sampled, shortest: float, longest: float) -> Array:
     """Where the error is measured: a dense logarithmic grid, and the rows of tables. [s]"""
     rows = [t for t in _rows(material) if shortest < t < longest]
     return np.unique(np.append(lattice(shortest, longest, _DENSE), rows))
 
 
-def _rows(material: Material) -> tuple[float, ...]:
+def _rows(material: Material | _Sampled) -> tuple[float, ...]:
     if isinstance(material, Tabulated):
         return material.times
     return _rows(material.a) + _rows(material.b) if isinstance(material, Pair) else ()
@@ -293,7 +330,7 @@ def _levelled(columns: Array, exact: Array, glassy: float) -> Iterator[Array]:
         importance = importance * np.sqrt(0.02 + misfit / misfit.max())
 
 
-def _from_weights(material: Tabulated, weights: Array, retardation: Array, longest: float) -> Prony:
+def _from_weights(material: Tabulated | _Sampled, weights: Array, retardation: Array, longest: float) -> Prony:
     used = np.flatnonzero(weights[1:] > 0)
     if not weights.any() and not material.creep_compliance(0.0):  # nothing but zeros was seen
         return _unfit(material, longest).prony

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import Engine
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
@@ -113,7 +114,7 @@ def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
 
 def _march(case: Case, height: xr.DataArray) -> March:
     settings, program = replace(case.solving(), missing="absent", edge="accept"), case.program()
-    scene, _ = prepare(Ground(height, settings.missing), case.material(), program, settings)
+    scene, _ = prepare(Ground(height, settings.missing, kernel=settings.kernel), case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = level = 0.0
     work, instants = 0, [0.0]
@@ -145,21 +146,21 @@ def _is_damped(scene: Scene, length: float) -> bool:
 
 
 class Stopwatch:
-    """Seconds a convolution takes within a solve, by grid and boundary; measured once each, in two seconds in all."""
+    """Seconds a convolution takes within a solve, by grid, boundary and kernel; once each, in two seconds in all."""
 
     def __init__(self) -> None:
-        self._found: dict[tuple[tuple[int, ...], str], float] = {}
+        self._found: dict[tuple[tuple[int, ...], str, Kernel], float] = {}
         self._left = _CALIBRATION
 
-    def seconds(self, height: xr.DataArray, boundary: str) -> float:
+    def seconds(self, height: xr.DataArray, boundary: str, kernel: Kernel) -> float:
         """Seconds of one convolution and what goes with it, one thread. [s]"""
-        grid = (height.shape, boundary)
+        grid = (height.shape, boundary, kernel)
         if grid not in self._found:
-            self._found[grid] = self._measured(height, boundary)
+            self._found[grid] = self._measured(height, boundary, kernel)
         return self._found[grid]
 
-    def _measured(self, height: xr.DataArray, boundary: str) -> float:
-        alike = [grid for grid in self._found if grid[1] == boundary]
+    def _measured(self, height: xr.DataArray, boundary: str, kernel: Kernel) -> float:
+        alike = [grid for grid in self._found if grid[1:] == (boundary, kernel)]
         if self._left <= 0 and alike:  # as N log N from the grid nearest in size
             nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
             return self._found[nearest] * work(height.size) / work(math.prod(nearest[0]))
@@ -167,7 +168,7 @@ class Stopwatch:
         if cells > _TIMED:
             height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
-        ground = Ground(height, "absent")
+        ground = Ground(height, "absent", kernel=kernel)
         halfspace: HalfSpace = ground.halfspace("free" if boundary == "free" else "periodic")
         gap = ground.gap
         load = 0.02 * float(np.mean(gap)) / (halfspace.self_influence or halfspace.spacing[0]) * gap.size

@@ -113,7 +113,7 @@ def plan(
     rows = []
     for number, case in enumerate(cases):
         like = _most_like(number, list(marches), parameters)
-        surface = surfaces.get(_surface_name(stated[number]))
+        surface = surfaces.get(_surface_name(cases[number], stated[number]))
         rows.append(
             _row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch)
         )
@@ -130,9 +130,10 @@ def _attributes(name: str) -> dict[str, str]:
     return {"long_name": long_name} | ({"units": units} if units else {})
 
 
-def _surface_name(stated: Mapping[str, Any]) -> str:
-    """Surfaces that differ by their seed alone cost the same."""
-    return json.dumps({key: value for key, value in stated["surface"].items() if key != "seed"}, sort_keys=True)
+def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
+    """Surfaces that differ by their seed alone cost the same; under a kernel that bulges they have no windows."""
+    surface = {key: value for key, value in stated["surface"].items() if key != "seed"}
+    return f"{json.dumps(surface, sort_keys=True)} {case.kernel()!r}"
 
 
 def _marches(
@@ -144,7 +145,7 @@ def _marches(
     problems: dict[int, str] = {}
     until = time.perf_counter() + _BUDGET
     for number in _spread(len(cases)):
-        name = _surface_name(stated[number])
+        name = _surface_name(cases[number], stated[number])
         if name not in surfaces:
             surfaces[name] = _surface(cases[number])
         height = surfaces[name].height
@@ -171,7 +172,7 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True)
+        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
     return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored)
@@ -231,7 +232,7 @@ def _row(
     row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
-    cells, convolution = height.size, stopwatch.seconds(height, settings.boundary)
+    cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
     reachable = surface.windows if window else surface.windows[-1:]
     part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
     return row | {

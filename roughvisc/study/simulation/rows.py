@@ -60,8 +60,10 @@ class Rows:
         self._store = store
         self.series_error = series_error
         single = settings.tolerance >= _SINGLE
-        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, single=single))
-        self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, ground.spacing))
+        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, ground.kernel, single=single))
+        self._mean_influence = lru_cache(maxsize=2)(
+            lambda window: mean_influence(window, ground.spacing, ground.kernel)
+        )
 
     def __len__(self) -> int:
         return len(self._store.plain)

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace.kernel import Kernel, displaces_as_a_whole
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, engine_for
 from roughvisc.mechanics.hereditary.memory import ActsOn
+from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program
@@ -51,6 +54,8 @@ class Ground:
         Whether to begin with a small window, where all of the surface is present.
     mirror : bool
         Whether to solve on a quarter of a surface that is its own mirror image in x and in y.
+    kernel : Kernel
+        Of the body that it is pressed on; under one that bulges there is no window.
     """
 
     def __init__(
@@ -60,14 +65,16 @@ class Ground:
         *,
         follow: bool = False,
         mirror: bool = False,
+        kernel: Kernel = HALF_SPACE,
     ) -> None:
         self._missing = missing
+        self.kernel = kernel
         self.growths = 0
         height = _checked(height)
         self.mirrored = mirror and is_mirrored(height.values)
         self._lay(height)
         self._extent = float(_FIRST_EXTENT)
-        if follow and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
+        if follow and not kernel.bulges and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
 
     def _lay(self, height: xr.DataArray) -> None:
@@ -98,8 +105,8 @@ class Ground:
         return float(self.domain["x"].values[first[0]]), float(self.domain["y"].values[first[1]])
 
     def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
-        """Half-space on the window's grid."""
-        return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored)
+        """The body under the window's grid."""
+        return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""
@@ -161,11 +168,10 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, settings.time_step)
-    if not hasattr(material, "mean_contact_compliance"):
-        raise InputError(f"material is a {type(material).__name__}: expected one of roughvisc's materials")
+    material = complete(material)
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), ground.gap[ground.present])
-    if settings.boundary == "periodic" and ground.present.all():
+    if settings.boundary == "periodic" and ground.present.all() and not displaces_as_a_whole(ground.kernel):
         _check_approach(program, ground.mean_gap)
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
@@ -198,7 +204,7 @@ def _foreseen(ground: Ground, program: Program, material: Material) -> float:
     stride = math.ceil(max(ground.height.shape) / _FORESEEN_ON)
     gap = ground.gap[::stride, ::stride]
     dx, dy = (stride * side for side in ground.spacing)
-    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=ground.mirrored)
+    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=ground.mirrored, kernel=ground.kernel)
     load = value * glassy / halfspace.cell_area
     return solve_contact(halfspace, gap, load=load, tolerance=1e-2, max_iterations=50).approach
 

@@ -11,7 +11,10 @@ from dataclasses import replace
 import xarray as xr
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
+from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
@@ -47,6 +50,7 @@ def simulate(
     edge: Edge = Settings.edge,
     memory: Memory = Settings.memory,
     grid_error: bool = Settings.grid_error,
+    kernel: Kernel = Settings.kernel,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
     """Press a rigid profile on a linear viscoelastic half-space.
@@ -57,7 +61,8 @@ def simulate(
         Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``; an indenter's
         counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Of the half-space.
+        Of the half-space: one of roughvisc's, or any object with the two functions that
+        :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
         Load or approach against time.
     boundary : {"free", "periodic"}
@@ -84,6 +89,8 @@ def simulate(
     grid_error : bool
         Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
         the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+    kernel : Kernel
+        Of the body that is pressed, if it is no half-space: see :class:`roughvisc.mechanics.halfspace.kernel.Kernel`.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -124,6 +131,7 @@ def simulate(
         edge=edge,
         memory=memory,
         grid_error=grid_error,
+        kernel=kernel,
     )
     return press(height, material, program, settings, progress=progress)
 
@@ -162,7 +170,9 @@ def _press(
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    ground = Ground(height, settings.missing, follow=follows(settings), mirror=settings.method == "fast")
+    ground = Ground(
+        height, settings.missing, follow=follows(settings), mirror=settings.method == "fast", kernel=settings.kernel
+    )
     expect_arrays(ground.gap.nbytes)
     scene, engine = prepare(ground, material, program, settings)
     followed = not ground.window.whole
@@ -178,7 +188,8 @@ def _press(
     described = {
         "memory": engine.note,
         "series_error": engine.series_error,
-        "material_note": material.note,
+        "kernel": "" if settings.kernel == HALF_SPACE else repr(settings.kernel),
+        "material_note": complete(material).note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
         "left_out": left_out(engine, settings, followed, ground.mirrored),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.study.statement.identity import case_key, surface_content
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
@@ -21,6 +22,7 @@ from roughvisc.study.statement.variation import expand, place
 if TYPE_CHECKING:
     import xarray as xr
 
+    from roughvisc.mechanics.halfspace.kernel import Kernel
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
     from roughvisc.study.statement.settings import Settings
@@ -80,13 +82,17 @@ class Case:
         """The material."""
         return self.settings.material.build()
 
+    def kernel(self) -> Kernel:
+        """What the surface of the body does under pressure: a half-space's."""
+        return HALF_SPACE
+
     def program(self) -> Program:
         """The loading program."""
         return self.settings.loading()
 
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
-        return self.settings.solving()
+        return replace(self.settings.solving(), kernel=self.kernel())
 
     def __reduce__(self) -> tuple[Any, ...]:
         # the classes of the tables are made at run time, so a case travels to another process as its text

@@ -10,6 +10,8 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.variables import FIELDS
 
@@ -31,7 +33,7 @@ class Settings:
 
     Parameters
     ----------
-    boundary, tolerance, time_step, times, fields, method, missing, edge, memory, grid_error
+    boundary, tolerance, time_step, times, fields, method, missing, edge, memory, grid_error, kernel
         As :func:`roughvisc.simulate` has them; any sequence of times or fields becomes a tuple.
 
     Raises
@@ -58,6 +60,7 @@ class Settings:
     edge: Edge = "error"
     memory: Memory = "auto"
     grid_error: bool = False
+    kernel: Kernel = HALF_SPACE
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():

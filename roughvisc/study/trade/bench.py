@@ -87,8 +87,8 @@ class Bench:
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         settings = replace(case.solving(), method="fast", missing="absent")
-        self._convolution = Stopwatch().seconds(height, settings.boundary)
-        ground = Ground(height, settings.missing, follow=follows(settings), mirror=True)
+        self._convolution = Stopwatch().seconds(height, settings.boundary, settings.kernel)
+        ground = Ground(height, settings.missing, follow=follows(settings), mirror=True, kernel=settings.kernel)
         self._part = solved_on(windows(ground), self._found.level)  # of the cells
         self._calibration = 1.0
 

@@ -20,6 +20,7 @@ from roughvisc.mechanics.closed_forms import (
     reduced_contact,
     ting,
 )
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.statement.case import Case
@@ -128,7 +129,12 @@ def closed_form(case: Case, times: Array) -> ClosedForm | None:
     """
     surface = case.settings.surface
     recipe = getattr(surface, "generate", "")
-    if case.settings.solve.boundary != "free" or is_data(case) or getattr(surface, "exact", False):
+    if (
+        case.kernel() != HALF_SPACE
+        or case.settings.solve.boundary != "free"
+        or is_data(case)
+        or getattr(surface, "exact", False)
+    ):
         return None
     centre = (surface.size[0] / 2, surface.size[1] / 2)
     material, program = case.material(), case.program()
