@@ -170,6 +170,22 @@ def test_folders__hold_no_more_than_one_sees_at_a_glance(folder):
     assert len(entries) <= MOST_ENTRIES[folder]
 
 
+def test_files__are_short_enough_to_read():
+    lengths = {module_of(path): len(path.read_text().splitlines()) for path in FILES}
+    assert {module: length for module, length in lengths.items() if length > 400} == {}
+
+
+def test_functions__are_short_enough_to_read():
+    long = {}
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                body = node.body[1:] if ast.get_docstring(node) else node.body
+                if body and node.end_lineno - body[0].lineno >= 60:
+                    long[f"{module_of(path)}.{node.name}"] = node.end_lineno - body[0].lineno + 1
+    assert long == {}
+
+
 def test_top_level__is_what_the_user_prescribed():
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
     if tracked.returncode:

@@ -11,9 +11,9 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.memory import ActsOn, Modes, stiff_ratio
-from roughvisc.mechanics.materials.completed import check_creep, complete
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
+from roughvisc.mechanics.materials.protocol import check_creep, complete
 from roughvisc.mechanics.materials.series import series_of
 from roughvisc.mechanics.materials.spectrum import lattice
 

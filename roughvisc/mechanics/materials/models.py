@@ -9,19 +9,17 @@ with which it changes in time: see :func:`roughvisc.mechanics.materials.bulk.wit
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.mechanics.materials.bulk import in_volume
 from roughvisc.mechanics.materials.checks import check_number
-from roughvisc.mechanics.materials.completed import complete, mean_of
 from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
 from roughvisc.mechanics.materials.power_law import PowerLaw
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.protocol import Material, complete
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tabulated import Tabulated
 
@@ -44,48 +42,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-
-class Material(Protocol):
-    """What is asked of a material: any object with two functions is one, and need not inherit from anything.
-
-    Required are :meth:`contact_compliance` and :meth:`contact_integral`, for arrays of any shape. The rest is optional:
-    a ``poisson`` ratio (a half if there is none), a ``note`` that results quote (none), and
-    :meth:`mean_contact_compliance` (found from the other two).
-
-    Notes
-    -----
-    A creep compliance is not negative and ascends. That of a passive material is a positive sum of exponentials, of
-    however many; then there is a series as near to it as the tolerance asks. ``memory="auto"`` samples the compliance
-    over the times that the program asks for, at a hundred instants a decade, and presses that series; how near it is
-    was measured, and is part of what a result states. Of others the nearest series is pressed, which the result says.
-    Equal materials should be equal, which frozen dataclasses are.
-    """
-
-    @property
-    def poisson(self) -> float:
-        """Poisson ratio; only a shear compliance is counted back by it, as a result depends on ``C`` alone."""
-        return 0.5
-
-    @property
-    def note(self) -> str:
-        """What a result should say of how the material was found; often empty."""
-        return ""
-
-    @abstractmethod
-    def contact_compliance(self, t: ArrayLike) -> Array:
-        """Contact compliance ``C(t)``, [1/Pa], at times after the load was applied, from zero on. [s]
-
-        ``C(0)`` is what is there at once, and may be zero.
-        """
-
-    @abstractmethod
-    def contact_integral(self, t: ArrayLike) -> Array:
-        """First antiderivative ``int_0^t C``. [s/Pa]"""
-
-    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
-        """Mean of ``C`` over ``[s, s + h]``, [1/Pa], to full precision for any ``s`` and ``h``. [s]"""
-        return mean_of(self.contact_compliance, self.contact_integral, s, h)
 
 
 def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus: float | None = None) -> Prony:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.completed import check_creep, complete
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated, pair
 from roughvisc.mechanics.materials.passive import first_time, nearest_series
+from roughvisc.mechanics.materials.protocol import check_creep, complete
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 
 Array = NDArray[np.float64]

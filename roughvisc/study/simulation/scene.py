@@ -19,8 +19,8 @@ from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, engine_for
 from roughvisc.mechanics.hereditary.memory import ActsOn
-from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene

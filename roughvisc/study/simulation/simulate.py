@@ -14,8 +14,8 @@ from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
-from roughvisc.mechanics.materials.completed import complete
 from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene

@@ -12,8 +12,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import lee_radok_step
 from roughvisc.mechanics.hereditary.choice import engine_for
-from roughvisc.mechanics.materials.completed import Completed, complete, mean_of
 from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.protocol import Completed, complete, mean_of
 from roughvisc.mechanics.materials.series import series_of
 from roughvisc.study.statement.case import Case
 
