@@ -99,6 +99,22 @@ def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     assert np.mean(true <= TOLERANCE) >= 0.98
 
 
+def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on():
+    """Nothing is there at once, and creep takes all times: the first short step stands for the jump."""
+    soft = rv.Prony(0.0, 0.0, tuple(0.3 * 10.0 ** (0.3 * np.arange(-6, 1))), tuple(10.0 ** np.arange(-6, 1)))
+    program = rv.Program().load(0.01, over=0).hold(2.0)
+    found = kept(sphere(soft, program, tolerance=TOLERANCE))
+    exact = kept(sphere(soft, program, times=tuple(found), tolerance=TOLERANCE / SHARPER))
+    rows = [
+        (step.uncertainty.approach, abs(step.shown.approach - exact[time].shown.approach))
+        for time, step in found.items()
+    ]
+    stated, true = np.array(rows[1:]).T
+    assert true.size > 20
+    assert stated[0] > 0.25 * true[0]
+    assert np.mean(stated >= 0.8 * true) >= 0.95, stated / true
+
+
 def test_force_error__is_nothing_where_the_load_is_given(matrix):
     for (_, what, _), (found, _) in matrix.items():
         rows = [stated(step, 0.0, counted(step)) for step in found.values() if step.shown.force > 0]
