@@ -1,4 +1,4 @@
-"""The door for quantities: a number in SI, or a string with a unit, becomes a float in SI.
+"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI.
 
 Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats.
 """

@@ -39,7 +39,7 @@ ROOMS = {
     "checkpoint": (("study/storage/checkpoint.py",), ("study/storage/test_checkpoint.py",)),
     "estimate": (("study/cost/estimate.py",), ("study/cost/test_plan.py",)),
     "conditioning": (
-        tuple(f"topography/{name}.py" for name in ("bandwidth", "framing", "gaps")),
+        tuple(f"topography/{name}.py" for name in ("bandwidth", "framing", "missing_points")),
         ("topography/test_conditioning.py",),
     ),
 }  # fmt: skip

@@ -7,7 +7,7 @@ import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.halfspace.love import love_kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
 

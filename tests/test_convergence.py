@@ -5,7 +5,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.choice import engine_for
+from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 
@@ -40,7 +40,7 @@ def run(material, program, times, shape=(19, 17)):
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * radius)
     program = scaled(program, load)
-    memory = engine_for(material, DURATION, 1e-7).memory
+    memory = choose_memory(material, DURATION, 1e-7).memory
     scene = Scene(HalfSpace(shape, spacing), gap, material, memory, program, tuple(times), 1e-9, time_step=1e9)
     steps = [s for s in march(scene) if np.isclose(s.shown.time, COMMON, rtol=0, atol=1e-9).any()]
     assert all(s.converged for s in steps)

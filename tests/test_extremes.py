@@ -411,7 +411,7 @@ def counted(height, material, program, **settings):
 
 
 def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
-    from roughvisc.mechanics.hereditary.memory import Modes
+    from roughvisc.mechanics.hereditary.exponentials import Modes
 
     kept = []
     sound = Modes.advance

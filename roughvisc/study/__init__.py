@@ -1,1 +1,1 @@
-"""One case becomes a Dataset; many cases become files seen as one Dataset."""
+"""Cases, their execution and their results: one case gives one Dataset, many cases a folder of files."""

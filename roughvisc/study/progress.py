@@ -1,4 +1,4 @@
-"""What is shown while something is computed: a live picture on a terminal or in a notebook, elsewhere plain lines."""
+"""Progress display: live on a terminal or in a notebook, plain lines elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bandwidth of scans: the form taken off, the waves that a filter passes, the cells that they are seen on."""
+"""Bandwidth of scans: removal of form, Gaussian filter, resampling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conditioning of scans, one step a function: the form and the waves, the gaps, the framing.
+"""Conditioning of scans, one function for each step.
 
 Every function takes a grid and gives a new one; what was done stands in the attribute ``history``. Missing points are
 NaN, and stay so until :func:`fill`. The same steps are methods of the accessor ``h.roughvisc``.
@@ -6,7 +6,7 @@ NaN, and stay so until :func:`fill`. The same steps are methods of the accessor 
 
 from roughvisc.topography.bandwidth import gaussian_filter, level, resample
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90, taper
-from roughvisc.topography.gaps import fill, mask_outliers
+from roughvisc.topography.missing_points import fill, mask_outliers
 
 __all__ = [
     "level",

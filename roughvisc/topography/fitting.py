@@ -1,4 +1,4 @@
-"""Self-affine roughness read off a scan, so that a small scan can be extended into an ensemble of surfaces."""
+"""Self-affine parameters fitted to a scan, from which an ensemble of surfaces is generated."""
 
 from __future__ import annotations
 

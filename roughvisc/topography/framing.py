@@ -1,4 +1,4 @@
-"""Framing of scans: what is cut out, which way it lies, what faces what, and how its border is made to repeat."""
+"""Framing of scans: cropping, rotation, inversion, combination, taper and mirror extension."""
 
 from __future__ import annotations
 

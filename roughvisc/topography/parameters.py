@@ -1,4 +1,4 @@
-"""Numbers of a surface: areal parameters of ISO 25178-2 and the power spectral density."""
+"""Areal parameters of ISO 25178-2 and power spectral density."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files in: an instrument file or a grid file becomes a labelled grid of heights.
+"""Readers: an instrument file or a grid file becomes a labelled height grid.
 
 The libraries parse; here is dispatch, labelling and checking. Whatever goes wrong is one
 :class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.

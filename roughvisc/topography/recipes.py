@@ -1,4 +1,4 @@
-"""Recipes of surfaces, as cards and studies state them: their names, arguments, defaults and units.
+"""Names, arguments, defaults and units of surface recipes, for cards and studies.
 
 Arguments and defaults are those of the functions themselves.
 """

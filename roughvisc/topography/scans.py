@@ -1,4 +1,4 @@
-"""Scans in: the one door to instrument files, grid files and surface cards."""
+"""``open_scan``: the entry to instrument files, grid files and surface cards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scans out: a height grid to netCDF, X3P or SDF, and a surface card for a file.
+"""Writers: a height grid to netCDF, X3P or SDF, and a surface card for a file.
 
 Libraries write, as they read.
 """

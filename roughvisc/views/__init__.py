@@ -1,1 +1,1 @@
-"""What people look at: figures and quantities derived from results."""
+"""Figures, tables and quantities derived from results."""

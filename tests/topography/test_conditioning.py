@@ -149,7 +149,7 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
 
 
 def test_mask_outliers__median_is_that_of_the_finite_points():
-    from roughvisc.topography.gaps import _local_median
+    from roughvisc.topography.missing_points import _local_median
 
     values = rough((13, 11), missing=0.4).values
     values[:6, :6] = np.nan

@@ -1,4 +1,4 @@
-"""Analytic solutions of frictionless normal contact, as importable code: what the numerical solver is held against.
+"""Analytic solutions of frictionless normal contact: the references that the numerical solver is tested against.
 
 Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``; viscoelastic ones take a
 material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.

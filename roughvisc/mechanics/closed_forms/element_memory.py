@@ -1,4 +1,4 @@
-"""What the independent elements of the reduced contact remember; shares nothing with the memory of the grid."""
+"""Memory of the elements of the method of dimensionality reduction (MDR), independent of that of the grid."""
 
 from __future__ import annotations
 

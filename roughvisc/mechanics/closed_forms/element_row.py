@@ -1,4 +1,4 @@
-"""A row of independent elements under an axisymmetric indenter, and the equilibrium of a step."""
+"""The row of independent elements of the MDR under an axisymmetric indenter, and its equilibrium in one step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The instants that a program is stepped through at, where every decade of a material's times is to be seen."""
+"""Time steps of the MDR solution: a grid in time that resolves every decade of the material."""
 
 from __future__ import annotations
 

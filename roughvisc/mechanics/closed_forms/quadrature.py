@@ -1,4 +1,4 @@
-"""Integrals of functions that are smooth but for what happens at the ends of the interval.
+"""Quadrature of functions with singular ends of the interval.
 
 Gauss panels that halve towards both ends converge exponentially for any power or logarithm at an end, near an
 end, and for boundary layers of any width: contact histories have all three.

@@ -1,4 +1,4 @@
-"""Exact reduction of an axisymmetric viscoelastic contact to a row of independent elements, for any history.
+"""Axisymmetric viscoelastic contact under any history by the method of dimensionality reduction (MDR).
 
 With the Abel transforms
 

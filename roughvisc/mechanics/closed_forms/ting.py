@@ -1,4 +1,4 @@
-"""A load that makes the contact grow to one maximum and then shrink (Ting, Graham), on exponential-series materials."""
+"""Contact that grows to one maximum and then recedes (Ting, Graham), for materials in exponentials."""
 
 from __future__ import annotations
 

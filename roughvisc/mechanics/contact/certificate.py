@@ -1,4 +1,4 @@
-"""The certificate of a pressure: the duality gap, a bound on its error, and whether that is small enough."""
+"""Convergence certificate of the contact solver: the duality gap and the error bound that follows from it."""
 
 from __future__ import annotations
 

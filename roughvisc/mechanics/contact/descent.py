@@ -1,4 +1,4 @@
-"""Steps that descend: what pressure to try next, and how far to go towards it.
+"""Descent steps of the contact solver: the trial pressure and the length of the step towards it.
 
 Vectors live on the free set (the cells that may change pressure), as flat indices into the grid; only what the
 transforms take and give, and the search for cells that enter, runs over the whole grid.

@@ -1,4 +1,4 @@
-"""The influence of pressure on displacement in scaled variables, and what has been spent on it."""
+"""Displacements and preconditioner in scaled variables, with a count of the convolutions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The door of the solver: a half-space, a gap and what is prescribed go in, a contact state comes out."""
+"""Public entry of the contact solver: half-space, gap and load or approach in, contact state out."""
 
 from __future__ import annotations
 

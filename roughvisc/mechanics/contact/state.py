@@ -1,4 +1,4 @@
-"""What a solved contact problem is."""
+"""Result of the contact solver: pressure, displacement, approach, load and their errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The transforms of ``scipy.fft`` that :mod:`~roughvisc.mechanics.halfspace.transforms` needs, computed by ducc0.
+"""The functions of ``scipy.fft`` that :mod:`~roughvisc.mechanics.halfspace.transforms` needs, computed by ducc0.
 
 Same arguments, same results to rounding. ducc0 is an optional dependency, the extra ``fast``.
 """

@@ -1,4 +1,4 @@
-r"""The kernel of a body: what its surface does under pressure, for unit contact compliance; all that is asked of it.
+r"""Kernel of a body: the displacement of its surface under unit pressure, at unit contact compliance.
 
 The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*``. A :class:`Kernel` is one value that
 everything built from it keeps: coarser, larger and mirrored grids, and windows.

@@ -1,4 +1,4 @@
-"""Real transforms of a field, of all of it or of one that is its own mirror image, and how symbols are laid out there.
+"""Real Fourier transforms of whole and of mirror-symmetric fields, and the layout of their symbols.
 
 A field on half an axis that goes on as its mirror image beyond its first cell has a transform of cosines alone: real,
 and of half the length. In both axes that is a quarter of the numbers.
@@ -69,7 +69,7 @@ def transforms(mirrored: bool) -> Transforms:
     return _SCIPY[mirrored]
 
 
-def transform_engine() -> str:
+def transform_library() -> str:
     """What the last digits depend on: results are equal to the last bit only where this is the same."""
     engine, version = ("ducc0", ducc.ducc0.__version__) if with_ducc0() else ("scipy.fft", scipy.__version__)
     return f"{engine} {version}, numpy {np.__version__}"

@@ -1,4 +1,4 @@
-"""The part of a free-space domain that the contact is solved on, and what it does to the rest.
+"""Window: the part of a free-space domain that the contact is solved on, and the displacement outside it.
 
 Pressure is not negative, and where the kernel does not bulge it pushes the surface away everywhere: beyond the window
 the gap exceeds the undeformed gap less the approach. As long as that is positive at the lowest place outside, no

@@ -1,4 +1,4 @@
-"""Which memory models a material: the cheapest one whose error is known to be small enough, and what it is."""
+"""Choice of the memory for a material: the cheapest form whose error is within the tolerance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.memory import ActsOn, Modes, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import ActsOn, Modes, stiff_ratio
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
 from roughvisc.mechanics.materials.protocol import check_creep, complete
@@ -37,7 +37,7 @@ Kind = Literal["auto", "direct"]
 
 
 @dataclass(frozen=True)
-class Engine:
+class Choice:
     """A memory, and how well it stands for the material.
 
     Attributes
@@ -61,14 +61,14 @@ class Engine:
         return self.memory.material
 
 
-def engine_for(
+def choose_memory(
     material: Material,
     duration: float,
     tolerance: float,
     acts_on: ActsOn = "displacement",
     kind: Kind = "auto",
     shortest: float | None = None,
-) -> Engine:
+) -> Choice:
     """Memory for a material over a program.
 
     Parameters
@@ -89,7 +89,7 @@ def engine_for(
 
     Returns
     -------
-    Engine
+    Choice
         Recursive exponentials: those of the material, if it is a series; else a series in its place, within a tenth of
         the tolerance if there is one. A table that has none is made passive: what is pressed then is the positive
         series nearest to it.
@@ -110,12 +110,12 @@ def engine_for(
                 "memory='direct' takes the pressure as linear in each step, which rings on this material: "
                 "expected memory='auto', or an instantaneous compliance that is not small"
             )
-        return Engine(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")
+        return Choice(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")
     if isinstance(material, Prony):
-        return Engine(_recursive(material, acts_on, duration), 0.0, _terms(material))
+        return Choice(_recursive(material, acts_on, duration), 0.0, _terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
         glassy = float(material.contact_compliance(0.0))
-        return Engine(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
+        return Choice(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
     material.contact_compliance(duration)  # refuses what ends before
     series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
@@ -126,7 +126,7 @@ def engine_for(
         )
     if series.repair:
         said.append(series.repair)
-    return Engine(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said))
+    return Choice(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said))
 
 
 def _active(material: Material) -> str:

@@ -1,4 +1,4 @@
-"""What a number of a material must be, in the words of its refusal."""
+"""Checks of material parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nearest passive material to a creep table: what a table that no passive material follows is pressed as.
+"""The passive material nearest to a measured creep table.
 
 A passive material dissipates: its compliance is a positive sum of exponentials (a Bernstein function). Rows with noise
 are none, nor is an interpolation with kinks: the loss factor is negative at some frequencies, and under a held approach

@@ -1,4 +1,4 @@
-"""What is asked of a material, what one of the user's own need not say, and whether it is a creep compliance."""
+"""The protocol of a material, the defaults of its optional parts, and the check that it is a creep compliance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Creep from relaxation, exactly."""
+"""Creep compliance from a relaxation modulus in exponentials, exactly."""
 
 from __future__ import annotations
 

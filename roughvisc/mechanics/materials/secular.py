@@ -1,4 +1,4 @@
-"""Zeros of the secular equation: what turns creep into relaxation and back, exactly, over any number of decades."""
+"""Roots of the secular equation: exact interconversion of creep and relaxation series."""
 
 from __future__ import annotations
 

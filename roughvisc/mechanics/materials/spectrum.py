@@ -1,4 +1,4 @@
-"""Positive spectra on a lattice of times: how measured or given functions become series."""
+"""Positive retardation spectra on a lattice of times, by non-negative least squares."""
 
 from __future__ import annotations
 

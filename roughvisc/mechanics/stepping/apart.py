@@ -1,4 +1,4 @@
-"""When surfaces that are apart come into contact: the first crossing of what is prescribed and what recovers.
+"""Time of first contact of surfaces that are apart, by root finding.
 
 A surface that carries no pressure recovers: the approach at which it would be touched never rises. What is prescribed
 is monotone between the turns of a cycle. Both bound the crossing on any interval, so that no contact is missed.

@@ -1,4 +1,4 @@
-"""One step: the elastic contact problem that it is, the state after it, and what is shown of it."""
+"""One time step: its elastic contact problem, the state after it, and the row that is shown of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.hereditary.memory import Modes, Rule
+from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial

@@ -1,4 +1,4 @@
-"""What the time steps leave unknown: the difference to a companion, the same march in steps twice as long.
+"""Error of the time steps, estimated by a companion march in steps twice as long.
 
 The rules for a step are of second order, so that the companion is about four times as far off and the difference is
 three times the error; where they are of first order, because contact jumps or creep is not resolved, it is the error.
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.hereditary.memory import Rule
+from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, with_cost
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.domain import is_outgrown

@@ -1,4 +1,4 @@
-"""The choice of time steps: by an error estimate that costs nothing, onto kept times exactly.
+"""Step length control: an error estimate that costs nothing, and steps that land on the kept times.
 
 The estimate is the difference between a solution and the linear extrapolation it was started from.
 """
@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from roughvisc.mechanics.hereditary.memory import Rule
+from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trial
 

@@ -1,4 +1,4 @@
-"""A contact that grows: whether the grid is too small for it, and how a state goes on on a larger one."""
+"""Growing domains: detects that the contact leaves the grid, and moves a state to a larger one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError
-from roughvisc.mechanics.hereditary.memory import padded
+from roughvisc.mechanics.hereditary.exponentials import padded
 from roughvisc.mechanics.stepping.attempt import predicted
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State
 

@@ -1,4 +1,4 @@
-r"""Where the work goes: energy stored in the springs of a material and dissipated in its dashpots.
+r"""Energy balance: energy stored in the springs of the material and dissipated in its dashpots.
 
 A creep compliance in exponentials is a chain of a spring, a dashpot and Kelvin elements. With the internal variable
 ``z_i`` of each element, a pressure with ``tau_i z_i' = p - z_i``, and ``<a, b>`` the sum of ``a K b`` over the surface,
@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.hereditary.memory import Modes, ModesState, Rule
+from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Events: corners and jumps of what is prescribed, from which a march goes on without a past to extrapolate."""
+"""Events: corners and jumps of the loading program, after which the march starts without extrapolation."""
 
 from __future__ import annotations
 

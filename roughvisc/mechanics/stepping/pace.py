@@ -1,4 +1,4 @@
-"""The pace of a march: how long the next step should be, by what the last ones were found to be. A plain value.
+"""State of the step length control: suggested length, sharpness, rejected error.
 
 It knows nothing of surfaces and materials: estimated errors, what of them is allowed, and lengths are all it is told.
 """

@@ -1,4 +1,4 @@
-"""Loading programs: what is prescribed, when; a chain of segments of load or approach.
+"""Loading programs: chains of segments that prescribe load or approach over time.
 
 A program knows values at corners only. What a hold keeps, or where a ramp starts after a change of control, is
 found during the run and handed to :meth:`Segment.value`.

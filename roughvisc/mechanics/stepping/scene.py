@@ -1,4 +1,4 @@
-"""What is prescribed, and what changes while a march goes on: plain values, all of them frozen."""
+"""Frozen values of the march: the scene (what is prescribed), the state, an accepted step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance, old_weight
+from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
@@ -85,7 +85,7 @@ class Scene:
         return self._known[1](min(step, self.program.duration))
 
     def stiff_ratio(self, step: float) -> float:
-        """As :func:`~roughvisc.mechanics.hereditary.memory.stiff_ratio`, no longer than the program."""
+        """As :func:`~roughvisc.mechanics.hereditary.exponentials.stiff_ratio`, no longer than the program."""
         return old_weight(self.compliance(step), self.mean_compliance(step))
 
     @cached_property

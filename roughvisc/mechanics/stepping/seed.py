@@ -1,4 +1,4 @@
-r"""The seed paper's algorithm, its slips corrected and nothing accelerated: the yardstick.
+r"""The algorithm of the seed paper with its slips corrected, not accelerated: the reference for speed and accuracy.
 
 "A robust algorithm for the contact of viscoelastic materials" presses a profile step by step: rectangle rule in
 time, one convolution for each past increment of pressure, plain conjugate gradients from a uniform first guess with

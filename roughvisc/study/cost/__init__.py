@@ -1,1 +1,1 @@
-"""What will be modelled and what it will cost, before anything runs."""
+"""Predicted steps, time and memory of a case, before it runs."""

@@ -1,4 +1,4 @@
-"""What a case will cost, found without computing it: coarse marches, a timed solve, and counted arrays."""
+"""Cost estimate of a case: marches on coarse grids, one timed convolution, and counted arrays."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ import xarray as xr
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.choice import Engine
+from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
@@ -30,8 +30,11 @@ from roughvisc.topography.grid import axis_step
 _COARSE = (17, 33)
 #: Cost may grow from a grid to one twice as fine by factors within these.
 _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
-#: Seconds for one coarse march, and for timing solves.
-_MARCH, _CALIBRATION = 3.0, 2.0
+#: A coarse march ends after so many convolutions, or steps, which take about three seconds: counts, so that what is
+#: foretold does not depend on how busy the machine is.
+_MOST_CONVOLUTIONS, _MOST_STEPS = 20_000, 3_000
+#: Seconds for timing solves.
+_CALIBRATION = 2.0
 #: Largest grid that a solve is timed on; larger ones are taken to cost as N log N. [cells]
 _TIMED = 1024**2
 #: What the grid's error costs: the march again on a quarter of the cells and a sixteenth, which is dearer by the cell.
@@ -118,7 +121,6 @@ def _march(case: Case, height: xr.DataArray) -> March:
     steps = rows = damped = 0
     reached = contact = level = 0.0
     work, instants = 0, [0.0]
-    until = time.perf_counter() + _MARCH
     kept = set(scene.times or ())
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
@@ -129,7 +131,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         level = max(level, step.level)
         work, reached = step.state.convolutions, now
         instants.append(now)
-        if time.perf_counter() > until:
+        if work > _MOST_CONVOLUTIONS or steps > _MOST_STEPS:
             break
     whole = reached >= program.duration
     stretch = 1.0
@@ -212,30 +214,30 @@ def work(cells: float) -> float:
 
 
 def wall_time(
-    settings: Settings, cells: int, found: March, engine: Engine, convolution: float, window: float = 1.0
+    settings: Settings, cells: int, found: March, choice: Choice, convolution: float, window: float = 1.0
 ) -> float:
     """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
     convolution *= work(window * cells) / work(cells)
-    modes = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
-    past = found.contact * found.steps / 2 if isinstance(engine.memory, History) else 0.0
+    modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
+    past = found.contact * found.steps / 2 if isinstance(choice.memory, History) else 0.0
     stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
     writing = found.rows * cells * 8 * len(settings.fields) * _WRITE
     again = _AGAIN if settings.grid_error else 1.0
     return found.convolutions * convolution * again + stepping + writing
 
 
-def memory(settings: Settings, cells: int, found: March, engine: Engine, part: float = 1.0) -> float:
+def bytes_needed(settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     field = 8.0 * cells
     surface, solver = 3.0, 14.0  # measured at 512 squared: together 13 to 18, as 5 to 45 % of the cells are in contact
     companion = 0.0  # measured there: 8 fields with one exponential
     transforms = 4.3 if settings.boundary == "free" else 1.4  # symbols, spectra
     past = 0.0
-    if isinstance(engine.memory, Modes):
-        modes = len(engine.memory.material.times) + bool(engine.memory.material.fluidity)
-        past = (3 if "bdf2" in engine.memory.rules else 2) * modes * part * field
+    if isinstance(choice.memory, Modes):
+        modes = len(choice.memory.material.times) + bool(choice.memory.material.fluidity)
+        past = (3 if "bdf2" in choice.memory.rules else 2) * modes * part * field
         companion = 7.0 + modes if modes else 0.0
-    elif isinstance(engine.memory, History):
+    elif isinstance(choice.memory, History):
         past = 1.5 * history_bytes(found.contact * cells, found.steps)
         companion = 7.0
     kept = min(found.rows, _FRAMES_TOGETHER) * field

@@ -1,4 +1,4 @@
-"""What will be modelled and what it will cost, before anything runs."""
+"""``roughvisc plan``: the model, the steps, the time and the memory of every case, before anything runs."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.hereditary.choice import Engine, engine_for
-from roughvisc.mechanics.hereditary.memory import Modes
-from roughvisc.study.cost.estimate import March, Stopwatch, disk, march_of, memory, solved_on, wall_time, windows
+from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.simulation.notes import left_out
-from roughvisc.study.simulation.scene import Ground, engine_wanted, follows
+from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.results import parameters_of
@@ -109,13 +109,13 @@ def plan(
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     marches, surfaces, problems = _marches(cases, stated, parameters)
-    stopwatch, engines = Stopwatch(), _Engines()
+    stopwatch, choices = Stopwatch(), _Engines()
     rows = []
     for number, case in enumerate(cases):
         like = _most_like(number, list(marches), parameters)
         surface = surfaces.get(_surface_name(cases[number], stated[number]))
         rows.append(
-            _row(case, surface, marches.get(like), like == number, problems.get(number, ""), engines, stopwatch)
+            _row(case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch)
         )
     columns = {name: ("case", np.array([row[name] for row in rows]), _attributes(name)) for name in _COLUMNS}
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
@@ -193,13 +193,13 @@ class _Engines:
     """Engines of distinct materials: fitting a series takes a while."""
 
     def __init__(self) -> None:
-        self._found: dict[str, Engine] = {}
+        self._found: dict[str, Choice] = {}
 
-    def of(self, case: Case, grows: bool) -> Engine:
-        wanted = engine_wanted(case.program(), case.solving(), "pressure" if grows else "displacement")
+    def of(self, case: Case, grows: bool) -> Choice:
+        wanted = memory_wanted(case.program(), case.solving(), "pressure" if grows else "displacement")
         name = f"{case.settings.material!r} {wanted!r}"
         if name not in self._found:
-            self._found[name] = engine_for(case.material(), **wanted)
+            self._found[name] = choose_memory(case.material(), **wanted)
         return self._found[name]
 
 
@@ -209,7 +209,7 @@ def _row(
     found: March | None,
     marched: bool,
     problem: str,
-    engines: _Engines,
+    choices: _Engines,
     stopwatch: Stopwatch,
 ) -> dict[str, Any]:
     settings = case.solving()
@@ -224,34 +224,34 @@ def _row(
     mirrored = surface.mirrored and settings.method == "fast"
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
-        engine = engines.of(case, grows or window)
+        choice = choices.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
-    exponentials = len(engine.memory.material.times) if isinstance(engine.memory, Modes) else 0
-    omitted = left_out(engine, settings, window, mirrored)
-    row |= {"memory_model": engine.note, "exponentials": exponentials, "left_out": omitted}
+    exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
+    omitted = left_out(choice, settings, window, mirrored)
+    row |= {"memory_model": choice.note, "exponentials": exponentials, "left_out": omitted}
     if found is None or problem:
         return row
     cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
     reachable = surface.windows if window else surface.windows[-1:]
     part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
     return row | {
-        "scheme": _scheme(settings, engine, found),
+        "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,
         "contact_fraction": found.contact,
         "convolutions": found.convolutions,
-        "wall_time": wall_time(settings, cells, found, engine, convolution, part),
-        "memory": memory(settings, cells, found, engine, part),
+        "wall_time": wall_time(settings, cells, found, choice, convolution, part),
+        "memory": bytes_needed(settings, cells, found, choice, part),
         "disk": disk(case, cells, found),
     }
 
 
-def _scheme(settings: Settings, engine: Engine, found: March) -> str:
+def _scheme(settings: Settings, choice: Choice, found: March) -> str:
     if settings.method == "seed":
         return "the seed paper's: rectangle rule, first order"
     steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
-    if engine.note.startswith("no memory"):
+    if choice.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"
     damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     return f"piecewise-linear pressure{damped}, steps {steps}"

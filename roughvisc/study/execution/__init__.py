@@ -1,1 +1,1 @@
-"""Here or on Dask: one case to its file, many cases, their progress."""
+"""Execution of cases, in this process or on Dask."""

@@ -1,4 +1,4 @@
-"""The files that a case names, put where every worker finds them: workers share nothing but the output folder."""
+"""Input files of cases, copied to where every Dask worker can read them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dask clients: of a cluster on this machine, set up for few long tasks, and of a scheduler that runs elsewhere."""
+"""Dask clients: a local cluster for few long tasks, or a scheduler that runs elsewhere."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from typing import Any
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.window import Reach
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import attempt
 from roughvisc.study.execution import run
 from roughvisc.study.simulation import rows, simulate

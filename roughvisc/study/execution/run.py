@@ -1,4 +1,4 @@
-"""One case, from its statement to its file."""
+"""Execution of one case, from the study to the result file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
-from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.simulate import press
 from roughvisc.study.statement.case import Case, read_study
@@ -133,7 +133,7 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "title": case.title + varied,
         "source": f"roughvisc {version}",
-        "transforms": transform_engine(),
+        "transforms": transform_library(),
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
         "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "

@@ -1,4 +1,4 @@
-"""What a process does for a sweep: bring one case to its file, tell how far it is, stop when asked, survive errors."""
+"""The task of a sweep on a Dask worker: computes one case, reports progress, stops on request, records errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep shows while it runs: one live display, plain lines where there is no terminal, or nothing."""
+"""Live display of a sweep."""
 
 from __future__ import annotations
 

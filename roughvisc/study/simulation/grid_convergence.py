@@ -1,4 +1,4 @@
-"""What a grid leaves unknown, from the same history on two or three grids: the grid convergence index of Roache."""
+"""Grid convergence index (Roache): the error of a grid from the same history on two or three grids."""
 
 from __future__ import annotations
 

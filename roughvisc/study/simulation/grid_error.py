@@ -1,4 +1,4 @@
-"""What the grid alone costs in accuracy: the same history on cells two and four times as long, and a look at the edge.
+"""Error of the grid, from the same history on cells two and four times as long and from the contact edge.
 
 Three grids show how fast a history settles (:mod:`~roughvisc.study.simulation.grid_convergence`). They may agree by
 chance, and do so where the contact is too small for any of them to see its shape. Therefore no error is stated that is

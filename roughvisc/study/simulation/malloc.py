@@ -1,4 +1,4 @@
-"""The C library's memory: freed arrays are to be used again, not given back to the system and asked for anew."""
+"""Settings of the C library's allocator, so that freed arrays are reused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces that are their own mirror images, in x and in y: a quarter of them is all that has to be solved."""
+"""Detection of surfaces that are mirror-symmetric in x and y, which are solved on a quarter."""
 
 from __future__ import annotations
 

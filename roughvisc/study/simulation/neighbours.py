@@ -1,4 +1,4 @@
-"""What lies across the four faces of every cell: the edge of a contact is counted from it."""
+"""Faces between cells in contact and cells out of contact."""
 
 from __future__ import annotations
 

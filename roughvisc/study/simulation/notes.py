@@ -1,11 +1,11 @@
-"""What a result says of its own limits: left out since nothing asked for it, or beyond what the method promises."""
+"""Notes of a result on its own limits: effects left out, rows beyond the tolerance, steep slopes."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
 
-from roughvisc.mechanics.hereditary.choice import Engine
+from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import axis_step
@@ -24,12 +24,12 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def left_out(engine: Engine, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
+def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
     """What nothing asks for, and is therefore not modelled, computed or kept."""
     out = []
-    if engine.note.startswith("no memory"):
+    if choice.note.startswith("no memory"):
         out.append("history (the material is elastic)")
-    elif engine.memory.acts_on != "pressure" and settings.method == "fast":
+    elif choice.memory.acts_on != "pressure" and settings.method == "fast":
         out.append("convolutions of the past")
     if settings.boundary == "periodic":
         out.append("padding")

@@ -1,4 +1,4 @@
-"""What floating-point numbers cannot tell apart is refused before anything runs."""
+"""Refusal of programs and loads that floating-point numbers cannot resolve."""
 
 from __future__ import annotations
 

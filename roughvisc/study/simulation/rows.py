@@ -1,4 +1,4 @@
-"""From arrays to labels: each kept instant becomes a row of the result Dataset."""
+"""Rows of a result: each kept instant with its stated errors, and the Dataset that they form."""
 
 from __future__ import annotations
 

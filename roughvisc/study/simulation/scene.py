@@ -1,4 +1,4 @@
-"""From labels to arrays: a surface, a material and a program become the scene of a march."""
+"""From labelled to plain arrays: surface, material, program and settings become the scene of a march."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from roughvisc.mechanics.halfspace.kernel import Kernel, displaces_as_a_whole
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Engine, engine_for
-from roughvisc.mechanics.hereditary.memory import ActsOn
+from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.hereditary.exponentials import ActsOn
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
@@ -157,7 +157,7 @@ def follows(settings: Settings) -> bool:
     return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
 
 
-def prepare(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Engine]:
+def prepare(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Choice]:
     """Scene of a case and what models its material.
 
     Raises
@@ -177,11 +177,11 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
     while ground.window.outside <= foreseen:
         ground.widen()
     grows = not ground.window.whole or (settings.boundary == "free" and settings.edge == "error" and ground.can_grow())
-    engine = engine_for(material, **engine_wanted(program, settings, "pressure" if grows else "displacement"))
+    choice = choose_memory(material, **memory_wanted(program, settings, "pressure" if grows else "displacement"))
     scene = Scene(
         halfspace=ground.halfspace(settings.boundary),
-        material=engine.material,
-        memory=engine.memory,
+        material=choice.material,
+        memory=choice.memory,
         program=program,
         times=kept_times(program, settings.times),
         tolerance=settings.tolerance,
@@ -190,7 +190,7 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
         enlarge=ground.enlarge if grows else None,
         **ground.shown(),
     )
-    return scene, engine
+    return scene, choice
 
 
 def _foreseen(ground: Ground, program: Program, material: Material) -> float:
@@ -249,8 +249,8 @@ def _check_approach(program: Program, full: float) -> None:
             )
 
 
-def engine_wanted(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
-    """What :func:`~roughvisc.mechanics.hereditary.choice.engine_for` is to be asked for, whatever the material."""
+def memory_wanted(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
+    """What :func:`~roughvisc.mechanics.hereditary.choice.choose_memory` is to be asked for, whatever the material."""
     return {
         "duration": program.duration,
         "tolerance": settings.tolerance,

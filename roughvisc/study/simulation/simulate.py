@@ -1,4 +1,4 @@
-"""One surface, one material, one program -> one Dataset ``(time, x, y)``."""
+"""``simulate``: one surface, one material, one program give one Dataset ``(time, x, y)``."""
 
 from __future__ import annotations
 
@@ -174,25 +174,25 @@ def _press(
         height, settings.missing, follow=follows(settings), mirror=settings.method == "fast", kernel=settings.kernel
     )
     expect_arrays(ground.gap.nbytes)
-    scene, engine = prepare(ground, material, program, settings)
+    scene, choice = prepare(ground, material, program, settings)
     followed = not ground.window.whole
-    log.info("memory: %s", engine.note)
+    log.info("memory: %s", choice.note)
     if keeper is not None:
         scene = _grown(scene, ground, keeper.saved.growths)
-    rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, engine.series_error)
+    rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
     with _reporting(progress) as report:
         _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     dataset = rows.dataset()
     described = {
-        "memory": engine.note,
-        "series_error": engine.series_error,
+        "memory": choice.note,
+        "series_error": choice.series_error,
         "kernel": "" if settings.kernel == HALF_SPACE else repr(settings.kernel),
         "material_note": complete(material).note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
-        "left_out": left_out(engine, settings, followed, ground.mirrored),
+        "left_out": left_out(choice, settings, followed, ground.mirrored),
     }
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset

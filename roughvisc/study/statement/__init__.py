@@ -1,1 +1,1 @@
-"""What is asked: study files, their schema, cases and what identifies them."""
+"""Statement of a study: study files, their schema, and the cases that they define."""

@@ -1,4 +1,4 @@
-"""Cases: one simulation, stated whole; read from study files, varied, and known by what determines its numbers."""
+"""Cases: read from study files, varied, and identified by what determines their numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What determines the numbers of a case, and its digest."""
+"""Key of a case: a digest of all that determines its numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FileSurface, SurfaceSection
 from roughvisc.topography.readers import sha256
@@ -53,7 +53,7 @@ def case_key(settings: Study) -> str:
     ]
     stated["material"] = settings.material.content()
     stated["surface"] = surface_content(settings.surface)
-    stated["numerics"] = [NUMERICS_REVISION, transform_engine().split()[0]]
+    stated["numerics"] = [NUMERICS_REVISION, transform_library().split()[0]]
     return _digest(stated)[:16]
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a study, in one message: a line for each problem."""
+"""Error messages for studies: one line for each problem."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a contact is computed and what is kept of it: one value, with its defaults, checked where it is made."""
+"""Settings of a solve: one frozen value with its defaults, checked where it is made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was done to a surface between its scan and its contact, found out from a result."""
+"""Provenance of a surface: the conditioning between scan and contact, read from a result."""
 
 from __future__ import annotations
 

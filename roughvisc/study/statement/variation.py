@@ -1,4 +1,4 @@
-"""Sweeps: which values are set in which case of a study."""
+"""Sweeps: the values of each case of a parametric study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a run has come, in a file: from it the run goes on, and ends with the same numbers to the last bit.
+"""Checkpoints: the state of an unfinished run, from which it continues to the same last bit.
 
 A checkpoint is one record of everything in the state of a march, all floats exact. Two files take turns, each written
 whole under another name first, so that one whole checkpoint outlives whatever happens to the other.
@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
-from roughvisc.mechanics.hereditary.memory import ModesState
+from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State, Step, Uncertainty
@@ -76,7 +76,7 @@ def save_checkpoint(path: Path, reached: Reached, key: str) -> None:
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
     stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
-    plain = {"key": key, "revision": NUMERICS_REVISION, "engine": transform_engine(), "reached": stated}
+    plain = {"key": key, "revision": NUMERICS_REVISION, "transforms": transform_library(), "reached": stated}
     with whole_file(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
@@ -103,10 +103,11 @@ def load_checkpoint(path: Path, key: str) -> Reached | None:
     if found != (key, NUMERICS_REVISION):
         log.warning("%s: belongs to another case or revision and is not used", path)
         return None
-    if plain["engine"] != transform_engine():
+    if plain["transforms"] != transform_library():
         raise InputError(
-            f"{path}: was written with {plain['engine']}, this is {transform_engine()}, and the numbers would differ "
-            "in their last digits: expected the same versions; go on with those, or remove the folder to start anew"
+            f"{path}: was written with {plain['transforms']}, this is {transform_library()}, and the numbers would "
+            "differ in their last digits: expected the same versions; go on with those, or remove the folder to "
+            "start anew"
         )
     return reached
 

@@ -1,4 +1,4 @@
-"""Records of cases that failed: what was asked, and what went wrong."""
+"""Records of failed cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run at a time: a lock file that names who holds it, and whether that one is alive.
+"""Lock file of a run, with the process that holds it.
 
 Where the file system's own locks reach every machine that is all there is to it: they end with the process. Where
 they do not, the file's age tells: whoever holds it touches it every few seconds.

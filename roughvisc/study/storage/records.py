@@ -1,4 +1,4 @@
-"""Numbers on the disk, exactly, for as long as a run lasts: records of plain values and arrays, with checksums.
+"""Record files of unfinished runs: plain values and arrays with checksums.
 
 A file of records is only ever appended to, and whoever reads it knows how many to expect: what was torn off or
 written beyond that is cut away. So it survives what kills a process, a machine or a disk's free space.

@@ -1,1 +1,1 @@
-"""Speed against accuracy: settings, each timed and held against the truth."""
+"""Trade of speed against accuracy: one case under many settings, each timed and its error measured."""

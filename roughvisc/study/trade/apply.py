@@ -1,4 +1,4 @@
-"""Settings written back into a study file, whose comments and layout stay as they are."""
+"""Writes settings back into a study file, keeping its comments and layout."""
 
 from __future__ import annotations
 

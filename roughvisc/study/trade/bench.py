@@ -1,4 +1,4 @@
-"""Timed runs of one case under different settings, none longer than there is time for."""
+"""Timed runs of one case under different settings, within a budget of time."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pathlib import Path
 import xarray as xr
 
 from roughvisc.errors import RoughviscError
-from roughvisc.mechanics.hereditary.choice import engine_for
-from roughvisc.study.cost.estimate import March, Stopwatch, march_of, memory, solved_on, windows, work
+from roughvisc.mechanics.hereditary.choice import choose_memory
+from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, march_of, solved_on, windows, work
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.simulation.scene import Ground, engine_wanted, follows
+from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
@@ -163,8 +163,8 @@ class Bench:
         """As a plan counts it, with the steps that were taken. [byte]"""
         settings, cells = case.solving(), dataset.sizes["x"] * dataset.sizes["y"]
         contact, rows = float(dataset["contact_fraction"].max()), dataset.sizes["time"]
-        engine = engine_for(case.material(), **engine_wanted(case.program(), settings))
+        choice = choose_memory(case.material(), **memory_wanted(case.program(), settings))
         found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
         increments = 8.0 * cells * steps if settings.method == "seed" else 0.0
         part = 1.0 if settings.method == "seed" else self._part
-        return memory(settings, cells, found, engine, part) + increments
+        return bytes_needed(settings, cells, found, choice, part) + increments

@@ -1,4 +1,4 @@
-"""The closed form of a case, where it has one, and how far a result is from it."""
+"""Closed form of a case, where there is one, and the error of a result against it."""
 
 from __future__ import annotations
 

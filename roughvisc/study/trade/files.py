@@ -1,4 +1,4 @@
-"""Where a trade is kept, and what its command is told: folders, files, parts of one, times."""
+"""Files and options of ``roughvisc trade``."""
 
 from __future__ import annotations
 

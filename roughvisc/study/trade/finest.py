@@ -1,4 +1,4 @@
-"""What a case is measured against that has no closed form: its own finest run."""
+"""Reference run at the finest affordable settings."""
 
 from __future__ import annotations
 

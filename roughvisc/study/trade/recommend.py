@@ -1,4 +1,4 @@
-"""Which setting to take: the cheapest that is accurate enough, in words and as keys of a study."""
+"""Recommendation of a trade: the cheapest setting that is accurate enough."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speed against accuracy: one scene under a ladder of settings, each timed and held against what is exact."""
+"""``trade``: one case under a ladder of settings, each timed and compared with the reference."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.scene import kept_times
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import Bench, NotRun, Report
@@ -180,7 +180,7 @@ def _labelled(
         "states it (JSON, SI units).",
         "case": case.to_json(),
         "grid_is_data": int(is_data(case)),
-        "transforms": transform_engine(),
+        "transforms": transform_library(),
     }
     dataset.attrs["recommendation"] = recommendation(dataset)
     return dataset

@@ -1,4 +1,4 @@
-"""What a trade shows while it runs: which setting is being measured and how far it is, or nothing."""
+"""Progress display of a trade."""
 
 from __future__ import annotations
 

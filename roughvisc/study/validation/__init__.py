@@ -1,1 +1,1 @@
-"""Held against closed forms, on the machine of the user."""
+"""Validation against closed forms on the machine of the user."""

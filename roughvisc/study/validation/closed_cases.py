@@ -1,4 +1,4 @@
-"""The cases of :func:`roughvisc.validate`: what is pressed, its closed form, and the error that the method explains.
+"""Validation cases: surface, closed form, and the error that the method explains.
 
 All in units of their own: lengths in contact radii or wavelengths, moduli and times of order one; the solver is
 neutral to units. Each case yields rows ``(what is compared, error, expected error)``. The expected ones are sums of

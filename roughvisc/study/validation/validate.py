@@ -1,4 +1,4 @@
-"""Is it right on this machine? Runs of :func:`roughvisc.simulate` against closed forms, with the errors to expect."""
+"""``validate``: runs of :func:`roughvisc.simulate` against closed forms, with the errors to expect."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What the command line shows."""
+"""Tables on the command line."""

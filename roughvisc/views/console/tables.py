@@ -1,4 +1,4 @@
-"""What the command line shows: tables of what was found and what it cost."""
+"""Tables on the command line: results, plans, scans, validation."""
 
 from __future__ import annotations
 

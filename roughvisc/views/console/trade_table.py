@@ -1,4 +1,4 @@
-"""What the command line shows of a trade: a line for each setting, and the advice."""
+"""Table of a trade on the command line, with its recommendation."""
 
 from __future__ import annotations
 

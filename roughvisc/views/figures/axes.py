@@ -1,4 +1,4 @@
-"""Units on axes, and what all figures share: prefixes, fonts, colours, the choice of time axis and of frames.
+"""Axes of all figures: units and prefixes, fonts, colours, choice of time axis and frames.
 
 The package computes in SI; figures show readable prefixes (µm, MPa, ms). A :class:`Unit` is chosen from the data of
 one axis and then used for every artist on it.

@@ -1,4 +1,4 @@
-"""Where a method is right: errors over two parameters, with what was refused."""
+"""Figure of the error over two parameters, with the refused cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of a trade: wall time against error, every setting a point, the best ones joined by a line."""
+"""Figure of a trade: error against wall time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How functions of a frame or of a history are applied to a result."""
+"""Application of a function of frames or of histories to a result."""
 
 from __future__ import annotations
 

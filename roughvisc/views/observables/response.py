@@ -1,4 +1,4 @@
-"""The response as histories tell it: growth of the area, stiffness, work."""
+"""Observables of histories: growth of the area, stiffness, work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The spots of contact: where they are, how many, how large, and whether they leave a way through."""
+"""Contact clusters: position, number, size, percolation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pre-rendered pictures of one case for a page: small maps, sections and histories, each as text."""
+"""Pictures of a report: small maps, sections and histories, encoded as text."""
 
 from __future__ import annotations
 

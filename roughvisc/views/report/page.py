@@ -1,4 +1,4 @@
-"""One self-contained page (HTML) of one or many results: nothing is fetched from anywhere when it is looked at."""
+"""Self-contained HTML report of one or many results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Axes on which what was varied lies: numbers on the scale that suits them, anything else as categories."""
+"""Axes of varied parameters: numeric scales or categories."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import roughvisc as rv
 from roughvisc.mechanics.halfspace import ducc, transforms
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.halfspace.transforms import transform_engine
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.halfspace.window import Reach, Window
 
 SHAPES = [(9, 15), (8, 14), (1, 11), (7, 1), (36, 25)]
@@ -17,7 +17,7 @@ SHAPES = [(9, 15), (8, 14), (1, 11), (7, 1), (36, 25)]
 @pytest.fixture
 def by_ducc0(monkeypatch):
     monkeypatch.delenv("ROUGHVISC_TRANSFORMS")
-    assert transform_engine().startswith("ducc0 ")
+    assert transform_library().startswith("ducc0 ")
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
@@ -102,5 +102,5 @@ def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
 
 def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):
     monkeypatch.setattr(ducc, "ducc0", None)
-    assert transform_engine().startswith("scipy.fft ")
+    assert transform_library().startswith("scipy.fft ")
     HalfSpace((5, 4), (1.0, 1.0)).displacement(np.ones((5, 4)))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence, whole_domain, window_around
-from roughvisc.mechanics.hereditary.memory import padded
+from roughvisc.mechanics.hereditary.exponentials import padded
 
 
 def paraboloid(shape, centre):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import roughvisc as rv
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 
 SHAPE = (3, 4)
 

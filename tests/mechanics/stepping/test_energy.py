@@ -11,7 +11,7 @@ from scipy.integrate import quad
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.march import march

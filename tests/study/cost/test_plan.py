@@ -10,7 +10,7 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.hereditary.choice import engine_for
+from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import plan as plan_module
 from roughvisc.study.cost.estimate import March, coarse, wall_time
 from roughvisc.study.simulation.simulate import simulate
@@ -75,8 +75,27 @@ def test_plan__expects_about_the_steps_and_convolutions_that_are_taken(study, ch
     assert 0.6 < float(planned.convolutions[0]) / int(ds.convolutions.sum()) < 1.8
     size = pathlib.Path(ds.encoding["source"]).stat().st_size
     assert 0.4 < size / float(planned.disk[0]) < 2
-    seconds = float(ds.wall_time[-1]) / float(planned.wall_time[0])
-    assert 0.1 < seconds < 10, "a loose bound: other programs run beside the tests"
+    assert planned.wall_time[0] > 0
+
+
+def test_plan__counts_the_same_however_busy_the_machine_is(study, monkeypatch):
+    case = study(ROUGH)[0]
+    first = rv.plan([case])
+    clock = iter(range(10**9))
+    monkeypatch.setattr("time.perf_counter", lambda: 100.0 * next(clock))  # every look at the clock costs 100 s
+    second = rv.plan([case])
+    for name in ("steps", "convolutions", "rows"):
+        assert first[name].equals(second[name]), name
+
+
+def test_plan__foresees_a_long_march_from_a_part_of_it(study, monkeypatch):
+    case = study(ROUGH)[0]
+    whole = rv.plan([case])
+    monkeypatch.setattr("roughvisc.study.cost.estimate._MOST_CONVOLUTIONS", int(0.5 * float(whole.convolutions[0])))
+    part = rv.plan([case])
+    ratio = float(part.convolutions[0]) / float(whole.convolutions[0])
+    assert ratio != 1
+    assert 1 / 3 < ratio < 3, "the steps of a hold grow, which its beginning does not tell"
 
 
 def test_plan__names_what_is_modelled_and_what_is_left_out(study):
@@ -180,7 +199,7 @@ def test_coarse__is_the_same_surface_with_fewer_points():
 def test_plan__counts_the_coarser_solve_of_a_grid_error(study):
     plain = study(ROUGH)[0]
     asked = vary(plain, {"solve.grid_error": True})
-    engine = engine_for(plain.material(), 0.51, 2e-3)
+    engine = choose_memory(plain.material(), 0.51, 2e-3)
     found = March(20, 10, 400, 0.0, 0.1, True)
     seconds = [wall_time(case.solving(), 90 * 108, found, engine, 1e-3) for case in (plain, asked)]
     assert seconds[0] + 0.25 * 0.4 <= seconds[1] <= 2 * seconds[0], "a quarter of the cells, at least"

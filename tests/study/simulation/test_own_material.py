@@ -11,7 +11,7 @@ from scipy.special import gammainc
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import lee_radok_step
-from roughvisc.mechanics.hereditary.choice import engine_for
+from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import Completed, complete, mean_of
 from roughvisc.mechanics.materials.series import series_of
@@ -152,9 +152,9 @@ def test_a_pair__takes_one():
     t = np.array([0.0, 0.1, 2.0])
     rest = rv.zener(1e6, 1e6, 1e5).contact_compliance(t)
     assert both.contact_compliance(t) == pytest.approx(alone.contact_compliance(t) + rest)
-    engine = engine_for(both, 2.0, 1e-3)
-    assert engine.series_error <= 1e-4
-    assert engine.material.contact_compliance(t) == pytest.approx(both.contact_compliance(t), rel=1e-4)
+    choice = choose_memory(both, 2.0, 1e-3)
+    assert choice.series_error <= 1e-4
+    assert choice.material.contact_compliance(t) == pytest.approx(both.contact_compliance(t), rel=1e-4)
 
 
 def test_a_plan__takes_one(monkeypatch, tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.rows import keeps_its_word

@@ -21,7 +21,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.errors import InUseError
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
-from roughvisc.mechanics.hereditary.memory import ModesState
+from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
@@ -445,7 +445,7 @@ def test_other_transforms__are_refused_and_the_checkpoint_stays(whole, tmp_path,
     case, expected, steps = whole(MODES)
     stopped(case, tmp_path, steps // 2)
     with monkeypatch.context() as patched:
-        patched.setattr(checkpoint_module, "transform_engine", lambda: "another engine")
+        patched.setattr(checkpoint_module, "transform_library", lambda: "another engine")
         with pytest.raises(rv.InputError, match=r"was written with scipy\.fft .*, this is another engine"):
             run_case(case, tmp_path)
     stop = Stop()

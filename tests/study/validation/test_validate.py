@@ -9,7 +9,7 @@ import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.memory import Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.validation.closed_cases import CASES
 from roughvisc.study.validation.validate import Comparison
 

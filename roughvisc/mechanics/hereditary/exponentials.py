@@ -1,4 +1,4 @@
-"""The hereditary integral: what a material remembers of the pressures it has carried.
+"""Memory in exponentials: the hereditary integral as a recursion from step to step.
 
 A memory reduces one time step to an elastic problem,
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.memory import Modes, mean_compliance, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import Modes, mean_compliance, stiff_ratio
 
 CELL = (1, 1)
 

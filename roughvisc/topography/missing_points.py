@@ -1,4 +1,4 @@
-"""Gaps in scans: points that are missing, spikes that are made missing, and how they are filled in."""
+"""Missing points: masking of outliers, filling."""
 
 from __future__ import annotations
 
