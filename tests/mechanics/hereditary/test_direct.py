@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.direct import History
+from roughvisc.mechanics.hereditary.direct import _BLOCK, History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 
 SHAPE = (3, 4)
@@ -69,6 +69,17 @@ def test_state__keeps_cells_in_contact_only():
     field[1, 2] = 3.0
     _, state = run(History(rv.maxwell(1.0, 1.0)), [0.1] * 100, [field] * 100)
     assert sum(block.pressures.size for block in state.blocks) <= 101  # one for the state at rest
+
+
+def test_state__gathers_its_steps_into_blocks():
+    """One block a step would cost an array operation for each past step, at every step."""
+    memory = History(rv.zener(1.0, 1.0, 1.0))
+    state, steps = memory.start((4, 3)), 5 * _BLOCK + 7
+    for number in range(steps):
+        state = memory.advance(state, 0.1, "linear", np.full((4, 3), 1.0 + number))
+    lengths = [len(block.pressures) for block in state.blocks]
+    assert sum(lengths) == steps + 1  # one for the state at rest
+    assert len(lengths) <= 5 + _BLOCK
 
 
 def test_enlarged__is_the_same_history_on_a_larger_grid():

@@ -112,3 +112,17 @@ def test_stiff_ratio__tells_what_a_linear_step_does():
     assert stiff_ratio(rv.kelvin_voigt(1.0, 1.0), 1e-6) == pytest.approx(1, rel=1e-5)
     assert stiff_ratio(rv.maxwell(1.0, 1.0), 2.0) == pytest.approx(0.5)
     assert mean_compliance(rv.maxwell(1.0, 1.0), 0.0) == pytest.approx(0.25)
+
+
+def test_jump__changes_the_field_and_nothing_of_what_is_remembered():
+    memory = Modes(rv.Prony(1.0, 0.2, (1.0, 2.0), (0.3, 3.0)))
+    rng = np.random.default_rng(1)
+    before = memory.advance(memory.start((3, 2)), 0.4, "linear", rng.random((3, 2)))
+    after = memory.advance(before, 0.0, "linear", field := rng.random((3, 2)))
+    np.testing.assert_array_equal(after.modes, before.modes)
+    assert after.field is field
+    # what a step after it sees is the new field from its beginning on
+    alpha, carried = memory.predict(after, 0.1, "linear")
+    held = memory.factor * float(memory.material.creep_compliance(0.1))
+    past = memory.predict(memory.advance(before, 0.0, "linear", np.zeros((3, 2))), 0.1, "linear")[1]
+    np.testing.assert_allclose(carried + alpha * field, past + held * field, rtol=1e-12)
