@@ -5,6 +5,7 @@ import re
 import shutil
 import sys
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -131,3 +132,21 @@ def test_links__lead_somewhere():
     for path in PAGES:
         for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):
             assert (path.parent / target).exists(), f"{named(path)}: {target}"
+
+
+def public():
+    """Functions that a user may call, by name."""
+    modules = (rv, rv.plot, rv.observables, rv.closed_forms)
+    found = {f"{module.__name__}.{name}": getattr(module, name) for module in modules for name in module.__all__}
+    found |= {f"Program.{name}": getattr(rv.Program, name) for name in ("load", "approach", "hold", "table", "cycle")}
+    return {name: one for name, one in found.items() if inspect.isroutine(one)}
+
+
+@pytest.mark.parametrize("name", sorted(public()))
+def test_public_functions__say_what_goes_in_and_what_comes_out(name):
+    function = public()[name]
+    text, signature = inspect.getdoc(function), inspect.signature(function)
+    sections = {line for line, rule in pairwise(text.splitlines()) if rule.startswith("---")}
+    if signature.parameters:
+        assert "Parameters" in sections
+    assert sections & {"Returns", "Yields", "Examples"} or str(signature.return_annotation) in ("None", "Program")

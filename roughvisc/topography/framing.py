@@ -76,7 +76,18 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
 
 
 def invert(h: xr.DataArray) -> xr.DataArray:
-    """The surface with valleys for peaks, as a replica has it; x and y stay as they are. [m]"""
+    """The surface with valleys for peaks, as a replica has it; x and y stay as they are.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+
+    Returns
+    -------
+    xarray.DataArray, dims (x, y)
+        Heights with the opposite sign. [m]
+    """
     h = checked(h, "invert")
     return noted(like(h, -h.values), "inverted")
 
@@ -159,9 +170,19 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
-    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse. [m]
+    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse.
 
     Contact with periodic boundaries is solved on a quarter of it, and costs no more than that of the surface itself.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+
+    Returns
+    -------
+    xarray.DataArray, dims (x, y)
+        Twice as many points along each axis. [m]
     """
     h = checked(h, "mirror")
     nx, ny = h.shape

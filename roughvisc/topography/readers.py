@@ -122,7 +122,13 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
 
 
 def supported_formats() -> dict[str, tuple[str, ...]]:
-    """Names of all formats, as ``format=`` takes them, with their usual suffixes."""
+    """Names of all formats, as ``format=`` takes them, with their usual suffixes.
+
+    Returns
+    -------
+    dict
+        Name -> suffixes, in alphabetical order.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's imports
         return dict(sorted(instruments.suffixes().items()))

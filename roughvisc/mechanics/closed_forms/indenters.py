@@ -161,7 +161,26 @@ class Cone:
 
 
 def punch_pressure(r: ArrayLike, radius: ArrayLike, force: ArrayLike) -> Array:
-    """Pressure under a flat round punch, ``W / (2 pi a sqrt(a^2 - r^2))``: no modulus in it. [Pa]"""
+    """Pressure under a flat round punch, ``W / (2 pi a sqrt(a^2 - r^2))``: no modulus in it.
+
+    Parameters
+    ----------
+    r : array_like
+        Distance from the axis. [m]
+    radius : array_like
+        ``a`` of the punch. [m]
+    force : array_like
+        ``W``. [N]
+
+    Returns
+    -------
+    ndarray
+        Zero outside, infinite at the edge. [Pa]
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.34).
+    """
     r, radius = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = np.asarray(force) / (2 * np.pi * radius * np.sqrt(np.maximum((radius - r) * (radius + r), 0.0)))

@@ -45,7 +45,26 @@ Array = NDArray[np.float64]
 
 
 def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus: float | None = None) -> Prony:
-    """Elastic half-space: a shear modulus [Pa] and no memory."""
+    """Elastic half-space: no memory.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        ``G``. [Pa]
+    poisson : float, optional
+        Poisson ratio, constant in time; a half unless given. [-]
+    bulk_modulus : float, optional
+        Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
+
+    Returns
+    -------
+    Prony
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+    """
     check_number("shear_modulus", shear_modulus, "Pa")
     return in_volume(Prony(1 / shear_modulus), poisson, bulk_modulus)
 
@@ -53,7 +72,28 @@ def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus:
 def maxwell(
     shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
 ) -> Prony:
-    """Maxwell fluid: a spring [Pa] in series with a dashpot [Pa s]; ``J = 1/G + t/eta``."""
+    """Maxwell fluid: a spring in series with a dashpot; ``J = 1/G + t/eta``.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        ``G`` of the spring. [Pa]
+    viscosity : float
+        ``eta`` of the dashpot. [Pa s]
+    poisson : float, optional
+        Poisson ratio, constant in time; a half unless given. [-]
+    bulk_modulus : float, optional
+        Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
+
+    Returns
+    -------
+    Prony
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+    """
     check_number("shear_modulus", shear_modulus, "Pa")
     check_number("viscosity", viscosity, "Pa s")
     return in_volume(Prony(1 / shear_modulus, fluidity=1 / viscosity), poisson, bulk_modulus)
@@ -62,7 +102,28 @@ def maxwell(
 def kelvin_voigt(
     shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
 ) -> Prony:
-    """Kelvin-Voigt solid: a spring [Pa] beside a dashpot [Pa s]; no instantaneous compliance."""
+    """Kelvin-Voigt solid: a spring beside a dashpot; ``J = (1 - exp(-G t / eta)) / G``, nothing at once.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        ``G`` of the spring. [Pa]
+    viscosity : float
+        ``eta`` of the dashpot. [Pa s]
+    poisson : float, optional
+        Poisson ratio, constant in time; a half unless given. [-]
+    bulk_modulus : float, optional
+        Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
+
+    Returns
+    -------
+    Prony
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+    """
     check_number("shear_modulus", shear_modulus, "Pa")
     check_number("viscosity", viscosity, "Pa s")
     shear = Prony(0.0, compliances=(1 / shear_modulus,), times=(viscosity / shear_modulus,))
@@ -77,7 +138,32 @@ def zener(
     *,
     bulk_modulus: float | None = None,
 ) -> Prony:
-    """Zener solid: a spring ``G`` [Pa] in series with a Kelvin element ``G_K`` [Pa], ``eta_K`` [Pa s]."""
+    """Zener (standard linear) solid: a spring in series with a Kelvin element.
+
+    ``J = 1/G + (1 - exp(-G_K t / eta_K)) / G_K``.
+
+    Parameters
+    ----------
+    shear_modulus : float
+        ``G`` of the spring: the modulus at once. [Pa]
+    kelvin_modulus : float
+        ``G_K`` of the Kelvin element. [Pa]
+    kelvin_viscosity : float
+        ``eta_K`` of the Kelvin element. [Pa s]
+    poisson : float, optional
+        Poisson ratio, constant in time; a half unless given. [-]
+    bulk_modulus : float, optional
+        Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
+
+    Returns
+    -------
+    Prony
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+    """
     check_number("shear_modulus", shear_modulus, "Pa")
     check_number("kelvin_modulus", kelvin_modulus, "Pa")
     check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")

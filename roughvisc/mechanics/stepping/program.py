@@ -94,6 +94,11 @@ class Program:
 
     Built as a chain; every call returns a longer program. ``over=0`` is a jump.
 
+    Parameters
+    ----------
+    segments : tuple of Segment
+        In order; none unless given.
+
     Examples
     --------
     >>> program = Program().load(2.0, over=0.05).hold(5.0).load(0.0, over=0.05)
@@ -113,15 +118,62 @@ class Program:
         return self._then(*other.segments)
 
     def load(self, value: float, *, over: float) -> Program:
-        """Go to a load [N], linearly over a time [s]."""
+        """Go to a load, linearly.
+
+        Parameters
+        ----------
+        value : float
+            Load at the end. [N]
+        over : float
+            How long it takes; zero is a jump. [s]
+
+        Returns
+        -------
+        Program
+
+        Raises
+        ------
+        InputError
+            If a number is negative or not finite.
+        """
         return self._then(Segment("load", over, value))
 
     def approach(self, value: float, *, over: float) -> Program:
-        """Go to an approach [m], linearly over a time [s]."""
+        """Go to an approach, linearly.
+
+        Parameters
+        ----------
+        value : float
+            Approach at the end; negative values lift the profile off. [m]
+        over : float
+            How long it takes; zero is a jump. [s]
+
+        Returns
+        -------
+        Program
+
+        Raises
+        ------
+        InputError
+            If a number is not finite, or the time is negative.
+        """
         return self._then(Segment("approach", over, value))
 
     def hold(self, duration: float, control: Control | None = None) -> Program:
-        """Keep what is controlled, or what ``control`` names, at the value it has. [s]"""
+        """Keep the load or the approach at the value that it has.
+
+        Parameters
+        ----------
+        duration : float
+            How long. [s]
+        control : {"load", "approach"}, optional
+            Which of them; that of the segment before unless given. The other one then follows from the contact: a load,
+            then ``hold(..., control="approach")``, is stress relaxation.
+
+        Returns
+        -------
+        Program
+        """
         if not self.segments and control is None:
             control = "load"
         return self._then(Segment(control or self.segments[-1].control, duration))
@@ -174,7 +226,13 @@ class Program:
         return cls((Segment(control, 0.0, mean), Segment(control, period * cycles, mean, amplitude, period)))
 
     def gives(self, number: int) -> bool:
-        """Whether the program states what a segment prescribes; a hold may keep what was found."""
+        """Whether the program states what a segment prescribes; a hold may keep what was found.
+
+        Parameters
+        ----------
+        number : int
+            Index of the segment.
+        """
         control = self.segments[number].control
         for segment in reversed(self.segments[: number + 1]):
             if segment.control != control or segment.end is not None:
