@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.views.figures.axes import TimeAxis, new_figure, styled
-from roughvisc.views.sweep_figures.cases import Parameter, cases_of
+from roughvisc.views.sweep_figures.cases import Parameter, cases_of, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
-from roughvisc.views.sweep_figures.quantities import label_of, quantity_unit
 
 #: Line styles of a second parameter; of one with more values nothing tells the lines apart.
 _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))

@@ -14,7 +14,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
-from roughvisc.views.figures.axes import Unit
+from roughvisc.variables import VARIABLES
+from roughvisc.views.figures.axes import Unit, unit_for
 from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
 
 _NO_PARAMETERS = ("case", "case_key")
@@ -230,3 +231,19 @@ def _last_word(key: str) -> str:
     """Last part of a dotted key; a number with what it counts."""
     parts = key.split(".")
     return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
+
+
+def quantity_unit(cases: Cases, quantity: str, values) -> Unit:
+    """Unit to show values [SI] of a quantity in."""
+    if quantity == "contact_fraction":
+        return Unit(0.01, "%")
+    declared = VARIABLES[quantity].units if quantity in VARIABLES else ""
+    return unit_for(middle_of_decades(np.ravel(values)), str(cases.members[0][quantity].attrs.get("units", declared)))
+
+
+def label_of(cases: Cases, quantity: str, unit: Unit) -> str:
+    """Axis label of a quantity."""
+    if quantity in VARIABLES:
+        return unit.label(VARIABLES[quantity].label)
+    said = str(cases.members[0][quantity].attrs.get("long_name", quantity)).replace("_", " ")
+    return unit.label(said[:1].upper() + said[1:])

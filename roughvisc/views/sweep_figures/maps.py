@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.views.figures.axes import ABSENT, letter_panels, new_figure
-from roughvisc.views.sweep_figures.cases import Cases, Parameter
+from roughvisc.views.sweep_figures.cases import Cases, Parameter, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import readable_ticks
 from roughvisc.views.sweep_figures.parameter_axes import borders_between, set_parameter_axis
-from roughvisc.views.sweep_figures.quantities import label_of, quantity_unit
 
 
 def draw_maps(
