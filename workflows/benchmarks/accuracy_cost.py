@@ -14,6 +14,7 @@ import os
 import pickle
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ def against(other, count=12, seed=1, first=0, ladder=LADDER):
             drawn = case(seed, number)
             name = f"{number:5d} {', '.join(drawn.families.values())}{', soft' if drawn.soft else ''}"
             try:
-                ratios = compare(drawn, this, that, ladder)
+                ratios = compare(drawn, partial(this, seed, number), partial(that, seed, number), ladder)
             except Exception as error:
                 print(f"{name}: {type(error).__name__}: {error}", flush=True)
                 continue
@@ -48,12 +49,12 @@ def compare(drawn, this, that, ladder):
     """Ratio of the costs of two checkouts, other over this, at equal error."""
     end = drawn.program.duration
     kept = np.linspace(0, end, ROWS).tolist() if drawn.times is None else drawn.times
-    exact = this(drawn, ladder[-1] / SHARPER, [*np.ravel(_listed(kept, end)), *watched(drawn.program)])
+    exact = this(ladder[-1] / SHARPER, [*np.ravel(_listed(kept, end)), *watched(drawn.program)])
     points = {this: [], that: []}
     for i, tolerance in enumerate((ladder[0], *ladder)):  # the first is to warm up
         for run in (this, that) if i % 2 else (that, this):  # nobody is always first
-            ds = run(drawn, tolerance, kept)
-            cpu = min(ds.attrs["cpu"], run(drawn, tolerance, kept).attrs["cpu"]) if _is_short(ds) else ds.attrs["cpu"]
+            ds = run(tolerance, kept)
+            cpu = min(ds.attrs["cpu"], run(tolerance, kept).attrs["cpu"]) if _is_short(ds) else ds.attrs["cpu"]
             if i:
                 points[run].append((error(drawn, ds, exact), int(ds.convolutions.sum()), cpu))
     return {
@@ -144,7 +145,10 @@ def checkout(folder):
 
 
 def serve():
-    """Answer each case, tolerance and times on the standard input with a result, or with what went wrong."""
+    """Answer each seed, number of a case, tolerance and times on the standard input with a result, or what went wrong.
+
+    The case is drawn here: classes of one checkout are not those of another.
+    """
     import roughvisc
 
     results, sys.stdout = sys.stdout.buffer, sys.stderr
@@ -153,10 +157,10 @@ def serve():
     results.flush()
     with contextlib.suppress(EOFError):
         while True:
-            task = pickle.load(sys.stdin.buffer)
+            seed, number, tolerance, times = pickle.load(sys.stdin.buffer)
             try:
                 with limited(TIME_LIMIT):
-                    answer = timed(*task)
+                    answer = timed(case(seed, number), tolerance, times)
             except Exception as failure:
                 answer = f"{type(failure).__name__}: {failure}"
             pickle.dump(answer, results)
