@@ -12,6 +12,7 @@ os.environ["ROUGHVISC_TRANSFORMS"] = "scipy"
 
 from roughvisc.cli import main
 from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.study.execution import run as run_module
 
 
 @pytest.fixture
@@ -39,3 +40,16 @@ def invoke(tmp_path, monkeypatch):
         return done.exit_code, done.stdout, done.stderr
 
     return run
+
+
+@pytest.fixture
+def stubborn(monkeypatch):
+    """Every run ends with a kept time, the second, that did not converge."""
+    press = run_module.press
+
+    def one_missed(*args, **settings):
+        ds = press(*args, **settings)
+        ds["status"][1] = 1
+        return ds
+
+    monkeypatch.setattr(run_module, "press", one_missed)

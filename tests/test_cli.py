@@ -93,15 +93,7 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     assert status == 2
 
 
-def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, monkeypatch):
-    press = run_module.press
-
-    def stubborn(*args, **settings):
-        ds = press(*args, **settings)
-        ds["status"][1] = 1
-        return ds
-
-    monkeypatch.setattr(run_module, "press", stubborn)
+def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
     status, out, err = invoke("run", write_study(), "--no-plots")
     assert status == 1
     assert "1 of 3 kept times did not converge" in err

@@ -13,7 +13,7 @@ from support import direct, rough_gap
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.contact import coarse_guess, descent, iteration, solve_contact
+from roughvisc.mechanics.contact import descent, iteration, solve_contact, solver
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
@@ -132,7 +132,7 @@ def test_cold_start__is_guessed_on_a_coarser_grid_where_contact_is_sparse(bounda
     gap = rough_gap(shape)
     sparse, dense = 0.02 * gap.size, 3.0 * gap.size
     guessed = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
-    monkeypatch.setattr(coarse_guess, "_COARSE_FROM", 10**6)
+    monkeypatch.setattr(solver, "_COARSE_FROM", 10**6)
     cold = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
     assert np.mean(cold[0].pressure > 0) < 0.1 < 0.5 < np.mean(cold[1].pressure > 0)
     assert guessed[0].iterations < 0.8 * cold[0].iterations
@@ -503,7 +503,7 @@ def test_memory__is_that_of_a_few_fields(mean, fields):
 def test_first_guess__of_a_quarter_knows_its_mirror_images():
     x, y = (np.arange(512) - 255.5) / 512, (np.arange(544) - 271.5) / 512
     gap = x[:, None] ** 2 + y**2
-    surface = coarse_guess.coarse_guess(HalfSpace(gap.shape, (1.0, 1.0)), gap, 1.0)
-    quarter = coarse_guess.coarse_guess(HalfSpace((256, 272), (1.0, 1.0), mirrored=True), gap[256:, 272:], 0.25)
+    surface = solver.coarse_guess(HalfSpace(gap.shape, (1.0, 1.0)), gap, 1.0)
+    quarter = solver.coarse_guess(HalfSpace((256, 272), (1.0, 1.0), mirrored=True), gap[256:, 272:], 0.25)
     assert np.sum(quarter) == pytest.approx(0.25 * np.sum(surface), rel=0.05)
     assert np.abs(quarter - surface[256:, 272:]).sum() < 0.1 * quarter.sum()

@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact.coarse_guess import coarse_guess
 from roughvisc.mechanics.contact.iteration import solved
 from roughvisc.mechanics.contact.problem import Array, Problem
 from roughvisc.mechanics.contact.state import ContactState
 from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+# A cold start on so many cells a side is guessed on every so-many-eth cell, and taken from there if no more than this
+# part of them is in contact. Measured at 256 to 512 squared, 5 % in contact: 0.6 of the time; at 30 and 95 % the guess
+# saves no iteration, and costs 5 % of the time.
+_COARSE_FROM, _STRIDE, _SPARSE = 256, 8, 0.25
+# Tolerance of the guess: what the coarse grid leaves out is more. Measured at 256 squared, 4 % in contact:
+# 10 to 12 iterations follow with any from 0.001 to 0.3.
+_COARSE_TOLERANCE = 0.03
 
 
 def solve_contact(
@@ -76,3 +83,17 @@ def solve_contact(
         start, start_displacement = coarse_guess(halfspace, gap, load), None
     problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
     return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)
+
+
+def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
+    """First guess of the pressure under a load, constant over blocks of cells; None where that does not pay. [-]"""
+    if min(gap.shape) < _COARSE_FROM:
+        return None
+    few = np.array(gap[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE])
+    spacing = (_STRIDE * halfspace.spacing[0], _STRIDE * halfspace.spacing[1])
+    coarse = halfspace.on((few.shape[0], few.shape[1]), spacing)
+    found = solve_contact(coarse, few, load=load / _STRIDE**2, tolerance=_COARSE_TOLERANCE, overwrite=True).pressure
+    if np.count_nonzero(found) > _SPARSE * found.size:
+        return None
+    cells = [np.minimum(np.arange(n) // _STRIDE, m - 1) for n, m in zip(gap.shape, few.shape, strict=True)]
+    return found[np.ix_(*cells)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.exponentials import ActsOn, Modes, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import STIFF, ActsOn, Modes, stiff_ratio
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
 from roughvisc.mechanics.materials.protocol import check_creep, complete
@@ -165,6 +165,6 @@ def _direct_is_accurate(material: Material, duration: float) -> bool:
     if float(material.contact_compliance(0.0)) == 0:
         return False
     length = duration
-    while stiff_ratio(material, length) > 0.5 and length > 1e-12 * duration:
+    while stiff_ratio(material, length) > STIFF and length > 1e-12 * duration:
         length /= 2
     return math.isfinite(length) and length >= _SHORTEST_STEP * duration

@@ -23,6 +23,9 @@ from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_
 
 Array = NDArray[np.float64]
 
+#: Ratio of :func:`stiff_ratio` from which the damped rule is taken (docs/theory.md, "Step lengths").
+STIFF = 0.5
+
 #: How pressure is taken to run within a step. ``linear``: second order, exact for piecewise-linear pressure.
 #: ``bdf2``: second order, damps what relaxes within a step. ``euler``: its start. ``right``: constant, jumping at
 #: the start of the step.
@@ -249,7 +252,7 @@ def mean_compliance(material: Material, step: float) -> float:
 
 
 def stiff_ratio(material: Material, step: float) -> float:
-    """Weight of the old over the new pressure in a ``linear`` step; above a half it rings.
+    """Weight of the old over the new pressure in a ``linear`` step; above :data:`STIFF` it rings.
 
     ``C(h) / mean C - 1``: zero for an elastic material, one for a dashpot or a Kelvin-Voigt solid.
     """

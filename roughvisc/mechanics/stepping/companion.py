@@ -34,23 +34,6 @@ _STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
 # Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
 # where a cell has entered within the companion's step.
 _ENTERED = 0.3
-# The companion's contact is solved to so many times the tolerance of the march's.
-_SHARE = 2.5
-# Where steps double from one to the next, those of the companion grow fourfold.
-_GROWTH = 4.1
-_NO_FIELD = np.zeros((0, 0))
-#: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
-#: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
-STATED = 1.0
-#: The same of energies, from which a third of the difference is taken off; and of those of soft materials.
-_STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
-# Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
-# where a cell has entered within the companion's step.
-_ENTERED = 0.3
-# Steps are shortened where what is stated exceeds the first part of the tolerance and has grown by more than a factor
-# since it was last told, and lengthened again where it is below the second part. Their share stays between two limits.
-_MOST_USED, _LEAST_USED = 0.7, 0.3
-_GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
 
 
 def bare(state: State) -> State:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from roughvisc.mechanics.hereditary.exponentials import Rule
+from roughvisc.mechanics.hereditary.exponentials import STIFF, Rule
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trial
 
@@ -23,9 +23,6 @@ _STEPS_A_CYCLE = 16
 # The two-step rule is stable while steps grow by no more than 1 + sqrt(2) (E. Hairer, S. P. Norsett, G. Wanner, Solving
 # Ordinary Differential Equations I, section III.5).
 _GROWTH = 2.4
-# Compliance at the end of a step over its mean in it, less one, from which the damped rule is taken: pressure that is
-# linear in each step rings there (docs/theory.md, "Step lengths").
-_STIFF = 0.5
 # The next step errs by curvature h^2 / 6 by the linear rule, and by curvature h (h + last) / 3 by the damped one. It
 # aims at 0.7 of what is allowed: hence 0.7 times 6, and 0.7 times 12 in the quadratic equation for the damped rule.
 _LINEAR, _DAMPED = 4.2, 8.4
@@ -97,7 +94,7 @@ def shortest_step(scene: Scene, state: State, segment: Segment) -> float:
 def _longest_linear(scene: Scene, distance: float) -> float:
     """Longest step in which pressure taken as linear does not ring. [s]"""
     length = distance
-    while scene.stiff_ratio(length) > _STIFF and length > 1e-9 * distance:
+    while scene.stiff_ratio(length) > STIFF and length > 1e-9 * distance:
         length /= 2
     return length
 
@@ -131,7 +128,7 @@ def rule_for(scene: Scene, state: State, length: float, growth: float = _GROWTH)
         return "linear"
     if state.before is None:
         return "euler" if scene.is_soft(length) else "linear"
-    if scene.stiff_ratio(length) <= _STIFF:
+    if scene.stiff_ratio(length) <= STIFF:
         return "linear"
     # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
     return "bdf2" if length <= growth * (state.now.time - state.before.time) else "euler"
@@ -214,7 +211,7 @@ def suggestion(scene: Scene, trial: Trial, error: float, state: State) -> float:
     if math.isnan(error) or state.before is None:
         return trial.length
     most = 2.0
-    if error < _EASY * _allowed(scene, state) and scene.stiff_ratio(_FASTEST * trial.length) <= _STIFF:
+    if error < _EASY * _allowed(scene, state) and scene.stiff_ratio(_FASTEST * trial.length) <= STIFF:
         most = _FASTEST
     if error == 0:
         return most * trial.length
@@ -223,6 +220,6 @@ def suggestion(scene: Scene, trial: Trial, error: float, state: State) -> float:
     curvature = error / (constant * trial.length * (trial.length + last))
     target = _allowed(scene, state) / curvature
     length = min(math.sqrt(_LINEAR * target), most * trial.length, scene.program.duration)
-    if scene.stiff_ratio(length) > _STIFF:
+    if scene.stiff_ratio(length) > STIFF:
         length = 0.5 * (-trial.length + math.sqrt(trial.length**2 + _DAMPED * target))
     return max(min(length, most * trial.length), 0.2 * trial.length)

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.attempt import attempt, committed, step_of, trial_at_rest, with_cost
 from roughvisc.mechanics.stepping.companion import bare, beside, compared
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene, State, Step
-
-Array = NDArray[np.float64]
 
 
 def entering(scene: Scene, state: State) -> State:

@@ -16,7 +16,7 @@ from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
-from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
@@ -144,7 +144,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
 
 
 def _is_damped(scene: Scene, length: float) -> bool:
-    return "bdf2" in scene.memory.rules and scene.stiff_ratio(length) > 0.5
+    return "bdf2" in scene.memory.rules and scene.stiff_ratio(length) > STIFF
 
 
 class Stopwatch:

@@ -109,7 +109,7 @@ def plan(
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     marches, surfaces, problems = _marches(cases, stated, parameters)
-    stopwatch, choices = Stopwatch(), _Engines()
+    stopwatch, choices = Stopwatch(), _Choices()
     rows = []
     for number, case in enumerate(cases):
         like = _most_like(number, list(marches), parameters)
@@ -189,8 +189,8 @@ def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]
     return min(others, key=distance)
 
 
-class _Engines:
-    """Engines of distinct materials: fitting a series takes a while."""
+class _Choices:
+    """Memories of distinct materials: fitting a series takes a while."""
 
     def __init__(self) -> None:
         self._found: dict[str, Choice] = {}
@@ -209,7 +209,7 @@ def _row(
     found: March | None,
     marched: bool,
     problem: str,
-    choices: _Engines,
+    choices: _Choices,
     stopwatch: Stopwatch,
 ) -> dict[str, Any]:
     settings = case.solving()

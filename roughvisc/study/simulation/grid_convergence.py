@@ -20,7 +20,7 @@ ORDERS = {
     "mean_gap": (1.0, 2.0),
 }
 #: Roache's safety factors: with three grids, and with two.
-_THREE, _TWO = 1.25, 3.0
+_THREE, TWO_GRIDS = 1.25, 3.0
 
 
 def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -> Array:
@@ -53,7 +53,7 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.log(far / near) / math.log(ratio)
     order = np.where(np.isnan(seen), expected, np.clip(seen, lowest, expected))
-    factor = np.where(np.isnan(far), _TWO, _THREE)
+    factor = np.where(np.isnan(far), TWO_GRIDS, _THREE)
     # a missing near makes it missing, a missing far does not
     difference = np.maximum(near, np.where(np.isnan(far), 0.0, far) / ratio**expected)
     return np.asarray(factor * difference / (ratio**order - 1))

@@ -10,15 +10,13 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.study.simulation.coarser import pressure_distance
-from roughvisc.study.simulation.grid_convergence import grid_uncertainty
+from roughvisc.study.simulation.grid_convergence import TWO_GRIDS, grid_uncertainty
 from roughvisc.study.trade.bench import Bench, NotRun, Run
 from roughvisc.study.trade.exact import QUANTITIES, relative
 from roughvisc.study.trade.ladder import Setting
 
 #: The reference's tolerance is the sharpest measured one over this.
 _SHARPER = 5.0
-#: Safety factor of a difference between two runs (Roache's, with two grids).
-_SAFETY = 3.0
 
 
 class Finest:
@@ -136,4 +134,4 @@ def time_uncertainty(near: float, sharper: float) -> float:
 
     The error follows the tolerance, unevenly: the safety factor is 3.
     """
-    return _SAFETY * near / (sharper - 1)
+    return TWO_GRIDS * near / (sharper - 1)

@@ -283,9 +283,7 @@ def _study(dataset: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
         "program": program_words(case["program"]) if "program" in case else [],
         "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
         "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
-        "notes": [
-            str(dataset.attrs[key]) for key in ("material_note", "accuracy_note", "slope_note") if key in dataset.attrs
-        ],
+        "notes": [str(dataset.attrs[key]) for key in _NOTES if key in dataset.attrs],
         "history": str(dataset.attrs.get("history", "")).splitlines(),
         "toml": study_text(case) if case else "",
     }

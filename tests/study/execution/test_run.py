@@ -79,15 +79,7 @@ def test_run__writes_nothing_where_the_input_is_wrong(study):
     assert [p.name for p in study.parent.iterdir()] == ["ball.toml"]
 
 
-def test_run__keeps_what_did_not_converge_and_says_so(study, monkeypatch, caplog):
-    press = run_module.press
-
-    def stubborn(*args, **settings):
-        ds = press(*args, **settings)
-        ds["status"][1] = 1
-        return ds
-
-    monkeypatch.setattr(run_module, "press", stubborn)
+def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):
     with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
         run(study, progress=False)
     (path,) = (study.parent / "results" / "ball").iterdir()

@@ -300,17 +300,7 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
 
 
-def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, monkeypatch):
-    from roughvisc.study.execution import run as run_module
-
-    press = run_module.press
-
-    def stubborn(*args, **settings):
-        ds = press(*args, **settings)
-        ds["status"][1] = 1
-        return ds
-
-    monkeypatch.setattr(run_module, "press", stubborn)
+def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
     for _ in range(2):
         outcomes = run_cases(study()[:1], tmp_path / "out", watch=Silence(), workers=0)
         (outcome,) = outcomes.values()
