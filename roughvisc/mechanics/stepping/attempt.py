@@ -141,6 +141,7 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
         memory=memory,
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
+        largest_work=max(state.largest_work, abs(work)),
         contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
         work=work,
         energy=spent,

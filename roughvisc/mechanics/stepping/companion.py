@@ -29,8 +29,10 @@ _NO_FIELD = np.zeros((0, 0))
 #: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
 #: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
 STATED = 1.0
-#: The same of energies, from which a third of the difference is taken off; and of those of soft materials.
-_STATED_ENERGY, _STATED_SOFT = 0.5, 1.0
+# The same of a force that is not given, and of energies, from which a third of the difference is taken off.
+_STATED_FORCE, _STATED_ENERGY = 0.8, 0.5
+# The same where hardly any compliance is there at once: both marches then miss some part of each jump.
+_STATED_SOFT, _STATED_SOFT_ENERGY = 1.05, 1.2
 # Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
 # where a cell has entered within the companion's step.
 _ENTERED = 0.3
@@ -100,14 +102,16 @@ def difference(
     entered, soft = 0.0, scene.is_soft(scene.program.duration)
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(fine.pressure, where=earlier == 0))
-    share = _STATED_SOFT if soft else _STATED_ENERGY
+    stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
+    if soft:
+        stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
     unresolved = 0.0 if step.state.energy is None else step.state.energy.unresolved
     return Uncertainty(
-        pressure=STATED * area * float(np.sum(np.abs(fine.pressure - coarse.pressure))) + entered,
-        approach=STATED * abs(fine.approach - coarse.approach),
-        force=STATED * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
-        work=share * abs(step.state.work - companion.work) + unresolved,
-        dissipated=share * abs(lost - companion_lost) + unresolved,
+        pressure=stated * area * float(np.sum(np.abs(fine.pressure - coarse.pressure))) + entered,
+        approach=stated * abs(fine.approach - coarse.approach),
+        force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
+        work=energy * abs(step.state.work - companion.work) + unresolved,
+        dissipated=energy * abs(lost - companion_lost) + unresolved,
         inside=area * inside,
         outside=area * outside,
         stored_excess=(kept - companion_kept) / -3,

@@ -222,8 +222,8 @@ class State:
         Index of the segment of the program.
     began, start : float
         Time at which the segment began [s], and the value of what it controls then [N or m].
-    largest_force, largest_approach : float
-        So far. [N], [m]
+    largest_force, largest_approach, largest_work : float
+        So far. [N], [m], [J]
     contact_since : float
         Time at which the surfaces last came into contact. [s]
     work : float
@@ -253,6 +253,7 @@ class State:
     start: float = 0.0
     largest_force: float = 0.0
     largest_approach: float = 0.0
+    largest_work: float = 0.0
     contact_since: float = 0.0
     work: float = 0.0
     energy: Energy | None = None

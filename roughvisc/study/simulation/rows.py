@@ -23,12 +23,16 @@ from roughvisc.variables import STATUS_MEANINGS, annotate
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
 PERIMETER_CORRECTION = 0.088
 
-#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance: measured on rows whose
-#: other errors are small (workflows/benchmarks/accuracy.py).
-_INHERITED = 0.02
+#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
+#: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
+_INHERITED, _INHERITED_APPROACH = 0.02, 0.005
+#: The least that is stated of a pressure without a past, in units of the tolerance: measured there too.
+_LEAST = 0.015
 #: Part of the contact solver's error that is left in an energy, a sum over steps in which it has either sign: measured
 #: there too.
 _SUMMED = 0.5
+#: A row that states more than so many tolerances is none where every step is kept and the row is not asked for.
+_AT_MOST = 3.0
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -211,14 +215,17 @@ class Rows:
 def keeps_its_word(step: Step, series_error: float) -> bool:
     """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
 
-    Where hardly any compliance is there at once, pressure jumps in each cell that enters: nothing is promised of it,
-    and the short steps that lead over such a jump are no rows; nor, under given approach, are those in which a cell
-    has entered, since the force jumps with it.
+    Where hardly any compliance is there at once, pressure jumps in each cell that enters. Only the approach is
+    promised there to the tolerance, and the rest to :data:`_AT_MOST` of it. The short steps that lead over such a jump
+    are no rows; nor, under given approach, are those in which a cell has entered, since the force jumps with it.
     """
     scene, state = step.scene, step.state
     if scene.time_step is not None:
         return True
     found = stated(step, series_error, 0.0)
+    most = _AT_MOST * scene.tolerance
+    if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
+        return False
     if not scene.is_soft(scene.program.duration):
         return not found["stated_error"] > scene.tolerance
     since = state.now.time - state.began
@@ -256,14 +263,14 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
     """
     state, unknown, shown = step.state, step.uncertainty, step.shown
     largest_force, largest_approach = state.largest_force, state.largest_approach
-    solved = step.residual
-    if step.scene.remembers and largest_force > 0:
-        solved += _INHERITED * step.scene.tolerance
+    remembers, unit = step.scene.remembers, step.scene.tolerance if largest_force > 0 else 0.0
+    solved = step.residual + _INHERITED * unit if remembers else max(step.residual, _LEAST * unit)
     force = approach = 0.0
     if step.control == "approach" or not step.given:
         force = unknown.force + solved * shown.force + series_error * largest_force
     if step.control == "load" or not step.given:
         approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
+        approach += _INHERITED_APPROACH * unit * largest_approach if remembers else 0.0
     pressure = solved
     if largest_force > 0:
         pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
