@@ -7,7 +7,7 @@ and refuses a variable that is not declared or whose dimensions differ.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -142,10 +142,10 @@ VARIABLES: dict[str, Variable] = {
     "contact_area": Variable(
         _SERIES,
         "m2",
-        "real contact area",
-        "cells that carry pressure, counted",
+        "real contact area, counted",
+        "cells that carry pressure",
         ancillary=("contact_area_lower", "contact_area_upper"),
-        short="contact area",
+        short="contact area, counted",
     ),
     "contact_area_corrected": Variable(
         _SERIES,
@@ -331,6 +331,43 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
 
 
+#: What is known of every accepted step, also between the kept times.
+STEPPED = (
+    "force",
+    "approach",
+    "contact_area",
+    "contact_area_corrected",
+    "contact_fraction",
+    "mean_gap",
+    "work",
+    "stored_energy",
+    "dissipated_energy",
+    "stated_error",
+    "time_error",
+    "residual",
+    "force_error",
+    "approach_error",
+    "work_error",
+    "contact_area_lower",
+    "contact_area_upper",
+    "status",
+)
+
+
+def of_step(name: str) -> str:
+    """Name of a variable over the accepted steps."""
+    return f"step_{name}"
+
+
+def _over_steps(name: str) -> Variable:
+    """The same variable over the accepted steps."""
+    one = VARIABLES[name]
+    return replace(one, dims=("step",), ancillary=tuple(of_step(other) for other in one.ancillary if other in STEPPED))
+
+
+VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
+
+
 def annotate(dataset: xr.Dataset) -> xr.Dataset:
     """Dataset with the declared dtype and attributes on every variable.
 
@@ -357,8 +394,8 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         variable.attrs.update(declared.attributes())
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
-    if "status" in annotated:
-        annotated.variables["status"].attrs.update(
+    for name in {"status", of_step("status")} & set(annotated.variables):
+        annotated.variables[name].attrs.update(
             flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),
             flag_meanings=" ".join(STATUS_MEANINGS),
         )

@@ -17,7 +17,7 @@ from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
-from roughvisc.variables import STATUS_MEANINGS, annotate
+from roughvisc.variables import STATUS_MEANINGS, STEPPED, annotate, of_step
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 
 class Rows:
-    """Kept instants of one march, in order.
+    """Accepted steps of one march, in order: histories of all of them, fields of those that are kept.
 
     Where the march goes on in a window, or the grid may grow, a row keeps what was in contact and the effective
     pressure there, from which its fields over the final domain follow: nothing outside ever carried pressure.
@@ -70,10 +70,10 @@ class Rows:
         )
 
     def __len__(self) -> int:
-        return len(self._store.plain)
+        return len(self._kept())
 
-    def add(self, step: Step, converged: bool, wall_time: float) -> None:
-        """Take up an accepted step; ``converged``: all of those since the last row."""
+    def add(self, step: Step, converged: bool, wall_time: float, kept: bool = True) -> None:
+        """Take up an accepted step; ``converged``: all of those since the last one that is kept."""
         shown, window = step.shown, self._ground.window
         contact = shown.pressure > 0
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
@@ -84,11 +84,11 @@ class Rows:
             gap[contact] = 0.0
             mean_gap = float(np.nanmean(gap))
             fields = {"pressure": shown.pressure, "gap": gap, "displacement": step.displacement}
-            arrays = {name: fields[name] for name in self._settings.fields}
+            arrays = {name: fields[name] for name in self._settings.fields if kept}
         else:
             assert step.effective is not None, "a window asks for a memory of pressures"
             mean_gap = self._mean_gap(window, step.effective, step.level)
-        if step.scene.enlarge is not None and step.effective is not None:
+        if kept and step.scene.enlarge is not None and step.effective is not None:
             arrays |= {"source_pressure": shown.pressure, "source": step.effective}
         row = {
             "time": shown.time,
@@ -105,19 +105,26 @@ class Rows:
             "mean_gap": mean_gap,
         }
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
-        self._store.append({"row": row, "grid": grid}, _of_their_own(arrays))
+        self._store.append({"row": row, "grid": grid, "kept": kept}, _of_their_own(arrays))
+
+    def _kept(self) -> list[int]:
+        """Numbers of the steps that are kept."""
+        return [number for number, plain in enumerate(self._store.plain) if plain["kept"]]
 
     def dataset(self) -> xr.Dataset:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
-        height = self._ground.height
+        height, kept = self._ground.height, self._kept()
         rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
-        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        columns = {name: np.array([rows[number][name] for number in kept]) for name in rows[0]}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
+        if len(kept) < len(rows):
+            for name in ("time", *STEPPED):
+                variables[of_step(name)] = (("step",), np.array([row[name] for row in rows]))
         for name in self._settings.fields:
-            frames = self._store.stacked(partial(self._frame, name), (height.shape[0], height.shape[1]))
+            frames = self._store.stacked(partial(self._frame, name), kept, (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)
         highest = {"highest": self._ground.highest}
         variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
@@ -144,6 +151,9 @@ class Rows:
         row, grid = (self._store.plain[index][part] for part in ("row", "grid"))
         if tuple(grid["domain"]) == self._ground.window.domain:
             return {}
+        fraction = row["contact_area"] / self._area()
+        if not self._store.plain[index]["kept"]:  # its pressure is not known any more
+            return {"contact_fraction": fraction, "mean_gap": math.nan}
         source = self._store.arrays(index, "source")["source"]
         window = self._window(index)
         if self._ground.present.all():
@@ -152,7 +162,7 @@ class Rows:
             gap = np.empty(window.domain)
             self._fill("gap", index, window, gap)
             mean_gap = float(np.nanmean(gap))
-        return {"contact_fraction": row["contact_area"] / self._area(), "mean_gap": mean_gap}
+        return {"contact_fraction": fraction, "mean_gap": mean_gap}
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
         """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
@@ -234,6 +244,17 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     if step.control == "approach" and _entered(step):
         return False
     return not found["approach_error"] > scene.tolerance * state.largest_approach
+
+
+def tells_of_its_end(step: Step) -> bool:
+    """Whether pressure and force of an accepted step are those at its end.
+
+    Where hardly any compliance is there at once they belong to the whole step, unless it is kept: what is given, the
+    load or the approach, is right all the same.
+    """
+    state = step.state
+    since = state.began if state.before is None else state.before.time
+    return step.control == "load" or not step.scene.is_soft(state.now.time - since)
 
 
 def _entered(step: Step) -> bool:

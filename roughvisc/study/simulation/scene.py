@@ -24,6 +24,7 @@ from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.control import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
 from roughvisc.study.statement.settings import Missing, Settings
@@ -293,36 +294,3 @@ def shortest_age(program: Program, kept: Sequence[float] | None, tolerance: floa
     times = np.array(sorted(kept))
     after = [times[times > corner][:1] - corner for corner in program.corners]
     return float(min([*spans, *np.concatenate(after)])) * max(SERIES_SHARE * tolerance, SMALLEST_STEP)
-
-
-def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Times to keep, ascending, snapped to the program's corners. [s]
-
-    Parameters
-    ----------
-    program : Program
-        The loading program.
-    times : int, sequence of float or None
-        A count, evenly from 0+ to the end; a list; None for every accepted step.
-
-    Raises
-    ------
-    InputError
-        If a time lies outside the program.
-    """
-    if times is None:
-        return None
-    duration = program.duration
-    if isinstance(times, int):
-        listed = np.linspace(0, duration, times) if times > 1 else np.array([duration])
-    else:
-        listed = np.unique(np.asarray(times, dtype=float))
-    corners = np.array(program.corners)
-    kept = []
-    for value in listed:
-        nearest = float(corners[np.argmin(np.abs(corners - value))])
-        snapped = nearest if abs(nearest - value) <= 1e-12 * duration else float(value)
-        if not 0 <= snapped <= duration:
-            raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
-        kept.append(snapped)
-    return tuple(kept)

@@ -23,7 +23,7 @@ from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
 from roughvisc.study.simulation.notes import accuracy_note, left_out, slope_note
-from roughvisc.study.simulation.rows import Rows, keeps_its_word
+from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
 from roughvisc.study.simulation.scene import Ground, follows, prepare
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
@@ -74,8 +74,8 @@ def simulate(
     time_step : "auto" or float
         Steps chosen by the tolerance, or of a given length. [s]
     times : int or sequence of float, optional
-        Times to keep, stepped onto exactly: a count, evenly from 0+ to the end; a list; or None, all corners of the
-        program and every accepted step that keeps the tolerance. [s]
+        Times whose fields are kept, stepped onto exactly: a count, the corners of the program and the rest where the
+        result changes; a list; or None, all corners and every accepted step that keeps the tolerance. [s]
     fields : sequence of str
         Fields to keep, of ``pressure``, ``gap``, ``displacement``.
     method : {"fast", "seed"}
@@ -227,6 +227,9 @@ def _march(
         if step.shown.time in kept or (every and keeps_its_word(step, rows.series_error)):
             rows.add(step, reached.converged, reached.wall_time)
             reached = reached.kept()
+        elif not every and tells_of_its_end(step):
+            rows.add(step, step.converged, reached.wall_time, kept=False)
+            reached = reached.noted()
         report(step.shown.time, scene.program.duration)
         if keeper is not None and settings.method == "fast":
             keeper.passed(reached)

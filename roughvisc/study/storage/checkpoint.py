@@ -45,7 +45,7 @@ class Reached:
     converged : bool
         Whether all steps since the last kept row are.
     rows, growths : int
-        Rows kept, and how many times the grid has grown.
+        Rows written, those of steps that are not kept too, and how many times the grid has grown.
     wall_time : float
         Spent so far. [s]
     """
@@ -69,6 +69,10 @@ class Reached:
     def kept(self) -> Reached:
         """How far it has come when the step is kept as a row."""
         return replace(self, converged=True, rows=self.rows + 1)
+
+    def noted(self) -> Reached:
+        """How far it has come when the step leaves a row without fields."""
+        return replace(self, rows=self.rows + 1)
 
 
 def save_checkpoint(path: Path, reached: Reached, key: str) -> None:

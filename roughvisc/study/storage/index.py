@@ -25,9 +25,9 @@ log = logging.getLogger("roughvisc")
 
 INDEX = ".index.npz"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 1
-#: Histories over time, and the time itself.
-_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims == ("time",))
+_LAYOUT = 2
+#: Histories over the kept times, and over the accepted steps, with the times themselves.
+_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)))
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Entry:
     fields : dict
         dtype of each variable over x and y.
     histories : dict
-        Everything over time, ``time`` too.
+        Everything over the kept times, ``time`` too, and over the accepted steps.
     x, y : ndarray
         Positions of the cells. [m]
     """
@@ -161,8 +161,7 @@ def save_index(folder: Path, index: Index) -> None:
             "stamp": entry.stamp,
             "attributes": entry.attributes,
             "fields": entry.fields,
-            "histories": list(entry.histories),
-            "rows": entry.rows,
+            "histories": {name: len(values) for name, values in entry.histories.items()},
             "grid": grids.number(entry),
         }
         for entry in entries
@@ -212,9 +211,9 @@ def _entries(heads: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[An
     entries = []
     for head in heads:
         histories = {}
-        for name in head["histories"]:
-            histories[name] = arrays[name][at[name] : at[name] + head["rows"]]
-            at[name] += head["rows"]
+        for name, count in head["histories"].items():
+            histories[name] = arrays[name][at[name] : at[name] + count]
+            at[name] += count
         x, y = arrays[f"x{head['grid']}"], arrays[f"y{head['grid']}"]
         size, changed = head["stamp"]
         entries.append(Entry(head["file"], (size, changed), head["attributes"], head["fields"], histories, x, y))

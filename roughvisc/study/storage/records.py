@@ -132,8 +132,8 @@ class RowStore(Protocol):
         """Arrays of a row, those of these names at least."""
         ...
 
-    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Any:
-        """Array (time, x, y) of what ``frame`` gives for each row."""
+    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Any:
+        """Array (time, x, y) of what ``frame`` gives for each of some rows."""
         ...
 
 
@@ -153,10 +153,10 @@ class RowsInMemory:
         """Arrays of a row, those of these names at least."""
         return self._arrays[row]
 
-    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Array:
-        """All frames."""
-        frames = np.zeros((len(self.plain), *shape))  # memory that is never written to is never touched
-        for row, out in enumerate(frames):
+    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Array:
+        """The frames of some rows."""
+        frames = np.zeros((len(rows), *shape))  # memory that is never written to is never touched
+        for row, out in zip(rows, frames, strict=True):
             frame(row, out)
         return frames
 
@@ -212,11 +212,11 @@ class RowFile:
         self._stream.seek(self._begins[row])
         return read_record(self._stream, names)[1]
 
-    def stacked(self, frame: Frame, shape: tuple[int, int]) -> Any:
-        """All frames, read when they are asked for."""
+    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Any:
+        """The frames of some rows, read when they are asked for."""
         from xarray.core.indexing import LazilyIndexedArray
 
-        return LazilyIndexedArray(_frames((len(self.plain), *shape), frame))
+        return LazilyIndexedArray(_frames((len(rows), *shape), lambda number, out: frame(rows[number], out)))
 
     def sync(self) -> None:
         """Have all rows on the disk."""

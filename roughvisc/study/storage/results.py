@@ -154,7 +154,7 @@ def _column(values: Sequence[Any]) -> NDArray[Any]:
 def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
     first = entries[0]
     variables: dict[str, Any] = {
-        name: (("case", "time"), np.stack([entry.histories[name] for entry in entries]))
+        name: (("case", *VARIABLES[name].dims), _side_by_side([entry.histories[name] for entry in entries]))
         for name in first.histories
         if name != "time" and all(name in entry.histories for entry in entries)
     }
@@ -174,6 +174,17 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
         unit = unit_of(key, first.case) if values.dtype.kind in "if" else ""
         on_case[key] = ("case", values, {"long_name": key} | ({"units": unit} if unit else {}))
     return dataset.assign_coords(on_case)
+
+
+def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Histories over (case, time or step); NaN where a case took fewer steps than others, -1 for its status."""
+    if len({len(one) for one in histories}) == 1:
+        return np.stack(histories)
+    missing = np.nan if histories[0].dtype.kind == "f" else -1
+    table = np.full((len(histories), max(map(len, histories))), missing, histories[0].dtype)
+    for row, one in zip(table, histories, strict=True):
+        row[: len(one)] = one
+    return table
 
 
 def _attributes(entries: Sequence[Entry]) -> dict[str, Any]:

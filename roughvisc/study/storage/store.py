@@ -21,14 +21,12 @@ import numpy as np
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
-from roughvisc.variables import annotate
+from roughvisc.variables import annotate, of_step
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
-#: algorithm states no accuracy, the direct history no energies.
-MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) | {
+_MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) | {
     "stated_error",
     "time_error",
     "residual",
@@ -42,6 +40,10 @@ MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) |
     "contact_area_lower",
     "contact_area_upper",
 }
+#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
+#: algorithm states no accuracy, the direct history no energies; of steps between kept times the mean gap is not known
+#: over a grid that has grown since.
+MAY_BE_MISSING = _MAY_BE_MISSING | {of_step(name) for name in (*_MAY_BE_MISSING, "mean_gap")}
 #: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
 #: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
 #: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.

@@ -20,7 +20,7 @@ TARGETS = (1e-2, 1e-3)
 _ALIKE = 1.1
 #: What quantities are called in words; the area meant where none is named is the corrected one.
 WORDS = {
-    name: VARIABLES[name].short + (" as counted" if name == "contact_area" else "")
+    name: VARIABLES[name].short
     for name in ("contact_area_corrected", "pressure", "approach", "contact_area", "mean_gap")
 }
 

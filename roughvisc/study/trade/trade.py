@@ -14,7 +14,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.study.simulation.scene import kept_times
+from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import Bench, NotRun, Report
 from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form

@@ -37,9 +37,9 @@ from roughvisc.views.figures.fields import (
     present,
 )
 from roughvisc.views.figures.sections import cut_position, deformed_surface
-from roughvisc.views.observables import contact
+from roughvisc.views.observables import contact, history
 
-_HISTORIES = ("force", "approach", "contact_area")
+_HISTORIES = ("force", "approach", "contact_area_corrected")
 
 
 def _writer(path: Path, rate: float):
@@ -208,13 +208,13 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
 
 
 def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
-    axis, values = TimeAxis.of(dataset["time"]), dataset[name].values
-    times, unit = axis.unit(dataset["time"]), unit_for(values, VARIABLES[name].units)
-    shown = unit(values)
+    steps = history(dataset)
+    axis, unit = TimeAxis.of(steps["time"]), unit_for(steps[name].values, VARIABLES[name].units)
+    times, shown = axis.unit(steps["time"]), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
     (run,) = ax.plot([], [], color=BLUE, lw=1.4)
     (now,) = ax.plot([], [], "o", color=VERMILION, ms=5)
-    axis.apply(ax, dataset["time"])
+    axis.apply(ax, steps["time"])
     ax.minorticks_off()  # each costs time in every picture
     if not lowest:
         ax.set_xlabel("")
@@ -224,8 +224,10 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     ax.set_ylabel(unit.label(VARIABLES[name].label))
     ax.grid(color="0.9", lw=0.5)
 
+    reached = np.searchsorted(steps["time"].values, dataset["time"].values, side="right")
+
     def move(frame):
-        run.set_data(times[: frame + 1], shown[: frame + 1])
-        now.set_data(times[frame : frame + 1], shown[frame : frame + 1])
+        run.set_data(times[: reached[frame]], shown[: reached[frame]])
+        now.set_data(times[reached[frame] - 1 : reached[frame]], shown[reached[frame] - 1 : reached[frame]])
 
     return move

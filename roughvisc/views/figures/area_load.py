@@ -15,7 +15,9 @@ from roughvisc.errors import InputError
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
 from roughvisc.views.figures.histories import leave_room, marker_of
+from roughvisc.views.observables import history
 
+_AREA = "contact_area_corrected"
 #: Recipes of surfaces without roughness.
 _SMOOTH = ("sphere", "cone", "flat_punch", "wavy")
 
@@ -51,7 +53,7 @@ def _root_mean_square_slope(height: xr.DataArray) -> float:
 
 @styled
 def area_against_load(results, *, contact_modulus=None) -> Figure:
-    r"""Contact area against force, one line a case.
+    r"""Contact area, corrected for the grid, against force at every accepted step, one line a case.
 
     Parameters
     ----------
@@ -77,27 +79,26 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     """
     cases = _as_cases(results)
     for dataset in cases.values():
-        require(dataset, "time", "force", "contact_area")
-    across = unit_for(np.concatenate([one["force"].values for one in cases.values()]), "N")
-    up = unit_for(np.concatenate([one["contact_area"].values for one in cases.values()]), "m2")
+        require(dataset, "time", "force", _AREA)
+    steps = {label: history(dataset) for label, dataset in cases.items()}
+    loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
+    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m2")
     figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12))
     ax = figure.add_subplot()
-    for number, (label, dataset) in enumerate(cases.items()):
+    for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
         colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
-        x, y = across(dataset["force"]), up(dataset["contact_area"])
         style = {"color": colour, "marker": marker_of(len(x)), "ms": 2.5}
         ax.plot(x, y, label=label if len(cases) <= 12 else "_", **style)
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
     _draw_low_load_lines(ax, next(iter(cases.values())), moduli, across, up)
-    loads = np.sort(np.concatenate([one["force"].values for one in cases.values()]))
-    if spans_decades(loads):
-        spread_axis(ax.xaxis, across(loads))
-        spread_axis(ax.yaxis, up(np.concatenate([one["contact_area"].values for one in cases.values()])))
+    if spans_decades(np.sort(np.concatenate(loads))):
+        spread_axis(ax.xaxis, across(np.concatenate(loads)))
+        spread_axis(ax.yaxis, up(np.concatenate(areas)))
     else:
-        leave_room(ax, *(up(one["contact_area"]) for one in cases.values()))
+        leave_room(ax, *map(up, areas))
         ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
     ax.set_xlabel(across.label(VARIABLES["force"].label))
-    ax.set_ylabel(up.label(VARIABLES["contact_area"].label))
+    ax.set_ylabel(up.label(VARIABLES[_AREA].label))
     ax.grid(color="0.9", lw=0.5)
     if len(ax.get_legend_handles_labels()[1]) > 1:
         figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(cases) < 6 else 2)

@@ -281,7 +281,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     """Refuse a Dataset that is not one case's result, or lacks variables; say how to get them."""
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
-    extra = [dim for dim in dataset.dims if dim not in ("time", "x", "y")]
+    extra = [dim for dim in dataset.dims if dim not in ("time", "step", "x", "y")]
     if extra:
         raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
     for name in names:

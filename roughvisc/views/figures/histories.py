@@ -27,24 +27,25 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
+from roughvisc.views.observables import history as over_steps
 
 _PANELS = (
     ("force", BLUE),
     ("approach", VERMILION),
-    ("contact_area", GREEN),
+    ("contact_area_corrected", GREEN),
     ("mean_gap", PURPLE),
     ("work", ORANGE),
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
-    "contact_area": (("contact_area_corrected", "corrected for the grid", "k", (0, (4, 2))),),
+    "contact_area_corrected": (("contact_area", "counted", "k", (0, (4, 2))),),
     "work": (
         ("stored_energy", "stored", SKY, (0, (4, 2))),
         ("dissipated_energy", "dissipated", VERMILION, (0, (1, 1.5))),
     ),
 }
 #: The line that they stand beside.
-_ITSELF = {"contact_area": "counted", "work": "in all"}
+_ITSELF = {"contact_area_corrected": "corrected for the grid", "work": "in all"}
 #: What is stated of accuracy first, then its parts, and what comes on top.
 _ERRORS = (
     ("stated_error", "stated", "k", 1.6),
@@ -80,50 +81,49 @@ def leave_room(ax: Axes, *values: np.ndarray) -> None:
     ax.set_ylim(lowest - 0.05 * span, highest + 0.15 * span)
 
 
-def _draw_history(ax: Axes, dataset: xr.Dataset, name: str, colour: str) -> None:
-    axis = TimeAxis.of(dataset["time"])
-    times, values = axis.unit(dataset["time"]), dataset[name].values
+def _draw_history(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, steps: xr.Dataset, name: str, colour: str) -> None:
+    """A line through every accepted step, and a dot at each kept time."""
+    times, values = axis.unit(steps["time"]), steps[name].values
     unit = unit_for(values, VARIABLES[name].units)
-    marker = marker_of(len(times))
-    beside = [one for one in _BESIDE.get(name, ()) if one[0] in dataset and dataset[one[0]].notnull().any()]
-    ax.plot(times, unit(values), color=colour, marker=marker, label=_ITSELF[name] if beside else "_")
-    failed = failed_frames(dataset)
+    beside = [one for one in _BESIDE.get(name, ()) if one[0] in steps and steps[one[0]].notnull().any()]
+    ax.plot(times, unit(values), color=colour, label=_ITSELF[name] if beside else "_")
+    if marker := marker_of(dataset.sizes["time"]):
+        ax.plot(axis.unit(dataset["time"]), unit(dataset[name]), ls="", marker=marker, color=colour)
+    failed = failed_frames(steps)
     if failed.any():
         note = "not converged" if name == "force" else "_"
         ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5, label=note)
     for other, said, shade, dashes in beside:
-        ax.plot(times, unit(dataset[other]), color=shade, ls=dashes, lw=0.9, label=said)
-    leave_room(ax, *(unit(dataset[one]) for one in (name, *(one[0] for one in beside))))
+        ax.plot(times, unit(steps[other]), color=shade, ls=dashes, lw=0.9, label=said)
+    leave_room(ax, *(unit(steps[one]) for one in (name, *(one[0] for one in beside))))
     ax.set_ylabel(unit.label(VARIABLES[name].label))
 
 
-def _fraction_axis(ax: Axes, dataset: xr.Dataset) -> None:
+def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     """Contact fraction on the right of the panel of the area, where the two are proportional."""
-    if "contact_fraction" not in dataset:
+    if "contact_fraction" not in steps or "contact_area" not in steps:
         return
-    area = unit_for(dataset["contact_area"], "m2")(dataset["contact_area"])
+    area = unit_for(steps["contact_area_corrected"], "m2")(steps["contact_area"])  # what the fraction is counted by
     touching = area > 0
     if not touching.any():
         return
-    ratio = float((100 * dataset["contact_fraction"].values[touching] / area[touching]).mean())
+    ratio = float(np.nanmean(100 * steps["contact_fraction"].values[touching] / area[touching]))
     if math.isfinite(ratio) and ratio > 0:
         right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
         right.set_ylabel("of nominal [%]")
 
 
-def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
-    axis = TimeAxis.of(dataset["time"])
-    times = axis.unit(dataset["time"])
+def _draw_accuracy(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, steps: xr.Dataset) -> None:
     floor, ceiling = math.inf, 0.0
     for name, label, colour, width in _ERRORS:
-        if name not in dataset:
+        source = steps if name in steps else dataset
+        if name not in source:
             continue
-        values = dataset[name].values.astype(float)
+        times, values = axis.unit(source["time"]), source[name].values.astype(float)
         known = np.isfinite(values) & (values > 0)
         if known.any():
-            ax.plot(
-                times[known], values[known], color=colour, marker=marker_of(len(times)), ms=2.5, lw=width, label=label
-            )
+            style = {"marker": marker_of(dataset.sizes["time"]) if source is dataset else "", "ms": 2.5, "lw": width}
+            ax.plot(times[known], values[known], color=colour, label=label, **style)
             floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
     tolerance = dataset.attrs.get("tolerance")
     if tolerance:
@@ -143,9 +143,9 @@ def _draw_accuracy(ax: Axes, dataset: xr.Dataset) -> None:
     ax.set_ylabel("Rel. error")
 
 
-def _draw_cost(ax: Axes, dataset: xr.Dataset) -> None:
+def _draw_cost(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
     """What every kept time has cost since the one before it."""
-    times = TimeAxis.of(dataset["time"]).unit(dataset["time"])
+    times = axis.unit(dataset["time"])
     found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
     for values, label, colour in found:
         ax.plot(times, values, color=colour, marker=marker_of(len(times)), ms=2.5, lw=1, label=label)
@@ -160,11 +160,12 @@ def _draw_cost(ax: Axes, dataset: xr.Dataset) -> None:
 
 @styled
 def history(dataset: xr.Dataset) -> Figure:
-    """Force, approach, contact area, mean gap and work over time; cost and accuracy of every kept time below.
+    """Force, approach, contact area, mean gap and work at every accepted step; cost and accuracy below.
 
-    What the result does not hold is left out. The time axis is linear or logarithmic as the kept times suit. Steps
-    that did not converge are crossed out. Work is that of the force so far, in all and by where it went: stored in the
-    springs of the material, or dissipated. Accuracy is the stated error, its parts, and the tolerance as a line.
+    Kept times are dots, where these are few. What the result does not hold is left out. The time axis is linear or
+    logarithmic as the steps suit. Steps that did not converge are crossed out. Work is that of the force so far, in
+    all and by where it went: stored in the springs of the material, or dissipated. Accuracy is the stated error, its
+    parts, and the tolerance as a line.
 
     Parameters
     ----------
@@ -181,22 +182,23 @@ def history(dataset: xr.Dataset) -> Figure:
         If the Dataset is not one case's result, or holds none of the histories.
     """
     require(dataset, "time")
-    panels = [panel for panel in _PANELS if panel[0] in dataset]
+    steps = over_steps(dataset)
+    panels = [panel for panel in _PANELS if panel[0] in steps]
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)
         raise InputError(f"the result holds none of {names}: nothing to draw over time")
     costs = any(name in dataset for name, _, _ in _COSTS)
     figure, axes = _history_panels(len(panels) + costs)
+    axis = TimeAxis.of(steps["time"])
     for ax, (name, colour) in zip(axes, panels, strict=False):
-        _draw_history(ax, dataset, name, colour)
-        if name == "contact_area":
-            _fraction_axis(ax, dataset)
+        _draw_history(ax, axis, dataset, steps, name, colour)
+        if name == "contact_area_corrected":
+            _fraction_axis(ax, steps)
     if costs:
-        _draw_cost(axes[-2], dataset)
-    _draw_accuracy(axes[-1], dataset)
-    axis = TimeAxis.of(dataset["time"])
+        _draw_cost(axes[-2], axis, dataset)
+    _draw_accuracy(axes[-1], axis, dataset, steps)
     for ax in axes:
-        axis.apply(ax, dataset["time"])
+        axis.apply(ax, steps["time"])
         lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(ax.get_xlabel() if lowest else "")

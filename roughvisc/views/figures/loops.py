@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import BLUE, VERMILION, new_figure, require, styled, unit_for
 from roughvisc.views.figures.histories import failed_frames, leave_room, marker_of
+from roughvisc.views.observables import history
 from roughvisc.views.observables.cycles import cycle_energy, has_cycles
 
 
 @styled
 def hysteresis(dataset: xr.Dataset) -> Figure:
-    """Force against approach, the direction of time marked, and the work that the loop encloses.
+    """Force against approach at every accepted step, the direction of time marked, and the work done in all.
 
     Where the program has cycles, what is dissipated in the last one that closes is stated too.
 
@@ -29,24 +30,23 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     matplotlib.figure.Figure
     """
     require(dataset, "time", "force", "approach")
-    force, approach = dataset["force"].values, dataset["approach"].values
+    steps = history(dataset)
+    force, approach = steps["force"].values, steps["approach"].values
     across, up = unit_for(approach, "m"), unit_for(force, "N")
     x, y = across(approach), up(force)
-    work = np.concatenate([[0.0], np.cumsum(np.diff(approach) * (force[1:] + force[:-1]) / 2)])
-    energy = unit_for(work, "J")
     figure = new_figure(3.6, 3.0)
     ax = figure.add_subplot()
     ax.plot(x, y, color=BLUE, marker=marker_of(len(x)), ms=2)
     _draw_arrows(ax, x, y)
-    ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="first kept time")
+    ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="start")
     if len(x) > 1:
-        ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=f"last: {energy.text(work[-1])} of work done")
+        ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=_end(dataset))
     lost = cycle_energy(dataset)["cycle_dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
     if len(lost):
         energy = unit_for([float(lost[-1])], "J")
         label = f"cycle {int(lost['cycle'][-1])}: {energy.text(float(lost[-1]))} dissipated"
         ax.plot([], [], ls="", label=label)
-    failed = failed_frames(dataset)
+    failed = failed_frames(steps)
     if failed.any():
         ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
     ax.set_xlabel(across.label(VARIABLES["approach"].label))
@@ -55,6 +55,14 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     ax.grid(color="0.9", lw=0.5)
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2, handlelength=1.2)
     return figure
+
+
+def _end(dataset: xr.Dataset) -> str:
+    """What the last point is, with the work that the result states."""
+    if "work" not in dataset:
+        return "end"
+    work = float(dataset["work"][-1])
+    return f"end: {unit_for([work], 'J').text(work)} of work done"
 
 
 def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray, count: int = 5) -> None:

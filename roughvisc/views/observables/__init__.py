@@ -12,7 +12,7 @@ import xarray as xr
 
 from roughvisc.views.observables.cycles import cycle_energy
 from roughvisc.views.observables.densities import gap_distribution, gap_statistics, pressure_distribution
-from roughvisc.views.observables.response import area_growth, stiffness, work
+from roughvisc.views.observables.response import area_growth, history, stiffness, work
 from roughvisc.views.observables.spots import cluster_areas, clusters, contact, percolation
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "cycle_energy",
     "gap_distribution",
     "gap_statistics",
+    "history",
     "observe",
     "percolation",
     "pressure_distribution",

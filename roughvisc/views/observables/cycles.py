@@ -12,8 +12,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.variables import describe
 from roughvisc.views.observables.derived import need
+from roughvisc.views.observables.response import history
 
-#: Kept times in a cycle below which its loop is not known.
+#: Steps in a cycle below which its loop is not known.
 _FEWEST = 8
 
 
@@ -35,7 +36,7 @@ def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.
     Returns
     -------
     xarray.Dataset
-        Over ``cycle``, counted from 1, of the cycles that the kept times cover: ``cycle_start`` [s], ``cycle_work``
+        Over ``cycle``, counted from 1, of the cycles that the steps cover: ``cycle_start`` [s], ``cycle_work``
         [J], ``cycle_closure``, ``cycle_dissipated_energy`` [J].
 
     Raises
@@ -46,20 +47,21 @@ def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.
     Notes
     -----
     Of each cycle :math:`W = \oint F \, d\delta`: the change of the variable ``work``, which every accepted step
-    counts in, where both ends are kept times; else the trapezoidal integral over the kept times, of second order in
-    their distance, missing if they are fewer than 8. With the changes :math:`\Delta` between the ends and the ranges
+    counts in, where a step ends at both ends; else the trapezoidal integral over the steps, of second order in their
+    length, missing if they are fewer than 8. With the changes :math:`\Delta` between the ends and the ranges
     :math:`R` over the cycle, the closure is
     :math:`(|\Delta F| R_\delta + \max|F| \, |\Delta\delta|) / (R_F R_\delta)`.
     """
     need(dataset, "force", "approach")
     if dataset["force"].dims != ("time",):
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
-    times = dataset["time"].values
+    steps = history(dataset)
+    times = steps["time"].values
     spans = _cycles(_program_of(dataset) if program is None else program)
     if not spans:
         raise InputError("the program has no whole cycle: expected Program.cycle in it, or cycle in the study")
     covered = [span for span in spans if times[0] <= span[0] + _slack(span) and span[1] <= times[-1] + _slack(span)]
-    rows = np.array([_measure(dataset, *span) for span in covered]).reshape(-1, 2)
+    rows = np.array([_measure(steps, *span) for span in covered]).reshape(-1, 2)
     work, closure = rows.T
     found = {
         "cycle_start": ("cycle", np.array([start for start, _ in covered])),

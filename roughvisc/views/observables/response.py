@@ -1,12 +1,46 @@
-"""Observables of histories: growth of the area, stiffness, work."""
+"""Observables of histories: every accepted step, growth of the area, stiffness, work."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
 
-from roughvisc.variables import describe
+from roughvisc.errors import InputError
+from roughvisc.variables import STEPPED, describe, of_step
 from roughvisc.views.observables.derived import along_time, need
+
+
+def history(dataset: xr.Dataset) -> xr.Dataset:
+    """Histories of every accepted step, under the names of those at the kept times.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    xarray.Dataset
+        Force, approach, area, mean gap, work, energies and stated errors over ``time``, which holds every accepted
+        step. Of a result that holds the kept times alone, and of one that keeps every step: these.
+
+    Raises
+    ------
+    InputError
+        If the Dataset holds many cases.
+    """
+    need(dataset, "time")
+    if "time" not in dataset.dims or "case" in dataset.dims:
+        raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
+    names = [name for name in STEPPED if name in dataset]
+    if of_step("time") not in dataset:
+        return dataset[names]
+    steps = dataset[[of_step(name) for name in names if of_step(name) in dataset]]
+    steps = steps.assign_coords(time=("step", dataset[of_step("time")].values)).drop_vars(
+        of_step("time"), errors="ignore"
+    )
+    steps = steps.isel(step=np.isfinite(steps["time"].values)).swap_dims(step="time")
+    return describe(steps.rename({name: str(name).removeprefix(of_step("")) for name in steps.data_vars}))
 
 
 def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
 from roughvisc.views.figures.fields import colour_map, plane_ratio, plane_unit, present
 from roughvisc.views.figures.sections import cut_position, deformed_surface
-from roughvisc.views.observables import contact
+from roughvisc.views.observables import contact, history
 
 #: Frames a case and cells along the longer side of a map, the richest first.
 _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64), (2, 48))
@@ -236,21 +236,23 @@ def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
 
 
 def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
-    """Histories as lines in a unit of their own, and where each frame lies on them."""
-    charts = []
-    for name in ("force", "approach", "contact_area"):
-        if name in dataset:
+    """Histories of every step as lines in a unit of their own, and where each frame lies on them."""
+    charts, steps = [], history(dataset)
+    places = np.searchsorted(steps["time"].values, dataset["time"].values[chosen], side="right") - 1
+    for name in ("force", "approach", "contact_area_corrected"):
+        if name in steps:
             label = VARIABLES[name].label
-            values = dataset[name].values.astype(float)
+            values = steps[name].values.astype(float)
             unit = unit_for(values, VARIABLES[name].units)
-            charts.append(_chart(dataset, unit.label(label), {label: unit(values)}, chosen))
+            charts.append(_chart(steps, unit.label(label), {label: unit(values)}, places.tolist()))
     errors = {
-        label: dataset[name].values.astype(float)
+        label: steps[name].values.astype(float)
         for name, label in _ERRORS.items()
-        if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
+        if name in steps and np.nanmax(steps[name].values, initial=0.0) > 0
     }
     if errors:
-        charts.append(_chart(dataset, "Relative error", errors, chosen, dataset.attrs.get("tolerance")))
+        tolerance = dataset.attrs.get("tolerance")
+        charts.append(_chart(steps, "Relative error", errors, places.tolist(), tolerance))
     return charts
 
 
@@ -331,14 +333,8 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
     one = dataset.isel(time=frame)
     time = float(one["time"])
     rows = [
-        (VARIABLES[name].label + apart, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
-        for name, apart in (
-            ("force", ""),
-            ("approach", ""),
-            ("contact_area", ", counted"),
-            ("contact_area_corrected", ", corrected"),
-            ("mean_gap", ""),
-        )
+        (VARIABLES[name].label, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
+        for name in ("force", "approach", "contact_area_corrected", "contact_area", "mean_gap", "work")
         if name in dataset
     ]
     if "contact_fraction" in dataset:

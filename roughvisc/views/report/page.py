@@ -188,8 +188,7 @@ def _common_title(rows: list[dict[str, Any]]) -> str:
 
 def _histories(dataset: xr.Dataset) -> xr.Dataset:
     """What the figure of all cases needs, in memory."""
-    names = [name for name in ("force", "contact_area") if name in dataset]
-    return dataset[names].load()
+    return dataset[[name for name in dataset.data_vars if dataset[name].dims in (("time",), ("step",))]].load()
 
 
 def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.views.figures.axes import TimeAxis, new_figure, styled
+from roughvisc.views.observables import history
 from roughvisc.views.sweep_figures.cases import Parameter, cases_of, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
 
@@ -17,8 +19,8 @@ _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
 
 
 @styled
-def histories_of_cases(results: Any, quantity: str = "contact_area", *, by: str | None = None) -> Figure:
-    """A history of every case over time, coloured by what was varied.
+def histories_of_cases(results: Any, quantity: str = "contact_area_corrected", *, by: str | None = None) -> Figure:
+    """A history of every case over time, coloured by what was varied; a dot for each kept time, where these are few.
 
     Up to eight values have a legend, more a colour bar. A second parameter of up to four values has line styles.
 
@@ -27,7 +29,7 @@ def histories_of_cases(results: Any, quantity: str = "contact_area", *, by: str 
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree the times may differ.
     quantity : str
-        A history of every case, such as ``"contact_area"`` or ``"approach"``.
+        A history of every case, such as ``"contact_area_corrected"`` or ``"approach"``.
     by : str, optional
         Dotted key of the parameter that colours the lines; by default the one with the most numbers.
 
@@ -46,19 +48,20 @@ def histories_of_cases(results: Any, quantity: str = "contact_area", *, by: str 
     first = cases.parameter(by) if by else ordered[0] if ordered else _numbered(len(cases.members))
     second = next((one for one in ordered if one is not first and len(one.levels) <= len(_DASHES)), None)
     colouring = Colouring(first)
-    times = np.unique(np.concatenate([member["time"].values for member in cases.members]))
+    lines = [_line(member, quantity) for member in cases.members]
+    times = np.unique(np.concatenate([line["time"].values for line in lines]))
     axis = TimeAxis.of(times)
-    unit = quantity_unit(cases, quantity, np.concatenate([member[quantity].values for member in cases.members]))
+    unit = quantity_unit(cases, quantity, np.concatenate([line.values for line in lines]))
     handles = colouring.handles() + _styles(second)
     figure = new_figure(4.6, 3.1 + 0.07 * len(handles))
     ax = figure.add_subplot()
     places = first.places
     dashes = second.places if second is not None else np.zeros(len(places), dtype=int)
-    for member, level, dash in zip(cases.members, places, dashes, strict=True):
-        few = len(cases.members) <= 8 and member.sizes["time"] <= 40 and second is None
-        style = {"marker": "o" if few else "", "ms": 2.5, "lw": 1.2 if len(cases.members) <= 30 else 0.8}
-        shown = unit(member[quantity])
-        ax.plot(axis.unit(member["time"]), shown, ls=_DASHES[dash], color=colouring.colour(int(level)), **style)
+    for member, line, level, dash in zip(cases.members, lines, places, dashes, strict=True):
+        style = {"color": colouring.colour(int(level)), "lw": 1.2 if len(cases.members) <= 30 else 0.8}
+        ax.plot(axis.unit(line["time"]), unit(line), ls=_DASHES[dash], **style)
+        if len(cases.members) <= 8 and member.sizes["time"] <= 40 and second is None:
+            ax.plot(axis.unit(member["time"]), unit(member[quantity]), "o", ms=2.5, color=style["color"])
     axis.apply(ax, times)
     _limits(ax)
     ax.set_ylabel(label_of(cases, quantity, unit))
@@ -70,6 +73,12 @@ def histories_of_cases(results: Any, quantity: str = "contact_area", *, by: str 
         legend.set_title(", ".join(names) if colouring.few else names[-1], prop={"size": 7.5})
     colouring.draw_bar(figure, ax)
     return figure
+
+
+def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
+    """A quantity over every accepted step, or over the kept times if it is known at these alone."""
+    steps = history(member)
+    return steps[quantity] if quantity in steps else member[quantity]
 
 
 def _numbered(count: int) -> Parameter:

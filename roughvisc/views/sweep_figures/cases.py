@@ -115,7 +115,7 @@ class Cases:
     Parameters
     ----------
     members : list of xarray.Dataset
-        Histories of each case over its own times.
+        Histories of each case over its own times, and over its steps.
     parameters : list of Parameter
         What was varied, but what says the same as one before it.
     """
@@ -164,7 +164,7 @@ def cases_of(results: Any) -> Cases:
         columns = {name: found for name, found in columns.items() if len(found) == len(members)}
         parameters = {name: (np.array([one.item() for one in found]), found[0]) for name, found in columns.items()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
-        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time"}]
+        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "step"}]
         table = results[held].load()
         members = [table.isel(case=i) for i in range(results.sizes["case"])]
         on_case = [str(name) for name in results.coords if results[name].dims == ("case",)]
@@ -184,8 +184,9 @@ def cases_of(results: Any) -> Cases:
 
 
 def _histories(dataset: xr.Dataset) -> xr.Dataset:
-    """What a case has over time, in memory."""
-    return dataset[[name for name in dataset.data_vars if dataset[name].dims == ("time",)]].load()
+    """What a case has over time and over its steps, in memory."""
+    held = [name for name in dataset.data_vars if dataset[name].dims in (("time",), ("step",))]
+    return dataset[held].load()
 
 
 def middle_of_decades(values: np.ndarray) -> np.ndarray:

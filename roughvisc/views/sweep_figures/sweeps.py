@@ -34,7 +34,7 @@ _MOST_PANELS = 6
 @styled
 def sweep(
     results: Any,
-    quantity: str = "contact_area",
+    quantity: str = "contact_area_corrected",
     *,
     times: float | Sequence[float] | None = None,
     along: str | Sequence[str] | None = None,
@@ -50,7 +50,7 @@ def sweep(
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
     quantity : str
-        A history of every case, such as ``"contact_area"``, ``"approach"`` or ``"wall_time"``.
+        A history of every case, such as ``"contact_area_corrected"``, ``"approach"`` or ``"wall_time"``.
     times : float or sequence of float, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
         by default up to four, a line each; else by default the last. Where several were, a panel each. [s]

@@ -13,7 +13,7 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.mechanics.halfspace import operator as halfspace
 from roughvisc.study.simulation import scene
-from roughvisc.study.simulation.scene import kept_times
+from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.storage.records import RowsInMemory
 from roughvisc.variables import FIELDS, VARIABLES, annotate
 
@@ -154,7 +154,8 @@ def test_seed_method__gives_the_same_dataset():
 
 
 @pytest.mark.parametrize(
-    ("times", "expected"), [(None, None), (1, (2.0,)), (3, (0.0, 1.0, 2.0)), ([0.5 + 1e-14, 2.0], (0.5, 2.0))]
+    ("times", "expected"),
+    [(None, None), (1, (2.0,)), (3, (0.0, 0.5, 2.0)), (2, (0.0, 2.0)), ([0.5 + 1e-14, 2.0], (0.5, 2.0))],
 )
 def test_kept_times__are_counted_listed_or_snapped(times, expected):
     assert kept_times(rv.Program().load(1.0, over=0.5).hold(1.5), times) == expected
