@@ -33,6 +33,8 @@ _LEAST = 0.015
 _SUMMED = 0.5
 #: A row that states more than so many tolerances is none where every step is kept and the row is not asked for.
 _AT_MOST = 3.0
+#: Error of a pressure at the edge of contact, over the mean one.
+_SOLVER_AT_EDGE = 3.0
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -94,7 +96,7 @@ class Rows:
             "time": shown.time,
             "force": shown.force,
             "approach": shown.approach,
-            **stated(step, self.series_error, touching),
+            **stated(step, self.series_error, touching, solver_in_doubt(step, contact)),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
             "status": self._status(step, converged, contact),
@@ -263,7 +265,27 @@ def _entered(step: Step) -> bool:
     return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))
 
 
-def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
+def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
+    """Area in contact and area out of it that the contact solver's error may put on the other side. [m2]
+
+    Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
+    """
+    shown, scene = step.shown, step.scene
+    if not contact.any() or not step.residual > 0:
+        return 0.0, 0.0
+    since = step.state.began if step.state.before is None else step.state.before.time
+    pressure = _SOLVER_AT_EDGE * step.residual * float(np.mean(shown.pressure, where=contact))
+    closed = pressure * scene.halfspace.self_influence * scene.compliance(step.state.now.time - since)
+    inside = np.count_nonzero(shown.pressure[contact] <= pressure)
+    outside = ~contact & (scene.gap + step.displacement - step.level <= closed)
+    if scene.present is not None:
+        outside &= scene.present
+    return scene.halfspace.cell_area * inside, scene.halfspace.cell_area * float(np.count_nonzero(outside))
+
+
+def stated(
+    step: Step, series_error: float, area: float, in_doubt: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, float]:
     """Work and energies of a step, and what is stated of its accuracy.
 
     Parameters
@@ -274,6 +296,8 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
         Relative error of the series that stands for the material.
     area : float
         Counted contact area. [m2]
+    in_doubt : pair of float
+        Area in contact and out of it that the contact solver leaves in doubt. [m2]
 
     Notes
     -----
@@ -314,8 +338,8 @@ def stated(step: Step, series_error: float, area: float) -> dict[str, float]:
         "approach_error": approach,
         "work_error": unknown.work + carried * abs(step.work),
         "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
-        "contact_area_lower": max(area - unknown.inside, 0.0),
-        "contact_area_upper": area + unknown.outside,
+        "contact_area_lower": max(area - unknown.inside - in_doubt[0], 0.0),
+        "contact_area_upper": area + unknown.outside + in_doubt[1],
     }
 
 
