@@ -49,8 +49,7 @@ def scan(
     from rich.console import Console
 
     from roughvisc.study.storage.store import whole_file
-    from roughvisc.topography.bandwidth import level
-    from roughvisc.topography.parameters import parameters
+    from roughvisc.topography.parameters import levelled_parameters
     from roughvisc.topography.readers import list_channels
     from roughvisc.topography.scans import open_scan
     from roughvisc.topography.writers import card_text, known_suffix, save_scan
@@ -73,7 +72,7 @@ def scan(
         if out.exists() and (out == card or out.samefile(file)):
             raise InputError(f"{out}: exists already, and is not written over: expected another name")
     console = Console()
-    console.print(scan_table(height, parameters(level(height)), file.name, channels))
+    console.print(scan_table(height, levelled_parameters(height), file.name, channels))
     draw(surface(height), picture)
     say(console, "Picture", picture)
     if to:

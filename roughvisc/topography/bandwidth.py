@@ -55,6 +55,14 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     return heights
 
 
+def off_plane(h: xr.DataArray) -> xr.DataArray:
+    """Height less its mean plane; less its mean where the points present determine no plane. [m]"""
+    try:
+        return like(h, less_polynomial(h.values, 1))
+    except InputError:
+        return like(h, less_polynomial(h.values, 0))
+
+
 def gaussian_filter(
     h: xr.DataArray, cutoff: float, keep: Literal["long", "short"] = "long", periodic: bool = False
 ) -> xr.DataArray:

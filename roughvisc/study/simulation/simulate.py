@@ -236,7 +236,7 @@ def _march(
 def _slope_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
     """What to say of a surface that is too steep where it was loaded, in the log too."""
     deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
-    note = slope_note(ground.domain[ground.window.cells], settings.boundary, deepest)
+    note = slope_note(ground.height[ground.window.surface_cells], settings.boundary, deepest)
     if note:
         log.warning("%s", note)
     return note

@@ -16,8 +16,9 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.treatment import Treatment, measures, treatment
+from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.fields import draw_map, plane_unit
@@ -296,8 +297,8 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
     """One surface: its figures, what conditioning did, and its parameters before and after."""
     found = treatment(dataset)
     unchanged = found.before is not None and _alike(found.before, found.after)
-    after = measures(found.after)
-    before = measures(found.before) if found.before is not None and not unchanged else None
+    after = levelled_parameters(found.after)
+    before = levelled_parameters(found.before) if found.before is not None and not unchanged else None
     rows = []
     for name in _PARAMETERS:
         attrs = after[name].attrs
