@@ -24,7 +24,7 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
-from roughvisc.views.figures.fields import draw_map, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
@@ -68,11 +68,7 @@ def surface(height: xr.DataArray) -> Figure:
     flat = plane_ratio(height) < 0.4
     bar = figure.colorbar(image, ax=on_map, location="top" if flat else "right", pad=0.02, aspect=50 if flat else 20)
     bar.set_label(unit.label(VARIABLES["height"].label))
-    on_map.set_xlabel(plane.label("x"))
-    on_map.set_ylabel(plane.label("y"))
-    on_map.tick_params(direction="out")
-    on_map.locator_params(axis="x", nbins=5)
-    on_map.locator_params(axis="y", nbins=2 if flat else 5)
+    label_plane(on_map, height, plane)
     missing = float(height.isnull().mean())
     if missing:
         figure.suptitle(f"{100 * missing:.2g} % of the points are missing (grey)", fontsize=8.5)

@@ -21,7 +21,7 @@ from roughvisc.study.storage.store import no_results, open_result, result_files,
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
-from roughvisc.views.figures.fields import draw_map, plane_unit
+from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
 from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures.case_text import material_words, program_words, readable_setting, study_text
@@ -343,8 +343,7 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
         low, high = unit(height.quantile([0.005, 0.995]).values)
         image = draw_map(ax, height, unit, plane, vmin=low, vmax=high if high > low else low + 1)
         figure.colorbar(image, ax=ax, aspect=18, pad=0.02, shrink=0.8, extend="both").set_label(unit.label("Height"))
-        ax.set_xlabel(plane.label("x"))
-        ax.set_ylabel(plane.label("y"))
+        label_plane(ax, height, plane)
         ax.tick_params(direction="out")
         missing = int(height.isnull().sum())
         ax.set_title(title + (f": {missing} points missing (grey)" if missing else ""))
