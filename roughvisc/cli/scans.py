@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.output import draw, say
+from roughvisc.cli.group import draw, say
 from roughvisc.errors import InputError
 
 
