@@ -32,17 +32,6 @@ def say(console: Console, what: str, path: Path) -> None:
     console.print(f"{what}: {path if shown.startswith('..') else shown}", soft_wrap=True, highlight=False)
 
 
-def draw(figure: Any, path: Path) -> None:
-    """Write a figure to a file of the kind that its suffix names, whole or not at all."""
-    from roughvisc.study.storage.store import whole_file
-
-    kind = path.suffix.lstrip(".") or "png"
-    if kind not in figure.canvas.get_supported_filetypes():
-        raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=200)
-
-
 class Commands(click.Group):
     """Errors made on purpose end in one message and an exit status, never in a traceback."""
 

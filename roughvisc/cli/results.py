@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from roughvisc.cli.group import Failure, draw, say
+from roughvisc.cli.group import Failure, say
 
 
 @click.command()
@@ -27,7 +27,7 @@ def plot(result: Path, out: Path | None) -> None:
     from roughvisc.study.storage.store import no_results, open_result, result_files
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import results_of
+    from roughvisc.views.sweep_figures.files import results_of, write_figure
 
     paths = result_files(result) if result.is_dir() else [result]
     if not paths:
@@ -35,8 +35,8 @@ def plot(result: Path, out: Path | None) -> None:
     console = Console()
     for path in paths:
         if path.is_file() and is_trade(path):
-            draw(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png")
-            say(console, "Figure", (out or path.parent) / f"{path.stem}.png")
+            picture = (out or path.parent) / f"{path.stem}.png"
+            say(console, "Figure", write_figure(trade(open_trade(path)), picture))
             continue
         with open_result(path) as dataset:
             for figure in save_figures(dataset, out or path.parent, path.stem):

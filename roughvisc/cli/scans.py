@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.group import draw, say
+from roughvisc.cli.group import say
 from roughvisc.errors import InputError
 
 
@@ -55,6 +55,7 @@ def scan(
     from roughvisc.topography.writers import card_text, known_suffix, save_scan
     from roughvisc.views.console.tables import scan_table
     from roughvisc.views.plot import surface
+    from roughvisc.views.sweep_figures.files import write_figure
 
     options = {
         "format": format,
@@ -73,8 +74,7 @@ def scan(
             raise InputError(f"{out}: exists already, and is not written over: expected another name")
     console = Console()
     console.print(scan_table(height, levelled_parameters(height), file.name, channels))
-    draw(surface(height), picture)
-    say(console, "Picture", picture)
+    say(console, "Picture", write_figure(surface(height), picture))
     if to:
         with whole_file(to) as temporary:
             save_scan(height, temporary)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure, draw, say
+from roughvisc.cli.group import Failure, say
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -199,6 +199,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.plot import trade as figure
+    from roughvisc.views.sweep_figures.files import write_figure
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
@@ -210,8 +211,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
         dataset = measured(case, budget=time, progress=report)
     console.print(trade_table(dataset))
     say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
-    draw(figure(dataset), folder / "trade.png")
-    say(console, "Figure", folder / "trade.png")
+    say(console, "Figure", write_figure(figure(dataset), folder / "trade.png"))
     if part is not None:
         index = recommend.cheapest(dataset, quantity, part)
         if index is None:
