@@ -19,7 +19,8 @@ _PUBLIC = {
         "roughvisc.topography.conditioning": (
             "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror"
         ),
-        "roughvisc.topography.parameters": "parameters psd",
+        "roughvisc.topography.parameters": "parameters",
+        "roughvisc.topography.spectrum": "psd",
         "roughvisc.topography.fitting": "fit_self_affine",
         "roughvisc.topography.writers": "save_scan",
         "roughvisc.topography.synthesis": "sphere cone flat_punch wavy self_affine",

@@ -5,8 +5,7 @@ are made inside the commands, so that ``--help`` is quick.
 """
 
 from roughvisc.cli.group import main
-from roughvisc.cli.machine import validate
-from roughvisc.cli.results import plot, report
+from roughvisc.cli.results import plot, report, validate
 from roughvisc.cli.scans import scan
 from roughvisc.cli.studies import plan, run, trade
 

@@ -1,13 +1,18 @@
-"""The group of commands, and how a command fails: one message and an exit status."""
+"""The group of commands, what they put out, and how they fail: one message and an exit status."""
 
 from __future__ import annotations
 
 import errno
-from typing import Any
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from roughvisc.errors import InputError, RoughviscError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class Failure(click.ClickException):
@@ -19,6 +24,12 @@ class Failure(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         click.echo(f"roughvisc: {self.message}", err=True)
+
+
+def say(console: Console, what: str, path: Path) -> None:
+    """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
+    shown = os.path.relpath(path)
+    console.print(f"{what}: {path if shown.startswith('..') else shown}", soft_wrap=True, highlight=False)
 
 
 class Commands(click.Group):

@@ -1,4 +1,4 @@
-"""Commands on results: ``plot``, ``report``."""
+"""Commands on results, ``plot`` and ``report``, and on this machine, ``validate``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from roughvisc.cli.output import draw, say
+from roughvisc.cli.group import Failure, say
 
 
 @click.command()
@@ -27,7 +27,7 @@ def plot(result: Path, out: Path | None) -> None:
     from roughvisc.study.storage.store import no_results, open_result, result_files
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import results_of
+    from roughvisc.views.sweep_figures.files import results_of, write_figure
 
     paths = result_files(result) if result.is_dir() else [result]
     if not paths:
@@ -35,8 +35,8 @@ def plot(result: Path, out: Path | None) -> None:
     console = Console()
     for path in paths:
         if path.is_file() and is_trade(path):
-            draw(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png")
-            say(console, "Figure", (out or path.parent) / f"{path.stem}.png")
+            picture = (out or path.parent) / f"{path.stem}.png"
+            say(console, "Figure", write_figure(trade(open_trade(path)), picture))
             continue
         with open_result(path) as dataset:
             for figure in save_figures(dataset, out or path.parent, path.stem):
@@ -64,3 +64,29 @@ def report(results: Path, output: Path | None) -> None:
     from roughvisc.views.report.page import report as write
 
     say(Console(), "Report", write(results, output))
+
+
+@click.command()
+@click.option("--cells", type=click.IntRange(33), default=129, show_default=True, help="Cells along the grids' sides.")
+def validate(cells: int) -> None:
+    """Hold the solver on this machine against analytic solutions.
+
+    Takes less than a minute on most machines. The errors to expect follow from the grid and the tolerance; the exit
+    status is 1 if any is larger.
+
+    \b
+    Example:
+      roughvisc validate --cells 65
+    """
+    from rich.console import Console
+
+    from roughvisc.study.validation.validate import validate as validated
+    from roughvisc.views.console.tables import print_validation
+
+    console = Console()
+    with console.status("validating") as status:
+        found = validated(cells, progress=lambda done, of: status.update(f"validating: {done} of {of} cases done"))
+    print_validation(console, found)
+    failed = sum(not one.passed for one in found)
+    if failed:
+        raise Failure(f"{failed} of {len(found)} comparisons failed", 1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.output import draw, say
+from roughvisc.cli.group import say
 from roughvisc.errors import InputError
 
 
@@ -49,13 +49,13 @@ def scan(
     from rich.console import Console
 
     from roughvisc.study.storage.store import whole_file
-    from roughvisc.topography.bandwidth import level
-    from roughvisc.topography.parameters import parameters
+    from roughvisc.topography.parameters import levelled_parameters
     from roughvisc.topography.readers import list_channels
     from roughvisc.topography.scans import open_scan
     from roughvisc.topography.writers import card_text, known_suffix, save_scan
     from roughvisc.views.console.tables import scan_table
     from roughvisc.views.plot import surface
+    from roughvisc.views.sweep_figures.files import write_figure
 
     options = {
         "format": format,
@@ -73,9 +73,8 @@ def scan(
         if out.exists() and (out == card or out.samefile(file)):
             raise InputError(f"{out}: exists already, and is not written over: expected another name")
     console = Console()
-    console.print(scan_table(height, parameters(level(height)), file.name, channels))
-    draw(surface(height), picture)
-    say(console, "Picture", picture)
+    console.print(scan_table(height, levelled_parameters(height), file.name, channels))
+    say(console, "Picture", write_figure(surface(height), picture))
     if to:
         with whole_file(to) as temporary:
             save_scan(height, temporary)

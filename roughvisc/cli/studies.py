@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure
-from roughvisc.cli.output import draw, say
+from roughvisc.cli.group import Failure, say
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -192,14 +191,15 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from rich.console import Console
     from scipy import fft
 
+    from roughvisc.study.progress import reporting
     from roughvisc.study.statement.case import read_study
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
     from roughvisc.study.trade.trade import trade as measured
-    from roughvisc.study.trade.watch import reporting
     from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.plot import trade as figure
+    from roughvisc.views.sweep_figures.files import write_figure
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
@@ -207,12 +207,11 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     if target is not None:
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)
-    with reporting(True, console) as report, fft.set_workers(CPU_COUNT):
+    with reporting(True, console=console) as report, fft.set_workers(CPU_COUNT):
         dataset = measured(case, budget=time, progress=report)
     console.print(trade_table(dataset))
     say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
-    draw(figure(dataset), folder / "trade.png")
-    say(console, "Figure", folder / "trade.png")
+    say(console, "Figure", write_figure(figure(dataset), folder / "trade.png"))
     if part is not None:
         index = recommend.cheapest(dataset, quantity, part)
         if index is None:

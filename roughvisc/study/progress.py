@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 
 from rich.console import Console, Group
@@ -117,12 +118,13 @@ class Bar:
         self._now, self._end = now, end
         self._display.tick()
 
-    def turned_to(self, label: str) -> None:
-        """Something else is computed from now on; where nothing is drawn, a line says so."""
+    def measured(self, label: str, now: float, end: float) -> None:
+        """Of several things computed in turn, this one is at this time of so much [s]; a line names each anew."""
         if label != self._label:
-            self._label, self._now, self._began = label, 0.0, time.monotonic()
+            self._label, self._began = label, time.monotonic()
             if not self._display.draws:
                 self._display.say(f"measuring {label}")
+        self.reached(now, end)
 
     def _rows(self) -> list[Row]:
         return [(self._label, self._now, self._end, self._text())]
@@ -136,6 +138,30 @@ class Bar:
         if 0 < self._now < self._end:
             words.append(f"about {clock(spent * (self._end - self._now) / self._now)} left")
         return ", ".join([*words, f"{clock(spent)} so far"])
+
+
+@contextmanager
+def reporting(
+    progress: bool | Callable[..., None], label: str = "", console: Console | None = None
+) -> Iterator[Callable[..., None]]:
+    """What a computation calls with the time it has reached and the time at its end [s]; a bar ends with the block.
+
+    Parameters
+    ----------
+    progress : bool or callable
+        Whether to draw a bar, or what is called instead.
+    label : str
+        What is computed; where empty, the call begins with the name of what is computed at the time.
+    console : rich.console.Console, optional
+        Where to; None: the standard error.
+    """
+    if callable(progress):
+        yield progress
+    elif not progress:
+        yield lambda *_: None
+    else:
+        with Bar(console, label) as bar:
+            yield bar.reached if label else bar.measured
 
 
 def clock(seconds: float) -> str:

@@ -17,7 +17,8 @@ METHODS = {
     name: f"roughvisc.topography.{module}"
     for module, names in {
         "conditioning": "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror",
-        "parameters": "parameters psd",
+        "parameters": "parameters",
+        "spectrum": "psd",
         "fitting": "fit_self_affine",
     }.items()
     for name in names.split()

@@ -11,6 +11,7 @@ import scipy.sparse
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.arguments import KEEP, ORDER
 from roughvisc.topography.grid import checked, counts, like, noted, number, spacing, valid_values, with_coordinates
 
 
@@ -35,8 +36,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
         If the order is none of these, or the points present do not determine the polynomial.
     """
     h = checked(h, "level")
-    if order not in (0, 1, 2, 3) or isinstance(order, bool):
-        raise InputError(f"level: order is {order!r}: expected 0 (mean), 1 (plane), 2 or 3")
+    ORDER.check("level: order", order)
     valid_values(h, "level")
     return noted(like(h, less_polynomial(h.values, order)), f"levelled: polynomial of order {order} removed")
 
@@ -53,6 +53,14 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
         heights = heights - _polynomial(heights, order)
     return heights
+
+
+def off_plane(h: xr.DataArray) -> xr.DataArray:
+    """Height less its mean plane; less its mean where the points present determine no plane. [m]"""
+    try:
+        return like(h, less_polynomial(h.values, 1))
+    except InputError:
+        return like(h, less_polynomial(h.values, 0))
 
 
 def gaussian_filter(
@@ -97,8 +105,7 @@ def gaussian_filter(
         raise InputError(
             f"gaussian_filter: cutoff is {cutoff!r}: expected at least three cells, {3 * max(sides):.6g} [m]"
         )
-    if keep not in ("long", "short"):
-        raise InputError(f"gaussian_filter: keep is {keep!r}: expected 'long' or 'short'")
+    KEEP.check("gaussian_filter: keep", keep)
     mean = valid_values(h, "gaussian_filter").mean()
     present = np.isfinite(h.values)
     long = np.where(present, h.values - mean, 0.0)

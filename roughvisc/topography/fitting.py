@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import scipy.fft
 import scipy.optimize
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import level
 from roughvisc.topography.grid import checked, like, spacing
+from roughvisc.topography.spectrum import hann, modes
 
 #: Rings a decade of wavevector, and Hurst exponents tried.
 _RINGS, _HURSTS = 24, np.linspace(0.02, 1.0, 99)
@@ -110,19 +110,10 @@ class _Modes:
     def of(cls, h: xr.DataArray, periodic: bool) -> _Modes:
         """Modes of levelled heights, under a Hann window unless they repeat."""
         cells, shape = spacing(h), h.shape
-        z = h.values
-        if not periodic:
-            weight = np.multiply.outer(*(1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n) for n in shape))
-            z = z * weight / np.sqrt(np.mean(weight**2))
-        power = np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
+        q_x, q_y, power, count = modes(h.values if periodic else hann(h.values), cells, norm="forward")
         power[0, 0] = 0.0
-        q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(shape[0], cells[0]), 2 * np.pi * scipy.fft.rfftfreq(shape[1], cells[1])
-        count = np.full(q_y.size, 2.0)
-        count[0] = 1.0
-        if shape[1] % 2 == 0:
-            count[-1] = 1.0
         size = (shape[0] * cells[0], shape[1] * cells[1])
-        return cls(q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape), size, cells)
+        return cls(q_x, q_y, power, count, size, cells)
 
     def stretched(self, anisotropy: float) -> np.ndarray:
         """Modulus of the wavevectors of the isotropic surface that this one is stretched from. [rad/m]"""

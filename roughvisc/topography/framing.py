@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.grid import checked, like, noted, pair, spacing, valid_values, with_coordinates
 
 
@@ -63,8 +64,7 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
         The turned surface; coordinates start half a cell from zero. [m]
     """
     h = checked(h, "rotate90")
-    if isinstance(turns, bool) or not isinstance(turns, int):
-        raise InputError(f"rotate90: turns is {turns!r}: expected a whole number of quarter turns")
+    TURNS.check("rotate90: turns", turns)
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
     axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]

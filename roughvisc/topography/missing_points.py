@@ -10,6 +10,7 @@ import scipy.ndimage
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.arguments import FILL, WINDOW
 from roughvisc.topography.grid import checked, like, noted, number, spacing, valid_values
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
@@ -45,8 +46,7 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     would take the spikes for the rim of the hole.
     """
     h = checked(h, "mask_outliers")
-    if isinstance(window, bool) or not isinstance(window, int) or window < 3 or window % 2 == 0:
-        raise InputError(f"mask_outliers: window is {window!r}: expected an odd number of points of at least 3")
+    WINDOW.check("mask_outliers: window", window)
     threshold = number("threshold", threshold, "-")
     valid_values(h, "mask_outliers")
     off = np.abs(h.values - _local_median(h.values, window))
@@ -81,8 +81,7 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
         If the method is another, all points are missing, or they are absent on purpose (no material there).
     """
     h = checked(h, "fill")
-    if method not in _FILLS:
-        raise InputError(f"fill: method is {method!r}: expected one of {', '.join(map(repr, _FILLS))}")
+    FILL.check("fill: method", method)
     if h.attrs.get("missing") == "absent":
         raise InputError(
             "fill: the missing cells are absent (there is no material): expected a scan with missing points"

@@ -1,14 +1,14 @@
-"""Areal parameters of ISO 25178-2 and power spectral density."""
+"""Areal parameters of ISO 25178-2."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import math
+from typing import Any
 
 import numpy as np
-import scipy.fft
 import xarray as xr
 
-from roughvisc.errors import InputError
+from roughvisc.topography.bandwidth import off_plane
 from roughvisc.topography.grid import checked, spacing, valid_values
 
 #: name -> (units, long name)
@@ -85,87 +85,42 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     return xr.Dataset({name: ((), float(value), declared[name]) for name, value in values.items()})
 
 
-def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
-    r"""Radially averaged power spectral density.
+def levelled_parameters(h: xr.DataArray) -> xr.Dataset:
+    """:func:`parameters` of heights less their mean plane, as tables, pages and figures state them."""
+    return parameters(off_plane(h))
+
+
+def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:
+    """Root mean square slope, that of :func:`parameters`, where the surface lies within a depth of its highest point.
 
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y), without missing points. [m]
-    window : {"hann"}, optional
-        None for a surface that repeats. "hann": a cosine window, for a scan that does not (its mean square is one).
+        Height over (x, y), NaN where missing. [m]
+    periodic : bool
+        Whether the differences reach across the border.
+    depth : float
+        A corner of three neighbouring points counts if one of them lies no deeper. [m]
 
     Returns
     -------
-    xarray.Dataset
-        Over ``wavevector`` [rad/m], the mean modulus of each ring: ``psd`` [m4], the mean of the two-dimensional
-        density over the ring, and ``modes``, the number of waves in it.
-
-    Raises
-    ------
-    InputError
-        If points are missing, or the window is another.
-
-    Notes
-    -----
-    The density is :math:`C(\mathbf q) = |\tilde h|^2 / A` with :math:`\tilde h = \Delta x \Delta y \sum h\,
-    e^{-i \mathbf q \cdot \mathbf r}`, so that :math:`\langle h^2 \rangle = (2 \pi)^{-2} \int C\, d^2q`. Every wave is
-    in one ring: the sum of ``psd * modes`` over the area :math:`A` is the variance exactly (Parseval) where there is no
-    window. Rings are as wide as the coarser of the two wavevector steps; beyond the Nyquist wavevector they are parts.
-
-    References
-    ----------
-    .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
+    float
+        NaN where no point is left for it. [-]
     """
-    h = checked(h, "psd", least=1)
-    if np.isnan(h.values).any():
-        raise InputError(f"psd: {int(np.isnan(h.values).sum())} points are missing: expected none (fill them first)")
-    if window not in (None, "hann"):
-        raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
-    cells, shape = spacing(h), h.shape
-    z = h.values - h.values.mean()
-    if window:
-        weight = np.multiply.outer(*(1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n) for n in shape))
-        z = z * weight / np.sqrt(np.mean(weight**2))
-    density = np.abs(scipy.fft.rfft2(z)) ** 2 * (cells[0] * cells[1] / (shape[0] * shape[1]))
-    q_x = 2 * np.pi * scipy.fft.fftfreq(shape[0], cells[0])
-    q_y = 2 * np.pi * scipy.fft.rfftfreq(shape[1], cells[1])
-    q = np.hypot(q_x[:, None], q_y)
-    twice = np.full(q_y.size, 2)  # waves of the half that is not stored
-    twice[0] = 1
-    if shape[1] % 2 == 0:
-        twice[-1] = 1
-    twice = np.broadcast_to(twice, q.shape).ravel()
-    step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)
-    ring = np.maximum(np.round(q.ravel() / step).astype(int), 1) - 1
-    ring[0] = -1  # the mean
-    counted, at, total = (
-        np.bincount(ring + 1, weight)[1:] for weight in (twice, twice * q.ravel(), twice * density.ravel())
-    )
-    ring = np.flatnonzero(counted)
-    density_attrs = {"units": "m4", "long_name": "power spectral density of height, radial average"}
-    density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
-    return xr.Dataset(
-        {
-            "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
-            "modes": (
-                "wavevector",
-                counted[ring].astype(int),
-                {"units": "1", "long_name": "waves in the ring"},
-            ),
-        },
-        coords={"wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"})},
-        attrs={"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"},
-    )
+    slope_x, slope_y = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
+    return float(np.sqrt(_mean(slope_x**2 + slope_y**2)))
 
 
-def _slopes(h: xr.DataArray, periodic: bool) -> tuple[np.ndarray, np.ndarray]:
+def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
     """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1)."""
     dx, dy = spacing(h)
     z = np.pad(h.values, [(0, int(periodic or n == 1)) for n in h.shape], mode="wrap")
     slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
-    both = np.isfinite(slope_x) & np.isfinite(slope_y)
-    return slope_x[both], slope_y[both]
+    counts = np.isfinite(slope_x) & np.isfinite(slope_y)
+    if depth < math.inf:
+        highest = np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1])
+        counts &= highest >= np.nanmax(z) - depth
+    return slope_x[counts], slope_y[counts]
 
 
 def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:

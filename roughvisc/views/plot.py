@@ -6,7 +6,6 @@ readable prefixes; nothing here touches matplotlib's global state.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import xarray as xr
@@ -24,7 +23,7 @@ from roughvisc.views.figures.stability import stability_map
 from roughvisc.views.figures.surfaces import surface
 from roughvisc.views.figures.trade import trade
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
-from roughvisc.views.sweep_figures.files import save_sweep_figures
+from roughvisc.views.sweep_figures.files import save_sweep_figures, write_figure
 from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
@@ -91,8 +90,6 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         If the Dataset is not one case's result or allows no figure.
     """
     require(dataset)
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, (draw, needed, wanted) in FIGURES.items():
         if not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted)):
@@ -100,14 +97,7 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         if name == "hysteresis" and dataset.sizes["time"] < 3:
             continue  # two states are no loop
         options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
-        path = folder / f"{stem}-{name}{suffix}"
-        unfinished = path.with_name(f".{path.stem}.part{suffix}")
-        try:
-            draw(dataset, **options).savefig(unfinished, dpi=dpi)
-            os.replace(unfinished, path)
-        finally:
-            unfinished.unlink(missing_ok=True)
-        written.append(path)
+        written.append(write_figure(draw(dataset, **options), Path(folder, f"{stem}-{name}{suffix}"), dpi))
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
         raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")

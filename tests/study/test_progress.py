@@ -7,9 +7,8 @@ from rich.console import Console
 
 import roughvisc as rv
 from roughvisc.study import progress
-from roughvisc.study.progress import Bar
+from roughvisc.study.progress import Bar, reporting
 from roughvisc.study.simulation.simulate import simulate
-from roughvisc.study.trade.watch import reporting
 
 
 @pytest.fixture
@@ -67,7 +66,7 @@ def test_line__is_not_said_twice_in_a_row(shown):
 def test_trade__says_each_setting_once(shown, monkeypatch):
     console = shown(False)
     monkeypatch.setattr(progress, "LINE_EVERY", 100.0)
-    with reporting(True, console) as report:
+    with reporting(True, console=console) as report:
         for label in ("coarse", "fine"):
             report(label, 0.0, 1.0)
             report(label, 0.5, 1.0)

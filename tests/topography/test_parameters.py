@@ -6,8 +6,9 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import cell_side, labelled, spacing
-from roughvisc.topography.parameters import PARAMETERS, parameters, psd
+from roughvisc.topography.parameters import PARAMETERS, parameters, rms_slope
 from roughvisc.topography.readers import from_array
+from roughvisc.topography.spectrum import psd
 from roughvisc.topography.synthesis import self_affine, wavy
 
 SIZE, SHAPE = (3e-4, 2e-4), (61, 48)
@@ -58,6 +59,20 @@ def test_parameters__differences_converge_at_second_order(order):
         for n in (25, 51)
     ]
     assert np.log(errors[0] / errors[1]) / np.log(51 / 25) == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_rms_slope__is_that_of_the_parameters(periodic):
+    assert rms_slope(ROUGH, periodic) == float(parameters(ROUGH, periodic)["rms_slope"])
+
+
+def test_rms_slope__of_what_is_near_the_highest_point():
+    """A roof of slope 0.1 on walls of slope 2, at the top of a plane."""
+    x = np.arange(40) * 1.0
+    ridge = labelled(np.repeat(np.where(x <= 30, 0.1 * x, 3 - 2 * (x - 30))[:, None], 5, 1), (1.0, 1.0))
+    assert rms_slope(ridge) == pytest.approx(np.sqrt((30 * 0.01 + 9 * 4) / 39), rel=1e-12)
+    assert rms_slope(ridge, depth=1.05) == pytest.approx(np.sqrt((11 * 0.01 + 4) / 12), rel=1e-12)
+    assert np.isnan(rms_slope(ridge.where(ridge.x < 1)[:1, :1] * np.nan))
 
 
 @pytest.mark.parametrize("periodic", [False, True])

@@ -8,7 +8,7 @@ import xarray as xr
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.settings import Settings
-from roughvisc.topography.grid import axis_step
+from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import FIELDS
 
 #: What a result says of a material without instantaneous compliance.
@@ -81,26 +81,11 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
     approach : float
         The largest at kept times, from the highest cell. [m]
     """
-    slope = loaded_slope(height, np.inf if boundary == "periodic" else approach)
+    periodic = boundary == "periodic"
+    slope = rms_slope(height, periodic, np.inf if periodic else approach)
     if not slope > LARGEST_SLOPE:
         return ""
     return (
         f"The rms slope of the loaded surface is {slope:.2g}: the method takes slopes as small, and leaves out what is "
         f"of the order of its square. Beyond {LARGEST_SLOPE:g} the results are a rough guess."
     )
-
-
-def loaded_slope(height: xr.DataArray, depth: float) -> float:
-    """Root mean square slope between neighbouring cells of which one lies within a depth [m] of the highest."""
-    values = height.values
-    highest = np.nanmax(values)
-    squares = 0.0
-    for axis, name in enumerate(("x", "y")):
-        if values.shape[axis] == 1:
-            continue
-        first, second = np.delete(values, -1, axis), np.delete(values, 0, axis)
-        loaded = np.fmax(first, second) >= highest - depth
-        steps = (second - first)[loaded & np.isfinite(first) & np.isfinite(second)]
-        side = axis_step(height, name, "height")
-        squares += float(np.mean((steps / side) ** 2)) if steps.size else 0.0
-    return float(np.sqrt(squares))

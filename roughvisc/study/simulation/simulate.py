@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import xarray as xr
@@ -180,7 +179,9 @@ def _press(
     if keeper is not None:
         scene = _grown(scene, ground, keeper.saved.growths)
     rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
-    with _reporting(progress) as report:
+    from roughvisc.study.progress import reporting  # slow to import
+
+    with reporting(progress, "pressing") as report:
         _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
@@ -239,21 +240,7 @@ def _march(
 def _slope_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
     """What to say of a surface that is too steep where it was loaded, in the log too."""
     deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
-    note = slope_note(ground.domain[ground.window.cells], settings.boundary, deepest)
+    note = slope_note(ground.height[ground.window.surface_cells], settings.boundary, deepest)
     if note:
         log.warning("%s", note)
     return note
-
-
-@contextmanager
-def _reporting(progress: bool | Progress) -> Iterator[Progress]:
-    """What to call with the time reached and the program's length; a progress bar ends with the block."""
-    if callable(progress):
-        yield progress
-    elif not progress:
-        yield lambda _now, _end: None
-    else:
-        from roughvisc.study.progress import Bar
-
-        with Bar(label="pressing") as bar:
-            yield bar.reached

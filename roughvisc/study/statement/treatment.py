@@ -44,14 +44,6 @@ def treatment(dataset: xr.Dataset) -> Treatment:
     return Treatment(steps, _measured(dataset), dataset["height"].load())
 
 
-def measures(height: xr.DataArray) -> xr.Dataset:
-    """Areal parameters of heights less their mean plane; see :func:`roughvisc.parameters`."""
-    from roughvisc.topography.bandwidth import less_polynomial
-    from roughvisc.topography.parameters import parameters
-
-    return parameters(height.copy(data=less_polynomial(height.values, 1)))
-
-
 def _measured(dataset: xr.Dataset) -> xr.DataArray | None:
     """Heights before any conditioning, if what they come from still has the checksum of the result."""
     if "case" not in dataset.attrs:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.study.progress import reporting
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import Bench, NotRun, Report
@@ -21,7 +22,6 @@ from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
 from roughvisc.study.trade.finest import Finest
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
-from roughvisc.study.trade.watch import reporting
 from roughvisc.variables import annotate
 
 #: Kept times where a study keeps all accepted steps, which differ from setting to setting.

@@ -31,6 +31,7 @@ from roughvisc.views.figures.axes import (
 from roughvisc.views.figures.fields import (
     draw_map,
     draw_outline,
+    label_plane,
     outline_colour,
     plane_ratio,
     plane_unit,
@@ -150,11 +151,7 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
     image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
     side = "right" if plane_ratio(dataset) > 0.4 else "top"
     figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(VARIABLES[field].label))
-    ax.set_xlabel(plane.label("x"))
-    ax.set_ylabel(plane.label("y"))
-    ax.tick_params(direction="out")
-    ax.locator_params(axis="x", nbins=5 if plane_ratio(dataset) < 2 else 1)
-    ax.locator_params(axis="y", nbins=5 if plane_ratio(dataset) > 0.25 else 1)
+    label_plane(ax, dataset, plane)
     outline = [None]
 
     def move(frame):

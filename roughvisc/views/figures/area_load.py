@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
 from roughvisc.views.figures.histories import leave_room, marker_of
@@ -39,16 +40,6 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
     if not cases:
         raise InputError("no result given: nothing to draw")
     return cases
-
-
-def _root_mean_square_slope(height: xr.DataArray) -> float:
-    """Slope of the surface by differences between neighbouring present cells."""
-    total = 0.0
-    for name in ("x", "y"):
-        if height.sizes[name] > 1:
-            step = float(height[name][1] - height[name][0])
-            total += float(((height.diff(name) / step) ** 2).mean())
-    return math.sqrt(total)
 
 
 @styled
@@ -131,7 +122,7 @@ def _draw_low_load_lines(ax: Axes, dataset: xr.Dataset, moduli, across, up) -> N
     if not named:
         return
     require(dataset, "height")
-    slope = _root_mean_square_slope(dataset["height"])
+    slope = rms_slope(dataset["height"], periodic=dataset.attrs.get("boundary") == "periodic")
     top = float(dataset["force"].max())
     for (name, modulus), dash in zip(named.items(), ((4, 2), (1, 1.5), (6, 1, 1, 1)) * len(named), strict=False):
         loads = np.geomspace(1e-3 * top, top, 50)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import cell_edges
@@ -32,6 +32,8 @@ from roughvisc.views.observables import contact
 #: Perceptually even maps, the same order of lightness in grey: pressure darkens as it rises, gap as it closes.
 COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
 _MOST_MAPS = 24
+#: A map's short over its long side below which ticks along the short one would lie on each other.
+_THIN = 0.1
 
 
 def colour_map(name: str) -> Colormap:
@@ -79,6 +81,24 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -
     )
     image.set_gid(str(field.name))
     return image
+
+
+def label_plane(
+    ax: Axes, field: xr.DataArray | xr.Dataset, plane: Unit, most: int = 5, x: bool = True, y: bool = True
+) -> None:
+    """Ticks and labels of a map's axes, where they are shown; the limits of a thin strip stand in its label."""
+    ratio = plane_ratio(field)
+    for axis, name, share, room, is_shown in ((ax.xaxis, "x", 1 / ratio, 0.5, x), (ax.yaxis, "y", ratio, 0.25, y)):
+        label = plane.label(name)
+        if share < _THIN:
+            low, high = plane(cell_edges(field[name]))[[0, -1]]
+            label = plane.label(f"{name} = {low:.3g} to {high:.3g}" + ("\n" if name == "x" else ""))
+            axis.set_major_locator(NullLocator())
+            axis.label.set(rotation=0, ha="center" if name == "x" else "right", va="top" if name == "x" else "center")
+        else:
+            axis.set_major_locator(MaxNLocator(most if share > room else 1, steps=[1, 2, 5, 10]))
+        axis.set_label_text(label if is_shown else "")
+    ax.tick_params(direction="out", labelbottom=x, labelleft=y)
 
 
 def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
@@ -166,7 +186,8 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
     width = 4.0 if ratio < 0.4 else 3.0 if columns == 1 and ratio < 1.5 else 1.75 if ratio < 2 else 1.1
     height = width * ratio + (0.27 if rows > 1 else 0.12)
     size = (width * columns + 0.17 * (columns - 1) + 1.25, max(height * rows, 1.2) * fields + 0.6)
-    figure = new_figure(*size, layout="compressed")
+    # side by side, maps that are narrower than their titles need the whole width
+    figure = new_figure(*size, layout="constrained" if plane_ratio(dataset) * _THIN > 1 else "compressed")
     axes = figure.subplots(rows * fields, columns, sharex=True, sharey=True, squeeze=False)
     return figure, axes.reshape(fields, rows, columns)
 
@@ -204,10 +225,6 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> Non
             ax.remove()
             continue
         lowest = field == fields - 1 and number + columns >= len(frames)
-        ax.xaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) < 2 else 1, steps=[1, 2, 5, 10]))
-        ax.yaxis.set_major_locator(MaxNLocator(4 if plane_ratio(dataset) > 0.25 else 1, steps=[1, 2, 5, 10]))
-        ax.tick_params(labelbottom=lowest, labelleft=column == 0, direction="out")
-        ax.set_xlabel(plane.label("x") if lowest else "")
-        ax.set_ylabel(plane.label("y") if column == 0 else "")
+        label_plane(ax, dataset, plane, 4, x=lowest, y=column == 0)
         if field == 0 or rows > 1:
             ax.set_title(time_text(float(dataset["time"][frames[number]])), pad=3)

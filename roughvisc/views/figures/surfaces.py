@@ -8,10 +8,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import cell_edges
+from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.grid import cell_edges, spacing
+from roughvisc.topography.spectrum import psd
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -23,7 +24,7 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
-from roughvisc.views.figures.fields import draw_map, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
@@ -55,9 +56,9 @@ def surface(height: xr.DataArray) -> Figure:
 
     Notes
     -----
-    The spectrum is the radial mean of the two-dimensional power spectral density of the heights less their mean
-    plane, under a Hann window, missing points on the plane: a quick look, not a measurement. The distribution is
-    shown with the normal one of the same mean and Sq.
+    Map and profile show the heights as they are; distribution and spectrum those less their mean plane. The
+    distribution is shown with the normal one of the same Sq. The spectrum is that of :func:`roughvisc.psd` under a
+    Hann window, missing points on the plane: a quick look, not a measurement.
     """
     height = _checked(height)
     unit, plane = unit_for(height - height.mean(), "m"), plane_unit(height)
@@ -67,17 +68,14 @@ def surface(height: xr.DataArray) -> Figure:
     flat = plane_ratio(height) < 0.4
     bar = figure.colorbar(image, ax=on_map, location="top" if flat else "right", pad=0.02, aspect=50 if flat else 20)
     bar.set_label(unit.label(VARIABLES["height"].label))
-    on_map.set_xlabel(plane.label("x"))
-    on_map.set_ylabel(plane.label("y"))
-    on_map.tick_params(direction="out")
-    on_map.locator_params(axis="x", nbins=5)
-    on_map.locator_params(axis="y", nbins=2 if flat else 5)
+    label_plane(on_map, height, plane)
     missing = float(height.isnull().mean())
     if missing:
         figure.suptitle(f"{100 * missing:.2g} % of the points are missing (grey)", fontsize=8.5)
     _draw_profile(panels["profile"], on_map, height, unit, plane)
-    _draw_heights(panels["heights"], height, unit)
-    _draw_spectrum(panels["spectrum"], height)
+    levelled = off_plane(height)
+    _draw_heights(panels["heights"], levelled, unit_for(levelled, "m"))
+    _draw_spectrum(panels["spectrum"], levelled)
     letter_panels(list(panels.values()))
     return figure
 
@@ -109,13 +107,13 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
     ax.grid(color="0.9", lw=0.5)
 
 
-def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
-    values = unit(height.values[np.isfinite(height.values)])
+def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
+    values = unit(levelled.values[np.isfinite(levelled.values)])
     deviation = float(values.std())
     bins = int(np.clip(math.sqrt(values.size) / 1.5, 8, 100))
     if deviation == 0:
         ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
-        ax.set_xlabel(unit.label(VARIABLES["height"].label))
+        ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
     ax.hist(values, bins=bins, density=True, color=BLUE, alpha=0.45, histtype="stepfilled", label="measured")
@@ -124,57 +122,18 @@ def _draw_heights(ax: Axes, height: xr.DataArray, unit: Unit) -> None:
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
     ax.legend(loc="upper right", handlelength=1.2)
-    ax.set_xlabel(unit.label(VARIABLES["height"].label))
+    ax.set_xlabel(unit.label("Height, levelled"))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
 
-def radial_spectrum(height: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
-    """Radial mean of the power spectral density of a surface.
-
-    Parameters
-    ----------
-    height : xarray.DataArray, dims (x, y)
-        Heights. [m]
-
-    Returns
-    -------
-    wavevector : ndarray
-        In rings of one step of the coarser axis, up to the lower of the two Nyquist values. [rad/m]
-    density : ndarray
-        ``C(q)`` with ``sum(C dqx dqy) / (4 pi^2)`` the mean square of the heights. [m4]
-    """
-    (nx, ny), sides = height.shape, [cell_edges(height[name]) for name in ("x", "y")]
-    steps = [side[1] - side[0] for side in sides]
-    values = _less_its_plane(height.values)
-    window = np.outer(np.hanning(nx + 2)[1:-1], np.hanning(ny + 2)[1:-1])
-    power = np.abs(fft.rfft2(values * window)) ** 2 * steps[0] * steps[1] / (window**2).sum()
-    qx = 2 * np.pi * fft.fftfreq(nx, steps[0])
-    qy = 2 * np.pi * fft.rfftfreq(ny, steps[1])
-    q = np.hypot(qx[:, None], qy[None, :])
-    width = 2 * np.pi / min(nx * steps[0], ny * steps[1])
-    rings = np.arange(0.5 * width, np.pi / max(steps) + width / 2, width)
-    ring = np.digitize(q.ravel(), rings)
-    count = np.bincount(ring, minlength=len(rings) + 1)[1:-1]
-    total = np.bincount(ring, power.ravel(), minlength=len(rings) + 1)[1:-1]
-    known = count > 0
-    return ((rings[1:] + rings[:-1]) / 2)[known], (total[known] / count[known])
-
-
-def _less_its_plane(values: np.ndarray) -> np.ndarray:
-    """Heights less their mean plane, zero where they are missing."""
-    x, y = np.meshgrid(*(np.linspace(-1, 1, n) for n in values.shape), indexing="ij")
-    known = np.isfinite(values)
-    design = np.stack([np.ones(known.sum()), x[known], y[known]], axis=1)
-    plane = np.linalg.lstsq(design, values[known], rcond=None)[0]
-    return np.where(known, values - (plane[0] + plane[1] * x + plane[2] * y), 0.0)
-
-
-def _draw_spectrum(ax: Axes, height: xr.DataArray) -> None:
+def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     ax.set_xlabel("Wavevector [rad/m]")
     ax.set_ylabel("Power spectral density [m⁴]")
     drawn = False
-    if min(height.shape) >= 8:
-        wavevector, density = radial_spectrum(height)
+    if min(levelled.shape) >= 8:
+        spectrum = psd(levelled.fillna(0.0), window="hann")
+        spectrum = spectrum.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings that are seen whole
+        wavevector, density = spectrum["wavevector"].values, spectrum["psd"].values
         scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
         symbol = "µm" if wavevector[-1] > 1e4 else "mm"
         symbol = "nm" if wavevector[-1] > 1e8 else symbol

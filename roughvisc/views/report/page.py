@@ -16,11 +16,12 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.treatment import Treatment, measures, treatment
+from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
-from roughvisc.views.figures.fields import draw_map, plane_unit
+from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
 from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures.case_text import material_words, program_words, readable_setting, study_text
@@ -295,8 +296,8 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
     """One surface: its figures, what conditioning did, and its parameters before and after."""
     found = treatment(dataset)
     unchanged = found.before is not None and _alike(found.before, found.after)
-    after = measures(found.after)
-    before = measures(found.before) if found.before is not None and not unchanged else None
+    after = levelled_parameters(found.after)
+    before = levelled_parameters(found.before) if found.before is not None and not unchanged else None
     rows = []
     for name in _PARAMETERS:
         attrs = after[name].attrs
@@ -341,8 +342,7 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
         low, high = unit(height.quantile([0.005, 0.995]).values)
         image = draw_map(ax, height, unit, plane, vmin=low, vmax=high if high > low else low + 1)
         figure.colorbar(image, ax=ax, aspect=18, pad=0.02, shrink=0.8, extend="both").set_label(unit.label("Height"))
-        ax.set_xlabel(plane.label("x"))
-        ax.set_ylabel(plane.label("y"))
+        label_plane(ax, height, plane)
         ax.tick_params(direction="out")
         missing = int(height.isnull().sum())
         ax.set_title(title + (f": {missing} points missing (grey)" if missing else ""))

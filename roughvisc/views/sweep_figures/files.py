@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +13,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.store import whole_file
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
 from roughvisc.views.sweep_figures.sweeps import sweep
@@ -93,16 +93,21 @@ def save_sweep_figures(
     InputError
         If there are no several cases.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, _, figure in sweep_figures(results):
-        path = folder / f"sweep-{name}{suffix}"
-        unfinished = path.with_name(f".{path.stem}.part{suffix}")
-        try:
-            figure.savefig(unfinished, dpi=dpi)
-            os.replace(unfinished, path)
-        finally:
-            unfinished.unlink(missing_ok=True)
-        written.append(path)
-    return written
+    drawn = sweep_figures(results)
+    return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]
+
+
+def write_figure(figure: Figure, path: Path, dpi: float = 200.0) -> Path:
+    """Write a figure to a file of the kind that its suffix names, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the suffix names no kind of picture, or the folder cannot be written to.
+    """
+    kind = path.suffix.lstrip(".") or "png"
+    if kind not in figure.canvas.get_supported_filetypes():
+        raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=dpi)
+    return path

@@ -23,8 +23,7 @@ from roughvisc.views.figures.axes import (
 )
 from roughvisc.views.sweep_figures.cases import Cases, Parameter, cases_of, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
-from roughvisc.views.sweep_figures.maps import draw_maps
-from roughvisc.views.sweep_figures.parameter_axes import positions, set_parameter_axis
+from roughvisc.views.sweep_figures.maps import draw_maps, positions, set_parameter_axis
 
 #: Parameters with so many values or more make a map by default.
 _MAP_FROM = 4

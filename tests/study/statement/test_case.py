@@ -441,10 +441,10 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
 
 [material]  =>  level = 4\n[material]
-| surface.level: found 4: expected true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3
+| surface.level: found 4: expected 0 (mean), 1 (plane), 2 or 3
 
 [material]  =>  fill = "cubic"\n[material]
-| surface.fill: found 'cubic': expected true, false, 'harmonic', 'nearest' or 'linear'
+| surface.fill: found 'cubic': expected 'harmonic', 'nearest' or 'linear'
 
 [material]  =>  outliers = 5\n[material]
 | surface.outliers: found 5: expected true, false, or a table of window and threshold
@@ -453,10 +453,10 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | surface.outliers.treshold: unknown key; did you mean 'threshold'?
 
 [material]  =>  outliers = { window = 4 }\n[material]
-| surface.outliers.window: found 4: expected an odd whole number at least 3
+| surface.outliers.window: found 4: expected an odd whole number of at least 3
 
 [material]  =>  outliers = { window = 1 }\n[material]
-| surface.outliers.window: found 1: expected an odd whole number at least 3
+| surface.outliers.window: found 1: expected an odd whole number of at least 3
 
 [material]  =>  outliers = { threshold = 0 }\n[material]
 | surface.outliers.threshold: found 0: expected a number above 0
@@ -467,8 +467,8 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 [material]  =>  crop = { y = ["0.9 mm", "100 um"] }\n[material]
 | surface.crop.y: found 0.0009 and 0.0001 m: expected a list of two lengths, the lower and the upper limit
 
-[material]  =>  rotate90 = 4\n[material]
-| surface.rotate90: found 4: expected a whole number at least 0 and up to 3
+[material]  =>  rotate90 = 0.5\n[material]
+| surface.rotate90: found 0.5: expected a whole number of quarter turns
 
 [material]  =>  resample = [1, 9]\n[material]
 | surface.resample.0: found 1: expected a whole number at least 2

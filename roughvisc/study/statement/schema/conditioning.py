@@ -10,6 +10,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, optional, paired, shown, whole
 from roughvisc.study.statement.schema.section import Section
 from roughvisc.study.statement.settings import WORDS, Settings
+from roughvisc.topography.arguments import FILL, KEEP, ORDER, TURNS, WINDOW, Argument
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +35,20 @@ LIMITS = Annotated[
 ]
 
 
+def _argument(argument: Argument, schema: dict[str, Any], when_true: Any = None) -> Any:
+    """Kind: an argument of a step as topography checks it; or true and false, where true stands for a value."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, bool) and when_true is not None:
+            return when_true if value else False
+        if not argument.allows(value):
+            raise InputError(f"found {shown(value)}: expected {argument.wanted}")
+        return value
+
+    wanted = argument.wanted if when_true is None else f"true ({when_true!r}), false, or {argument.wanted}"
+    return Annotated[Any, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
+
+
 class Crop(Section):
     """The part of the scan that is used."""
 
@@ -44,7 +59,7 @@ class Crop(Section):
 class Outliers(Section):
     """Points masked that lie far from the median of their neighbours."""
 
-    window: whole(3, odd=True) = 9
+    window: _argument(WINDOW, {"type": "integer", "minimum": 3, "not": {"multipleOf": 2}}) = 9
     threshold: measured("1", above=0) = 8.0
 
 
@@ -52,7 +67,7 @@ class Filter(Section):
     """A Gaussian filter."""
 
     cutoff: LENGTH
-    keep: choice("long", "short") = "long"
+    keep: _argument(KEEP, {"enum": ["long", "short"]}) = "long"
     periodic: Flag = False
 
 
@@ -62,26 +77,8 @@ def either(check: Any, kinds: list[str], wanted: str, table: Any = Any) -> Any:
     return Annotated[made, BeforeValidator(check), WithJsonSchema({"type": kinds}), Field(description=wanted)]
 
 
-_LEVEL = "true (a plane), false, or the order of the polynomial removed: 0, 1, 2 or 3"
-_FILL = "true, false, 'harmonic', 'nearest' or 'linear'"
 _OUTLIERS = "true, false, or a table of window and threshold"
 _FILTER = "false, a cut-off length, or a table of cutoff, keep and periodic"
-
-
-def _level(value: Any) -> Any:
-    if isinstance(value, bool):
-        return 1 if value else False
-    if not isinstance(value, int) or not 0 <= value <= 3:
-        raise InputError(f"found {shown(value)}: expected {_LEVEL}")
-    return value
-
-
-def _fill(value: Any) -> Any:
-    if isinstance(value, bool):
-        return "harmonic" if value else False
-    if value not in ("harmonic", "nearest", "linear"):
-        raise InputError(f"found {shown(value)}: expected {_FILL}")
-    return value
 
 
 def _outliers(value: Any) -> Any:
@@ -102,11 +99,11 @@ class Conditioned(Section):
     """What every surface may have done to it; the steps act in the order of surface cards, which is this one."""
 
     crop: optional(Crop) = None
-    rotate90: optional(whole(0, 3)) = None
+    rotate90: optional(_argument(TURNS, {"type": "integer"})) = None
     invert: Flag = False
-    level: either(_level, ["boolean", "integer"], _LEVEL) = False
+    level: _argument(ORDER, {"type": ["boolean", "integer"]}, 1) = False
     outliers: either(_outliers, ["boolean", "object"], _OUTLIERS, Outliers) = False
-    fill: either(_fill, ["boolean", "string"], _FILL) = False
+    fill: _argument(FILL, {"type": ["boolean", "string"]}, "harmonic") = False
     filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER, Filter) = False
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None

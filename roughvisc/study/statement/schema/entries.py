@@ -94,18 +94,17 @@ def word_or(word: str, kind: Any, wanted: str) -> Any:
     return Annotated[Any, BeforeValidator(check), schema, Field(description=wanted), *units]
 
 
-def whole(least: int, most: int | None = None, *, odd: bool = False) -> Any:
+def whole(least: int, most: int | None = None) -> Any:
     """Kind: a whole number; ``true`` and ``2.0`` are none."""
-    wanted = f"{'an odd' if odd else 'a'} whole number{range_in_words(None, least, most, None)}"
+    wanted = f"a whole number{range_in_words(None, least, most, None)}"
 
     def check(value: Any) -> int:
-        good = isinstance(value, int) and not isinstance(value, bool) and not (odd and value % 2 == 0)
+        good = isinstance(value, int) and not isinstance(value, bool)
         if not good or value < least or (most is not None and value > most):
             raise InputError(f"found {shown(value)}: expected {wanted}")
         return int(value)
 
     schema: dict[str, Any] = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
-    schema |= {"not": {"multipleOf": 2}} if odd else {}
     return Annotated[int, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted)]
 
 

@@ -1,0 +1,61 @@
+"""Arguments of conditioning steps are judged alike by the functions, by surface cards and by study files."""
+
+import json
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import Case
+from roughvisc.topography.cards import condition
+
+H = rv.from_array(np.random.default_rng(0).standard_normal((20, 24)), 1e-6)
+STATED = {
+    "surface": {"generate": "sphere", "radius": 1e-3, "size": 1e-4, "shape": 16},
+    "material": {"model": "elastic", "shear_modulus": 1e6},
+    "program": [{"load": 1.0, "over": 0.1}],
+}
+ORDERS, METHODS = "expected 0 (mean), 1 (plane), 2 or 3", "expected 'harmonic', 'nearest' or 'linear'"
+ODD = "expected an odd whole number of at least 3"
+KEEPS, TURNS = "expected 'long' or 'short'", "expected a whole number of quarter turns"
+
+
+def case_with(step, value):
+    return Case.from_json(json.dumps(STATED | {"surface": STATED["surface"] | {step: value}}))
+
+
+@pytest.mark.parametrize(
+    ("function", "step", "value", "says"),
+    [
+        (lambda: rv.level(H, 4), "level", 4, ORDERS),
+        (lambda: rv.level(H, 1.0), "level", 1.0, ORDERS),
+        (lambda: rv.level(H, -1), "level", -1, ORDERS),
+        (lambda: rv.fill(H, "cubic"), "fill", "cubic", METHODS),
+        (lambda: rv.fill(H, 3), "fill", 3, METHODS),
+        (lambda: rv.mask_outliers(H, 4), "outliers", {"window": 4}, ODD),
+        (lambda: rv.mask_outliers(H, 1), "outliers", {"window": 1}, ODD),
+        (lambda: rv.mask_outliers(H, True), "outliers", {"window": True}, ODD),
+        (lambda: rv.gaussian_filter(H, 5e-6, "both"), "filter", {"cutoff": 5e-6, "keep": "both"}, KEEPS),
+        (lambda: rv.rotate90(H, 0.5), "rotate90", 0.5, TURNS),
+        (lambda: rv.rotate90(H, True), "rotate90", True, TURNS),
+    ],
+)
+def test_doors__refuse_with_one_sentence(function, step, value, says):
+    doors = (
+        function,
+        lambda: condition(H, {step: value}),
+        lambda: case_with(step, value),
+    )
+    for door in doors:
+        with pytest.raises(InputError) as told:
+            door()
+        assert str(told.value).endswith(says)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3, True, False])
+def test_level__is_what_a_card_makes_of_it(order):
+    case = case_with("level", order)
+    expected = case.settings.surface.raw() if order is False else rv.level(case.settings.surface.raw(), int(order))
+    np.testing.assert_array_equal(case.height(), expected)
+    np.testing.assert_array_equal(condition(case.settings.surface.raw(), {"level": order}), expected)
