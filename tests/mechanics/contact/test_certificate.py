@@ -197,6 +197,7 @@ def test_load__is_certain_where_the_gap_in_the_contact_is_small_over_what_is_lef
         assert not 0.8 < error / limit < 1.25
         assert not 0.8 < part / limit < 1.25
         assert (certain, unknown) == (part <= limit or error <= limit, False)
+        assert case.problem.influence.convolutions == int(part > limit), "the stiffness where that is not clear"
     # no iteration can do more than rounding lets it
     case = nearly_closed(1e-4, tolerance=1e-9, sign=sign)
     here = case.separation.take(case.contact)

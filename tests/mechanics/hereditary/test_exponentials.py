@@ -188,3 +188,16 @@ def test_next_state__is_what_was_foretold(rule):
     assert alpha * field + carried == pytest.approx(expected, rel=1e-12)
     assert after.earlier is state.modes
     assert after.step == 0.25
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2", "euler", "right"])
+def test_fluidity__under_a_ramp_flows_as_each_rule_has_it(rule):
+    """Flow ``t^2 / 2`` under the pressure ``t``: exact by both rules of second order, else with the last."""
+    memory = Modes(rv.Prony(1.0, 0.8))
+    state = memory.start(CELL)
+    for step, time in ((0.5, 0.5), (0.3, 0.8)):
+        state = memory.advance(state, step, "linear", np.full(CELL, time))
+    alpha, carried = memory.predict(state, 0.2, rule)
+    flow = 0.5 if rule in ("linear", "bdf2") else 0.32 + 0.2
+    assert float(alpha + carried[0, 0]) == pytest.approx(memory.factor * (1.0 + 0.8 * flow), rel=1e-13)
+    assert memory.advance(state, 0.2, rule, np.ones(CELL)).modes[0, 0, 0] == pytest.approx(flow, rel=1e-13)
