@@ -7,6 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, choose_memory
+from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.passive import smallest_loss
 
@@ -89,3 +90,92 @@ def test_table_shorter_than_the_program__is_refused():
     material = rv.Tabulated(tuple(ROWS), tuple(0.5 + ROWS**0.4))
     with pytest.raises(rv.InputError, match="the table ends at 10 s"):
         choose_memory(material, 11.0, 1e-3)
+
+
+def fluid(relaxation):
+    """Maxwell fluid with a compliance of one plus the age over the relaxation time, but for a factor."""
+    return rv.Prony(1.0, 1 / relaxation)
+
+
+@pytest.mark.parametrize("duration", [1.0, 5e-14, 3e6])
+def test_direct_history__is_offered_where_steps_of_a_thousandth_do_not_ring(duration):
+    """A linear step of a fluid rings from twice its relaxation time on; steps are halves of the program."""
+    shortest = duration / 512  # of those of a thousandth at least
+    choice = choose_memory(fluid(0.505 * shortest), duration, 1e-3, kind="direct")
+    assert isinstance(choice.memory, History)
+    assert (choice.series_error, choice.note) == (0.0, "direct history of every pressure, as asked for")
+    with pytest.raises(rv.InputError, match="rings on this material"):
+        choose_memory(fluid(0.495 * shortest), duration, 1e-3, kind="direct")
+
+
+def test_direct_history__is_refused_where_nothing_gives_way_at_once():
+    with pytest.raises(rv.InputError, match="an instantaneous compliance that is not small"):
+        choose_memory(rv.kelvin_voigt(1.0, 1.0), 1.0, 1e-3, kind="direct")
+    # jumps alone know no step that may ring
+    for material in (rv.kelvin_voigt(1.0, 1.0), Dented(1.0)):
+        assert isinstance(choose_memory(material, 0.0, 1e-3, kind="direct").memory, History)
+
+
+def test_unknown_kind_of_memory__is_refused():
+    with pytest.raises(rv.InputError, match="memory is 'recursive': expected 'auto' or 'direct'"):
+        choose_memory(rv.elastic(1.0), 1.0, 1e-3, kind="recursive")
+
+
+class Dented:
+    """A compliance of one that falls to a half for good at some age: no creep compliance."""
+
+    def __init__(self, age):
+        self.age = age
+
+    def contact_compliance(self, t):
+        return np.where(t < self.age, 1.0, 0.5)
+
+    def contact_integral(self, t):
+        return np.where(t < self.age, t, 0.5 * (t + self.age))
+
+
+@pytest.mark.parametrize("age", [2e-6, 1e-3, 0.9])
+def test_direct_history__looks_at_a_material_of_the_users_own_from_a_millionth_of_the_program_on(age):
+    duration = 40.0
+    with pytest.raises(rv.InputError, match=r"Dented\.contact_compliance is 0\.5") as refused:
+        choose_memory(Dented(age * duration), duration, 1e-3, kind="direct")
+    found = float(re.search(r" at ([\d.e+-]+) s", str(refused.value))[1])
+    assert age * duration <= found < 1.03 * age * duration, "a hundred instants in a decade"
+
+
+def test_jumps_alone__ask_for_the_instantaneous_compliance_only():
+    for material, note in (
+        (rv.PowerLaw(0.1, 1.0, 0.3), "instantaneous"),
+        (rv.PowerLaw(0.0, 1.0, 0.3), "no instantaneous"),
+    ):
+        choice = choose_memory(material, 0.0, 1e-3)
+        assert isinstance(choice.memory, History)
+        assert (choice.series_error, choice.note) == (0.0, f"{note} compliance")
+
+
+@pytest.mark.parametrize(
+    ("count", "fluidity", "form"),
+    [(1, 0.0, "both"), (3, 0.0, "both"), (2, 0.5, "both"), (3, 0.5, "pressure"), (4, 0.0, "pressure")],
+)
+def test_few_exponentials__are_remembered_as_pressures_and_as_displacements(count, fluidity, form):
+    """Up to three fields, a fluidity among them, and only where the grid may change."""
+    series = rv.Prony(1.0, fluidity, (1.0,) * count, tuple(10.0**i for i in range(count)))
+    assert choose_memory(series, 10.0, 1e-3, "pressure").memory.acts_on == form
+    assert choose_memory(series, 10.0, 1e-3).memory.acts_on == "displacement"
+
+
+@pytest.mark.parametrize(
+    ("material", "duration", "rings"),
+    [
+        # of a fluid (1 + h/t) / (1 + h/2t), which is 1.45 at h = 1.636 t
+        (fluid(1.0), 1.60, False),
+        (fluid(1.0), 1.67, True),
+        # of what creeps tenfold a millionth of the program after the load, and no more later
+        (rv.Prony(1.0, 0.0, (10.0,), (1e-6,)), 1.0, True),
+        (rv.Prony(1.0, 0.0, (0.2,), (1e-6,)), 1.0, False),
+        (fluid(1.0), 0.0, False),
+    ],
+)
+def test_two_step_rule__is_there_where_a_linear_step_may_ring(material, duration, rings):
+    memory = choose_memory(material, duration, 1e-3).memory
+    assert set(memory.rules) == {"linear", "euler", "right"} | ({"bdf2"} if rings else set())

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.direct import _BLOCK, History
+from roughvisc.mechanics.hereditary.direct import _BLOCK, History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 
 SHAPE = (3, 4)
@@ -99,3 +99,18 @@ def test_unknown_rule__is_refused():
     memory = History(rv.maxwell(1.0, 1.0))
     with pytest.raises(ValueError, match="no rule 'bdf2'"):
         memory.predict(memory.start(SHAPE), 0.1, "bdf2")
+
+
+def test_memory_needed__is_that_of_the_pressures_kept():
+    field = np.zeros(SHAPE)
+    field[:, 1:] = 2.0
+    _, state = run(History(rv.maxwell(1.0, 1.0)), [0.1] * 70, [field] * 70)
+    assert history_bytes(9, 71) == sum(block.pressures.nbytes for block in state.blocks)  # and the state at rest
+
+
+def test_constant_pressure__by_the_rule_of_a_jump_at_the_start_of_the_step():
+    """Each pressure came at the start of its step and has crept since."""
+    memory = History(rv.PowerLaw(0.3, 1.0, 0.4))
+    alpha, carried = memory.predict(memory.start(SHAPE), 0.7, "right")
+    assert alpha == pytest.approx(float(memory.material.contact_compliance(0.7)))
+    assert not carried.any()

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import direct as displaced
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.exponentials import Modes, mean_compliance, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import Modes, mean_compliance, old_weight, padded, stiff_ratio
 
 CELL = (1, 1)
 
@@ -121,8 +122,82 @@ def test_jump__changes_the_field_and_nothing_of_what_is_remembered():
     after = memory.advance(before, 0.0, "linear", field := rng.random((3, 2)))
     np.testing.assert_array_equal(after.modes, before.modes)
     assert after.field is field
+    with pytest.raises(ValueError, match="two states"):  # none reaches behind a jump
+        memory.predict(after, 0.1, "bdf2")
     # what a step after it sees is the new field from its beginning on
     alpha, carried = memory.predict(after, 0.1, "linear")
     held = memory.factor * float(memory.material.creep_compliance(0.1))
     past = memory.predict(memory.advance(before, 0.0, "linear", np.zeros((3, 2))), 0.1, "linear")[1]
     np.testing.assert_allclose(carried + alpha * field, past + held * field, rtol=1e-12)
+
+
+def test_weight_of_the_old_pressure__is_unbounded_where_nothing_has_crept():
+    assert old_weight(0.0, 0.0) == np.inf
+    assert old_weight(3.0, 2.0) == pytest.approx(0.5)
+    assert old_weight(3e-300, 1e-300) == pytest.approx(2.0)
+
+
+def test_products__with_a_pressure_are_those_with_what_each_exponential_displaces():
+    """``p K z`` by a dense kernel, whatever the fields are; a fluidity, which stores nothing, has none."""
+    shape, spacing = (5, 4), (1.0, 0.7)
+    rng = np.random.default_rng(3)
+    z = rng.random((3, *shape))
+    pressure = rng.random(shape) * (rng.random(shape) < 0.6)
+    expected = [np.sum(pressure * displaced(mode, spacing)) for mode in z[:2]]
+    dual, cells = (pressure, displaced(pressure, spacing)), np.flatnonzero(pressure)
+    series = rv.Prony(1.0, 0.5, (1.0, 2.0), (0.3, 3.0))
+    v = np.array([displaced(mode, spacing) for mode in z])
+    for acts_on, fields in (("pressure", z), ("displacement", v), ("both", np.stack((z, v), axis=1))):
+        assert Modes(series, acts_on).products(fields, dual, cells) == pytest.approx(expected, rel=1e-12)
+
+
+def test_larger_grid__holds_what_the_smaller_displaces():
+    """A memory of both forms: each pressure in its place, and displacements of it everywhere."""
+    shape, larger, offset, spacing = (3, 2), (6, 7), (2, 3), (1.0, 0.7)
+    rng = np.random.default_rng(5)
+    memory = Modes(rv.Prony(1.0, 0.5, (1.0,), (0.3,)), "both")
+    state, again = memory.start(shape), memory.start(larger)
+    for step in (0.2, 0.4):
+        p = rng.random(shape)
+        wide = np.zeros(larger)
+        wide[2:5, 3:5] = p
+        state = memory.advance(state, step, "linear", np.stack((p, displaced(p, spacing))))
+        again = memory.advance(again, step, "linear", np.stack((wide, displaced(wide, spacing))))
+    moved = memory.enlarged(state, larger, offset, lambda pressure: displaced(pressure, spacing))
+    assert moved.step == state.step
+    for name in ("modes", "field", "earlier"):
+        assert getattr(moved, name) == pytest.approx(getattr(again, name), rel=1e-12), name
+    assert memory.enlarged(memory.restart(state), larger, offset, np.copy).earlier is None
+    assert padded(np.ones((2, 1, 1)), (2, 3), (1, 2)).tolist() == [[[0, 0, 0], [0, 0, 1]]] * 2
+    with pytest.raises(ValueError, match="cannot be enlarged"):
+        Modes(rv.maxwell(1.0, 1.0)).enlarged(state, larger, offset, np.copy)
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2", "euler", "right"])
+def test_next_state__is_what_was_foretold(rule):
+    """``q = alpha p + carried`` is the compliance of the modes after the step, with unequal steps too."""
+    series = rv.Prony(1.0, 0.5, (1.0, 2.0), (0.3, 3.0))
+    memory = Modes(series)
+    rng = np.random.default_rng(6)
+    state = memory.advance(memory.start((2, 3)), 0.4, "euler", rng.random((2, 3)))
+    state = memory.advance(state, 0.7, "euler", rng.random((2, 3)))
+    alpha, carried = memory.predict(state, 0.25, rule)
+    after = memory.advance(state, 0.25, rule, field := rng.random((2, 3)))
+    weights = np.array([1.0, 2.0, 0.5])
+    expected = memory.factor * (series.glassy * field + np.tensordot(weights, after.modes, 1))
+    assert alpha * field + carried == pytest.approx(expected, rel=1e-12)
+    assert after.earlier is state.modes
+    assert after.step == 0.25
+
+
+@pytest.mark.parametrize("rule", ["linear", "bdf2", "euler", "right"])
+def test_fluidity__under_a_ramp_flows_as_each_rule_has_it(rule):
+    """Flow ``t^2 / 2`` under the pressure ``t``: exact by both rules of second order, else with the last."""
+    memory = Modes(rv.Prony(1.0, 0.8))
+    state = memory.start(CELL)
+    for step, time in ((0.5, 0.5), (0.3, 0.8)):
+        state = memory.advance(state, step, "linear", np.full(CELL, time))
+    alpha, carried = memory.predict(state, 0.2, rule)
+    flow = 0.5 if rule in ("linear", "bdf2") else 0.32 + 0.2
+    assert float(alpha + carried[0, 0]) == pytest.approx(memory.factor * (1.0 + 0.8 * flow), rel=1e-13)
+    assert memory.advance(state, 0.2, rule, np.ones(CELL)).modes[0, 0, 0] == pytest.approx(flow, rel=1e-13)

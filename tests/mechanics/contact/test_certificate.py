@@ -1,0 +1,256 @@
+"""What is known of a pressure that is no solution, by dense linear algebra and by Fourier series."""
+
+import math
+
+import numpy as np
+import pytest
+from support import rough_gap
+
+from roughvisc.mechanics.contact import full_contact
+from roughvisc.mechanics.contact.certificate import Certificate, certify
+from roughvisc.mechanics.contact.error_estimate import estimated_error
+from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+SHAPE, SPACING = (7, 6), (0.5, 0.8)
+CORNER = np.ones(SHAPE, bool)
+CORNER[:2, :3] = False
+
+
+class Case:
+    """A problem in its own units, a pressure on part of the cells, and the matrix that displaces them."""
+
+    def __init__(self, boundary="free", present=None, tolerance=1e-6, touching=0.6, **known):
+        self.halfspace = HalfSpace(SHAPE, SPACING, boundary)
+        self.gap = rough_gap(SHAPE)
+        wanted = {"load": None, "approach": None} | known
+        self.problem = Problem.scaled(self.halfspace, self.gap.copy(), **wanted, tolerance=tolerance, present=present)
+        cells = np.eye(self.gap.size).reshape(-1, *SHAPE)
+        ratio = self.problem.unit / self.problem.length
+        self.matrix = np.array([self.halfspace.displacement(cell).ravel() for cell in cells]) * ratio
+        rng = np.random.default_rng(1)
+        self.pressure = rng.random(SHAPE) * (rng.random(SHAPE) < touching)
+        if present is not None:
+            self.pressure *= present
+        if self.problem.load is not None:
+            self.pressure *= self.problem.load / self.pressure.sum()
+        self.displacement = (self.matrix @ self.pressure.ravel()).reshape(SHAPE)
+        self.separation = self.problem.gap + self.displacement
+        self.contact = np.flatnonzero(self.pressure)
+
+    def certificate(self):
+        return certify(self.problem, self.pressure, self.contact, self.displacement, self.separation.copy())
+
+
+def test_scaled_problem__is_the_same_in_other_units():
+    """Lengths over one of them, pressures over another, heights from the lowest point that is there."""
+    for known in ({"load": 3.0}, {"approach": 2.0}):
+        case = Case(present=CORNER, **known)
+        problem, lowest = case.problem, case.gap[CORNER].min()
+        assert problem.lowest == lowest > case.gap.min() or not lowest > case.gap.min()
+        assert problem.gap * problem.length + lowest == pytest.approx(case.gap)
+        pressure = np.arange(case.gap.size, dtype=float).reshape(SHAPE)
+        displaced = problem.influence.displacement(pressure)
+        assert displaced * problem.length == pytest.approx(case.halfspace.displacement(pressure * problem.unit))
+        if "load" in known:
+            assert problem.load * problem.unit == pytest.approx(3.0)
+        else:
+            assert problem.target * problem.length + lowest == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 2.0}], ids=["load", "approach"])
+@pytest.mark.parametrize("told", [False, True])
+def test_first_guess__is_made_admissible(known, told):
+    case = Case(present=CORNER, **known)
+    guess = np.random.default_rng(4).standard_normal(SHAPE)
+    if told:
+        guess = np.abs(guess) * CORNER
+    displacement = case.halfspace.displacement(guess) if told else None
+    pressure, displaced = case.problem.feasible(guess.copy(), displacement)
+    expected = np.maximum(guess, 0) * CORNER
+    expected *= 3.0 / expected.sum() if "load" in known else 1.0
+    assert pressure * case.problem.unit == pytest.approx(expected)
+    if told:
+        assert displaced == pytest.approx((case.matrix @ pressure.ravel()).reshape(SHAPE))
+    else:
+        assert displaced is None
+
+
+def test_first_guess__without_one_presses_what_lies_below_the_approach():
+    under = Case(approach=2.0)
+    for nothing in (None, np.zeros(SHAPE)):
+        pressure, displaced = under.problem.feasible(nothing, None)
+        assert displaced is None
+        assert pressure * under.problem.length == pytest.approx(np.maximum(2.0 - under.gap, 0))
+        loaded = Case(load=3.0, present=CORNER).problem.feasible(nothing, None)[0]
+        assert loaded == pytest.approx(CORNER / CORNER.sum())
+
+
+@pytest.mark.parametrize("present", [None, CORNER], ids=["all", "some"])
+def test_certificate__under_a_load_is_the_duality_gap(present):
+    """The dual value is that of the same pressure at the largest level at which it is feasible."""
+    case = Case(load=3.0, present=present)
+    found = case.certificate()
+    p, g = case.pressure.ravel(), case.problem.gap.ravel()
+    there = slice(None) if present is None else present.ravel()
+    primal = 0.5 * p @ case.matrix @ p + g @ p
+    lowest = (case.matrix @ p + g)[there].min()
+    dual = lowest * p.sum() - 0.5 * p @ case.matrix @ p
+    assert found.duality_gap == pytest.approx(primal - dual, rel=1e-10)
+    assert found.energy == pytest.approx(p @ case.matrix @ p, rel=1e-12)
+    assert found.level == pytest.approx((case.matrix @ p + g)[p > 0].mean(), rel=1e-12)
+    assert not found.converged
+    assert not found.hopeless
+
+
+@pytest.mark.parametrize("present", [None, CORNER], ids=["all", "some"])
+def test_certificate__under_an_approach_is_the_duality_gap(present):
+    """The dual point is the pressure and as much uniform pressure as keeps every cell from penetrating."""
+    case = Case(approach=2.0, present=present, touching=0.2)
+    found = case.certificate()
+    p, g = case.pressure.ravel(), case.problem.gap.ravel() - case.problem.target
+    everywhere = np.ones(g.size, bool) if present is None else present.ravel()
+    missing = max(0.0, -(case.matrix @ p + g)[everywhere].min())
+    assert missing > 0
+    q = p + missing * everywhere / (case.matrix @ everywhere.astype(float))[everywhere].min()
+    assert ((case.matrix @ q + g)[everywhere] > -1e-12).all()
+    expected = 0.5 * p @ case.matrix @ p + g @ p + 0.5 * q @ case.matrix @ q
+    if present is None:
+        assert found.duality_gap == pytest.approx(expected, rel=1e-10)
+    else:  # what absent cells are displaced is counted in, too
+        assert expected < found.duality_gap < 1.1 * expected
+    assert found.level == case.problem.target
+
+
+def test_certificate__of_nothing_is_none():
+    for known in ({"load": 3.0}, {"approach": 2.0}):
+        for boundary in ("free", "periodic"):
+            case = Case(boundary, **known)
+            nothing = np.zeros(SHAPE)
+            contact = np.arange(1)
+            found = certify(case.problem, nothing, contact, nothing, case.problem.gap.copy())
+            assert not found.converged
+            assert not found.settled
+
+
+@pytest.mark.parametrize("more", [0.5, 4.0])
+def test_certificate__of_a_periodic_surface_under_an_approach_knows_its_load_and_its_approach(more):
+    """The energy error of a pressure among those of its load, and what its own approach is off by."""
+    case = Case("periodic", approach=0.9 * float(rough_gap(SHAPE).mean()))
+    case.pressure *= more
+    case.displacement *= more
+    case.separation = case.problem.gap + case.displacement
+    p, g = case.pressure.ravel(), case.problem.gap.ravel()
+    s = case.matrix @ p + g
+    own = p @ s - s.min() * p.sum()
+    off = abs(p @ (s - 1.0)) + max(0.0, 1.0 - s.min()) * p.sum()
+    assert case.certificate().duality_gap == pytest.approx(max(own, off), rel=1e-10)
+
+
+def test_certificate__is_settled_where_it_converged_or_cannot():
+    assert Certificate(1.0, 1.0, 1.0, True, False).settled
+    assert Certificate(1.0, 1.0, 1.0, False, True).settled
+    assert not Certificate(1.0, 1.0, 1.0, False, False).settled
+
+
+def stiffness_by_fourier(case, separation, contact):
+    """``w.(1/K)w / mean(w)^2`` for the open gap: the periodic kernel is ``2 / |q|``."""
+    w = np.maximum(separation - case.problem.target, 0)
+    w.reshape(-1)[contact] = 0
+    qx = 2 * np.pi * np.fft.fftfreq(SHAPE[0], SPACING[0])[:, None]
+    qy = 2 * np.pi * np.fft.fftfreq(SHAPE[1], SPACING[1])
+    over = np.fft.ifft2(np.fft.fft2(w) * np.hypot(qx, qy) / 2).real
+    return float((w * over).sum()) / w.mean() ** 2 * case.problem.length / case.problem.unit
+
+
+def test_stiffness__is_that_of_the_open_gap():
+    case = Case("periodic", approach=0.9 * float(rough_gap(SHAPE).mean()), touching=0.8)
+    found = full_contact.stiffness(case.problem, case.contact, case.separation.copy())
+    assert found == pytest.approx(stiffness_by_fourier(case, case.separation, case.contact), rel=1e-5)
+    assert full_contact.stiffness(case.problem, np.arange(case.gap.size), case.separation.copy()) == math.inf
+
+
+def nearly_closed(amiss, short=1e-2, tolerance=1e-6, sign=1.0):
+    """All cells but one touch, and in one of those the gap is off; the load is one."""
+    case = Case("periodic", approach=(1 - short) * float(rough_gap(SHAPE).mean()), tolerance=tolerance)
+    case.contact = np.arange(1, case.gap.size)
+    case.separation = np.ones(SHAPE)
+    case.separation[0, 0] += case.problem.remaining * case.gap.size
+    case.separation[2, 3] += sign * amiss
+    return case
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["open", "penetrating"])
+def test_load__is_certain_where_the_gap_in_the_contact_is_small_over_what_is_left(sign):
+    """A gap of ``e`` on average in the contact is off by as much load as it has stiffness."""
+    for amiss, tolerance in ((1e-8, 1e-6), (1e-4, 1e-6), (1e-4, 1e-2)):
+        case = nearly_closed(amiss, tolerance=tolerance, sign=sign)
+        here = case.separation.take(case.contact)
+        load = 2.0
+        certain, unknown = full_contact.load_certainty(
+            case.problem, case.contact, case.separation.copy(), here, load, 1e-15
+        )
+        stiff = stiffness_by_fourier(case, case.separation, case.contact)
+        part = amiss / (case.gap.size * case.problem.remaining)
+        error = stiff * amiss / case.gap.size / load
+        limit = 10 * tolerance
+        assert not 0.8 < error / limit < 1.25
+        assert not 0.8 < part / limit < 1.25
+        assert (certain, unknown) == (part <= limit or error <= limit, False)
+        assert case.problem.influence.convolutions == int(part > limit), "the stiffness where that is not clear"
+    # no iteration can do more than rounding lets it
+    case = nearly_closed(1e-4, tolerance=1e-9, sign=sign)
+    here = case.separation.take(case.contact)
+    assert full_contact.load_certainty(case.problem, case.contact, case.separation.copy(), here, 2.0, 1e-5)[1]
+    assert full_contact.load_certainty(case.problem, case.contact, case.separation.copy(), here, 2.0, 1.0) == (
+        False,
+        True,
+    ), "nothing is left to full contact but rounding"
+
+
+@pytest.mark.parametrize(("short", "expected"), [(-1e-4, False), (1e-4, True), (1e-2, False)])
+def test_excess__is_a_load_that_leaves_no_gap_so_near_full_contact(short, expected):
+    case = Case("periodic", approach=(1 - short) * float(rough_gap(SHAPE).mean()))
+    everywhere = np.arange(case.gap.size)
+    # what is left is in parts of the approach above the lowest point
+    left = case.problem.remaining
+    assert left == pytest.approx(case.problem.gap.mean() - 1.0)
+    assert full_contact.carries_excess(case.problem, everywhere) == expected == (0 < left < 1e-3)
+    assert not full_contact.carries_excess(case.problem, everywhere[1:])
+
+
+def test_approach_under_a_load__is_the_level_of_the_contact_weighted_by_pressure():
+    case = Case(load=3.0)
+    s, p = case.separation, case.pressure
+    level = float(s[p > 0].mean())
+    found = full_contact.approach_under_load(case.problem, p, case.contact, s.copy(), level)
+    assert found == pytest.approx((p * s).sum() / p.sum())
+
+
+def test_estimated_error__of_a_pressure_that_the_solver_improved():
+    case = Case(load=3.0)
+    certificate = Certificate(4e-4, 2.0, 1.0, True, False)
+    arguments = (case.problem, case.pressure, case.contact, case.displacement)
+    # the change asked for, over the pressure, less as the square root of the duality gap fell
+    asked = 0.05 * case.problem.influence.scale
+    assert estimated_error(*arguments, certificate, (asked, 1e-2)) == pytest.approx(1.25 * 0.05 * 0.2)
+    assert estimated_error(*arguments, certificate, None) == pytest.approx(3.5 * 2e-4)
+    assert estimated_error(*arguments, Certificate(4e-4, 0.0, 1.0, True, False), None) == 0
+    assert estimated_error(*arguments, Certificate(-1e-20, 2.0, 1.0, True, False), (asked, 1e-2)) == 0
+    assert estimated_error(*arguments, Certificate(4e-4, 2.0, 1.0, False, True), None) == math.inf
+
+
+def test_estimated_error__where_the_energy_does_not_see_the_load():
+    """The change that undoes the residual in the contact, by Fourier series, and the load of a uniform one."""
+    case = Case("periodic", approach=0.9 * float(rough_gap(SHAPE).mean()), touching=0.8)
+    certificate = Certificate(1e-3, 1.0, 1.0, False, False)
+    found = estimated_error(case.problem, case.pressure, case.contact, case.displacement, certificate, None)
+    free = (case.separation < 1.0) | (case.pressure > 0)
+    residual = np.where(free, case.separation - 1.0, 0.0)
+    inverse = np.array(
+        [case.problem.influence.halfspace.approximate_inverse(c.astype(np.float32)).ravel()
+         for c in np.eye(case.gap.size).reshape(-1, *SHAPE)]
+    ).T  # fmt: skip
+    change = (inverse @ residual.ravel())[free.ravel()] * case.problem.length / case.problem.unit
+    uniform = stiffness_by_fourier(case, case.separation, case.contact) * abs(residual.sum()) / case.gap.size
+    assert found == pytest.approx((np.abs(change).sum() + uniform) / case.pressure.sum(), rel=1e-4)
