@@ -334,6 +334,7 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
         (VARIABLES[name].label + apart, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
         for name, apart in (
             ("force", ""),
+            ("nominal_pressure", ""),
             ("approach", ""),
             ("contact_area", ", counted"),
             ("contact_area_corrected", ", corrected"),
