@@ -52,7 +52,8 @@ def full_contact_pressure(slope: float, material: Material, duration: float) -> 
     ----------
     B. N. J. Persson, J. Chem. Phys. 115, 3840 (2001).
     """
-    return slope / float(material.contact_compliance(duration))
+    compliance = float(material.contact_compliance(duration))
+    return slope / compliance if compliance > 0 else math.inf  # nothing has crept yet
 
 
 def full_contact_warning(pressure: float, full: float) -> str:

@@ -151,6 +151,8 @@ def read_history(
     decimal: str | None,
 ) -> History:
     """As :func:`read_program`, with quantities in SI, for one column of what is controlled."""
+    if decimal not in (None, ".", ","):
+        raise InputError(f"decimal: found {decimal!r}: expected '.' or ','")
     wanted = {"time": as_wanted(time, "s"), control: as_wanted(column, UNITS[control])}
     columns, lines = read_sheet(path, wanted, decimal)
     times, values = columns["time"], _less(columns[control], zero) * factor

@@ -135,3 +135,4 @@ def test_full_contact__persson():
     assert not full_contact_warning(0.9e6, 1e6)
     assert not full_contact_warning(1.0, 0.0)
     assert not full_contact_warning(math.nan, 1e6)
+    assert full_contact_pressure(0.2, rv.kelvin_voigt(1e6, 1e5), 0.0) == math.inf  # it has not crept yet
