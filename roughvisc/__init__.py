@@ -30,6 +30,7 @@ _PUBLIC = {
         ),
         "roughvisc.mechanics.stepping.program": "Program",
         "roughvisc.study.simulation.simulate": "simulate",
+        "roughvisc.study.statement.histories": "read_program",
         "roughvisc.study.statement.case": "read_study read_cases vary study_schema",
         "roughvisc.study.storage.store": "open_result",
         "roughvisc.study.execution.run": "run",

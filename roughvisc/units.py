@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from functools import cache
 from numbers import Real
 from typing import Any
@@ -68,6 +69,102 @@ def quantity(value: str | float, unit: str, name: str = "") -> float:
     if not math.isfinite(result):
         raise InputError(f"{label}: expected {wanted}, finite")
     return result
+
+
+def is_quantity(value: Any, unit: str) -> bool:
+    """Whether a value is a number, or a string of a number and a unit that converts to this one."""
+    try:
+        quantity(value, unit)
+    except InputError:
+        return False
+    return True
+
+
+def shown(value: Any) -> str:
+    """What was found, short enough for a message."""
+    if isinstance(value, Mapping):
+        return f"a table with {', '.join(map(str, value)) or 'no keys'}"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def range_in_words(above: float | None, least: float | None, most: float | None, below: float | None) -> str:
+    """``" above 0 and up to 0.5"`` and the like; empty without bounds."""
+    words = [
+        f"{word} {bound:g}"
+        for word, bound in (("above", above), ("at least", least), ("up to", most), ("below", below))
+        if bound is not None
+    ]
+    return " " + " and ".join(words) if words else ""
+
+
+def wanted_quantity(
+    unit: str,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    below: float | None = None,
+) -> str:
+    """What is expected of a quantity, in words."""
+    wanted = "a number" if unit == "1" else f"a number in {unit}, or a string with a unit of its kind,"
+    return (wanted + range_in_words(above, least, most, below)).rstrip(",")
+
+
+def bounded_quantity(
+    value: str | float,
+    unit: str,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    below: float | None = None,
+    instead: Mapping[str, str] | None = None,
+) -> float:
+    """Value of a quantity in a given unit and between bounds: the check of study files and of loading programs.
+
+    Parameters
+    ----------
+    value : str or float
+        As :func:`quantity` takes it.
+    unit : str
+        The unit expected.
+    above, least, most, below : float, optional
+        Bounds, the first and the last excluded. [unit]
+    instead : mapping of str to str, optional
+        Key -> unit of quantities that may be meant where the unit is of another kind; the message suggests the key.
+
+    Returns
+    -------
+    float
+        The value in `unit`.
+
+    Raises
+    ------
+    InputError
+        If the value is no quantity of this kind, or outside the bounds.
+
+    Examples
+    --------
+    >>> bounded_quantity("2 MPa", "N", instead={"pressure": "Pa"})  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    InputError: found '2 MPa', which is in megapascal: expected ...; did you mean pressure = '2 MPa'?
+    """
+    try:
+        number = quantity(value, unit)
+    except InputError as error:
+        for key, other in (instead or {}).items():
+            if is_quantity(value, other):
+                raise InputError(f"{error}; did you mean {key} = {value!r}?") from None
+        raise
+    outside = (
+        (above is not None and not number > above)
+        or (least is not None and not number >= least)
+        or (most is not None and not number <= most)
+        or (below is not None and not number < below)
+    )
+    if outside:
+        raise InputError(f"found {shown(value)}: expected {wanted_quantity(unit, above, least, most, below)}")
+    return number
 
 
 def _parsed(text: str, unit: str, label: str, wanted: str) -> float:

@@ -117,6 +117,7 @@ VARIABLES: dict[str, Variable] = {
         ancillary=("approach_error",),
         short="approach",
     ),
+    "nominal_pressure": Variable(_SERIES, "Pa", "nominal pressure", "force over the area of the surface as given"),
     "work": Variable(
         _SERIES,
         "J",

@@ -33,6 +33,8 @@ BASE = {
 MEASURED = {
     "creep.csv": "time [s], compliance [1/MPa]\n0.01, 0.20\n0.1, 0.31\n1, 0.55\n10, 0.82\n",
     "relaxation.csv": "time [s], modulus [MPa]\n0.01, 3\n0.1, 2\n1, 1.5\n10, 1.2\n",
+    "machine.csv": '"Prüfzeit";"Standardkraft";"Standardweg"\n"s";"N";"mm"\n12,30;-0,0004;0,1000\n'
+    "12,40;0,0102;0,1021\n12,50;0,0199;0,1043\n12,60;0,0200;0,1050\n",
     "dma.csv": "frequency, storage [MPa], loss [MPa]\n0.1, 1, 0.2\n1, 1.5, 0.5\n10, 3, 0.6\n100, 3.5, 0.3\n",
 }
 
@@ -53,7 +55,7 @@ def there(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "surfaces", tmp_path / "surfaces")
     shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
     for name, text in MEASURED.items():
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_text(text, encoding="utf-8")
     known = [(table, dict(table)) for table in (instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES)]
     monkeypatch.chdir(tmp_path)
     yield tmp_path

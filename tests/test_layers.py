@@ -33,6 +33,7 @@ ALLOWED = {
         "mechanics.halfspace",
         "mechanics.hereditary",
         "mechanics.materials",
+        "units",
     },
     "mechanics.closed_forms": {"errors", "mechanics.materials", "mechanics.stepping"},
     "topography": _LABELS,

@@ -65,6 +65,8 @@ class March:
         Whether the coarse marches came to their end in the time that they were given.
     level : float
         Largest approach: what lies deeper cannot be touched. [m]
+    force : float
+        Largest force. [N]
     """
 
     steps: float
@@ -74,6 +76,7 @@ class March:
     contact: float
     whole: bool
     level: float = math.inf
+    force: float = math.nan
 
 
 def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
@@ -119,7 +122,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
     settings, program = replace(case.solving(), missing="absent", edge="accept"), case.program()
     scene, _ = prepare(Ground(height, settings.missing, kernel=settings.kernel), case.material(), program, settings)
     steps = rows = damped = 0
-    reached = contact = level = 0.0
+    reached = contact = level = force = 0.0
     work, instants = 0, [0.0]
     kept = set(scene.times or ())
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
@@ -128,7 +131,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         rows += settings.times is None or now in kept
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, float(np.mean(step.shown.pressure > 0)))
-        level = max(level, step.level)
+        level, force = max(level, step.level), max(force, step.shown.force)
         work, reached = step.state.convolutions, now
         instants.append(now)
         if work > _MOST_CONVOLUTIONS or steps > _MOST_STEPS:
@@ -140,7 +143,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         pace = (reached - instants[half]) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
-    return March(steps * stretch, kept_rows, work * stretch, part, contact, bool(whole), level)
+    return March(steps * stretch, kept_rows, work * stretch, part, contact, bool(whole), level, force)
 
 
 def _is_damped(scene: Scene, length: float) -> bool:

@@ -17,8 +17,9 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
+from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.simulation.notes import left_out
+from roughvisc.study.simulation.notes import left_out, loaded_slope
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
@@ -46,24 +47,29 @@ _COLUMNS = {
         "1",
         "largest contact fraction on a coarse grid, which rounds the summits off: rather too much",
     ),
+    "nominal_pressure": ("Pa", "largest nominal pressure, prescribed or of the coarse march: force over nominal area"),
+    "full_contact_pressure": ("Pa", "nominal pressure from which on contact takes 95 % of the area (Persson's theory)"),
     "convolutions": ("1", "convolutions expected, one forward and one inverse transform each"),
     "wall_time": ("s", "wall time expected, in one process with one thread"),
     "memory": ("byte", "memory of the process at its peak"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
+    "program_note": ("", "how a measured history became segments"),
+    "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
     "refusal": ("", "why it cannot run; empty if it can"),
 }
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height and its :func:`windows`, or why it cannot be had."""
+    """A surface's height, its :func:`windows` and its rms slope, or why it cannot be had."""
 
     height: xr.DataArray | None
     grows: bool
     problem: str
     windows: tuple[tuple[float, float], ...] = ()
     mirrored: bool = False
+    slope: float = 0.0
 
 
 def plan(
@@ -175,7 +181,7 @@ def _surface(case: Case) -> _Surface:
         ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored)
+    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored, loaded_slope(height, np.inf))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -230,6 +236,7 @@ def _row(
     exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
     omitted = left_out(choice, settings, window, mirrored)
     row |= {"memory_model": choice.note, "exponentials": exponentials, "left_out": omitted}
+    row |= _pressures(case, surface, choice, found.force if found and marched else np.nan)
     if found is None or problem:
         return row
     cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
@@ -244,6 +251,20 @@ def _row(
         "wall_time": wall_time(settings, cells, found, choice, convolution, part),
         "memory": bytes_needed(settings, cells, found, choice, part),
         "disk": disk(case, cells, found),
+    }
+
+
+def _pressures(case: Case, surface: _Surface, choice: Choice, force: float) -> dict[str, Any]:
+    """Nominal pressure, by the force of a coarse march [N] where the program states none, and that of full contact."""
+    assert surface.height is not None
+    program = case.program()
+    largest = largest_pressure(surface.height, program, force)
+    full = full_contact_pressure(surface.slope, choice.material, program.duration)
+    return {
+        "nominal_pressure": largest,
+        "full_contact_pressure": full,
+        "warning": full_contact_warning(largest, full),
+        "program_note": program.note,
     }
 
 

@@ -120,6 +120,7 @@ class Rows:
         columns = {name: np.array([rows[number][name] for number in kept]) for name in rows[0]}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
+        columns["nominal_pressure"] = columns["force"] / self._ground.nominal_area
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         if len(kept) < len(rows):

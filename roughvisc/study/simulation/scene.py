@@ -74,6 +74,8 @@ class Ground:
         height = _checked(height)
         self.mirrored = mirror and is_mirrored(height.values)
         self._lay(height)
+        #: Area that nominal pressures refer to: of the surface as it was given, absent cells included. [m2]
+        self.nominal_area = nominal_area(height)
         self._extent = float(_FIRST_EXTENT)
         if follow and not kernel.bulges and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
@@ -153,6 +155,11 @@ class Ground:
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
+def nominal_area(height: xr.DataArray) -> float:
+    """Area that the nominal pressure on a surface refers to: of its whole grid, absent cells included. [m2]"""
+    return height.size * math.prod(spacing(height, "height"))
+
+
 def follows(settings: Settings) -> bool:
     """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
     return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
@@ -166,6 +173,7 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
     InputError
         If surface, material, program and settings do not go together; nothing has been computed then.
     """
+    program = program.on_area(ground.nominal_area)
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, settings.time_step)

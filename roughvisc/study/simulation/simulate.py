@@ -23,7 +23,7 @@ from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
 from roughvisc.study.simulation.notes import accuracy_note, left_out, slope_note
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
-from roughvisc.study.simulation.scene import Ground, follows, prepare
+from roughvisc.study.simulation.scene import Ground, follows, nominal_area, prepare
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
@@ -63,7 +63,8 @@ def simulate(
         Of the half-space: one of roughvisc's, or any object with the two functions that
         :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
-        Load or approach against time.
+        Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
+        grid of heights as it is given, absent cells included.
     boundary : {"free", "periodic"}
         ``free`` for an indenter, ``periodic`` for a nominally flat scan.
     tolerance : float
@@ -154,8 +155,10 @@ def press(
     if not settings.grid_error:
         return dataset
 
+    loads = program.on_area(nominal_area(height))  # coarser grids may be of other sizes
+
     def again(few: xr.DataArray, times: list[float]) -> xr.Dataset:
-        return _press(few, material, program, replace(settings, times=times, fields=("pressure",)), False, None)
+        return _press(few, material, loads, replace(settings, times=times, fields=("pressure",)), False, None)
 
     return annotate(with_grid_error(dataset, height, again)).drop_vars(needed)
 
@@ -191,6 +194,7 @@ def _press(
         "series_error": choice.series_error,
         "kernel": "" if settings.kernel == HALF_SPACE else repr(settings.kernel),
         "material_note": complete(material).note,
+        "program_note": program.note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
         "left_out": left_out(choice, settings, followed, ground.mirrored),

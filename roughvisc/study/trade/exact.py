@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -137,7 +138,7 @@ def closed_form(case: Case, times: Array) -> ClosedForm | None:
     ):
         return None
     centre = (surface.size[0] / 2, surface.size[1] / 2)
-    material, program = case.material(), case.program()
+    material, program = case.material(), case.program().on_area(math.prod(surface.size))
     if recipe == "flat_punch":
         return _punch(surface.radius, centre, material, program, times)
     if recipe not in ("sphere", "cone"):

@@ -47,6 +47,7 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
         ("Kept times", f"{steps}, up to t = {readable(end, 's')}"),
         ("Force at the end", readable(float(last["force"]), "N")),
+        *_nominal_pressure(dataset),
         ("Approach at the end", readable(float(last["approach"]), "m")),
         (
             "Contact area at the end",
@@ -60,6 +61,7 @@ def result_table(dataset: xr.Dataset) -> Group:
             for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
             if name in dataset
         ),
+        *([("Program", dataset.attrs["program_note"])] if "program_note" in dataset.attrs else []),
         ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
         ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
         ("Cost: wall time", readable(float(last["wall_time"]), "s")),
@@ -107,6 +109,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Cases", f"{total}, {attrs['processes']} side by side"),
         *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
         ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
+        ("Nominal pressure at most", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
         ("Contact at most", _contact(costs)),
         ("Steps a case", _span(costs["steps"], "")),
         ("Convolutions a case", _span(costs["convolutions"], "")),
@@ -117,6 +120,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
     ]
     parts: list[Any] = [_two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    parts += [Text(f"Warning: {text}", style="bold red") for text in _warnings(costs)]
     if total > 1:
         parts += [Text(), _case_table(costs, varied)]
     return Group(*parts)
@@ -163,6 +167,7 @@ _MODELLED = {
     "memory_model": "Memory of the material",
     "scheme": "Time",
     "left_out": "Left out",
+    "program_note": "Program",
 }
 #: Cases that a plan lists one by one.
 _LISTED = 20
@@ -190,6 +195,16 @@ def _contact(costs: xr.Dataset) -> str:
     texts = dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (low, high))
     span = " to ".join(texts)
     return f"about {span} % of the grid, judged on a coarse one"
+
+
+def _warnings(costs: xr.Dataset) -> list[str]:
+    """What is foreseen in some cases, once, where most is foreseen; and in how many."""
+    warned = np.flatnonzero(costs["warning"].values != "")
+    if not warned.size:
+        return []
+    worst = warned[np.argmax(costs["nominal_pressure"].values[warned])]
+    several = f" ({warned.size} of {costs.sizes['case']} cases; this is the largest)" if costs.sizes["case"] > 1 else ""
+    return [f"{costs['warning'].values[worst]}{several}"]
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:
@@ -288,6 +303,15 @@ def _channel_row(channel: Any) -> tuple[str, str]:
     shape = " x ".join(map(str, channel.shape))
     described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
     return f"Channel {channel.index}", described
+
+
+def _nominal_pressure(dataset: xr.Dataset) -> list[tuple[str, str]]:
+    """At the end, and the largest where that is another; none of a result that was kept without it."""
+    if "nominal_pressure" not in dataset:
+        return []
+    end, most = float(dataset["nominal_pressure"][-1]), float(dataset["nominal_pressure"].max())
+    largest = f", at most {readable(most, 'Pa')}" if most > end * (1 + 1e-6) else ""
+    return [("Nominal pressure at the end", readable(end, "Pa") + largest)]
 
 
 def _accuracy(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:

@@ -227,4 +227,13 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> Non
         lowest = field == fields - 1 and number + columns >= len(frames)
         label_plane(ax, dataset, plane, 4, x=lowest, y=column == 0)
         if field == 0 or rows > 1:
-            ax.set_title(time_text(float(dataset["time"][frames[number]])), pad=3)
+            ax.set_title(_frame_text(dataset, frames[number]), pad=3)
+
+
+def _frame_text(dataset: xr.Dataset, frame: int) -> str:
+    """Time of a frame; below it the nominal pressure of a scan that stands for a larger surface."""
+    text = time_text(float(dataset["time"][frame]))
+    if "nominal_pressure" not in dataset or dataset.attrs.get("boundary") != "periodic":
+        return text
+    nominal = float(dataset["nominal_pressure"][frame])
+    return f"{text}\nnominal {unit_for([nominal], 'Pa').text(nominal)}"

@@ -334,7 +334,15 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
     time = float(one["time"])
     rows = [
         (VARIABLES[name].label, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
-        for name in ("force", "approach", "contact_area_corrected", "contact_area", "mean_gap", "work")
+        for name in (
+            "force",
+            "nominal_pressure",
+            "approach",
+            "contact_area_corrected",
+            "contact_area",
+            "mean_gap",
+            "work",
+        )
         if name in dataset
     ]
     if "contact_fraction" in dataset:

@@ -38,7 +38,7 @@ _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes in which a result speaks of its limits.
-_NOTES = ("material_note", "accuracy_note", "slope_note")
+_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note")
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -232,6 +232,7 @@ def _row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
         "times": dataset.sizes["time"],
         "force": _largest(dataset, "force", "N"),
+        "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
         "approach": _last(last, "approach", "m"),
         "area": _last(last, "contact_area_corrected", "m2"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",

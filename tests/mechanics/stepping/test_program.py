@@ -5,6 +5,7 @@ import math
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.stepping.segment import Segment
 
 
 def test_chain__adds_segments_in_order():
@@ -36,10 +37,15 @@ def test_cycle__is_a_sine_about_its_mean():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: rv.Program().load(-1.0, over=1), r"load reaches -1\.0 N: expected no negative load"),
-        (lambda: rv.Program().load(1.0, over=-1), r"duration of a load segment is -1"),
-        (lambda: rv.Program().load(math.nan, over=1), r"load is nan: expected a finite number \[N\]"),
-        (lambda: rv.Program().hold(1.0, control="force"), r"control is 'force': expected 'load' or 'approach'"),
+        (lambda: Segment("load", 1, -1.0), r"load reaches -1\.0 N: expected no negative load"),
+        (lambda: Segment("pressure", 1, -1.0), r"pressure reaches -1\.0 Pa: expected no negative pressure"),
+        (lambda: Segment("load", -1, 1.0), r"duration of a load segment is -1"),
+        (lambda: Segment("load", 1, math.nan), r"load is nan: expected a finite number \[N\]"),
+        (
+            lambda: rv.Program().hold(1.0, control="force"),
+            "program.0.control: found 'force': expected 'load'",
+        ),
+        (lambda: rv.Program().pressure("1 kPa", over=0).largest_load, "nominal pressure: expected loads"),
         (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), r"load reaches -1\.0 N"),
         (lambda: rv.Program.table([0, 2, 1], [0, 1, 2]), r"table row 2: time 1 s after 2\.0 s"),
         (lambda: rv.Program.table([1, 2], [0, 1]), r"table starts at time 1 s: expected 0"),
@@ -49,3 +55,24 @@ def test_cycle__is_a_sine_about_its_mean():
 def test_bad_programs__are_named(make, message):
     with pytest.raises(rv.InputError, match=message):
         make()
+
+
+def test_quantities__are_numbers_or_strings_with_units():
+    said = rv.Program().load("1 mN", over="50 ms").hold("1 min").approach("2 um", over=0).pressure("3 kPa", over="1 s")
+    meant = rv.Program().load(1e-3, over=0.05).hold(60.0).approach(2e-6, over=0.0).pressure(3e3, over=1.0)
+    assert said == meant
+    assert rv.Program.table(["0 ms", "20 ms"], ["0 N", "5 mN"]) == rv.Program.table([0, 0.02], [0, 5e-3])
+    assert rv.Program.cycle("2 mN", "1 mN", "4 ms", 3) == rv.Program.cycle(2e-3, 1e-3, 4e-3, 3)
+
+
+def test_pressure__is_a_load_on_an_area():
+    program = rv.Program().pressure(2e5, over=0.5).hold(1.0).hold(2.0, control="approach")
+    program += rv.Program.cycle(4e5, 1e5, 0.5, 2, control="pressure")
+    on = program.on_area(3e-6)
+    assert [s.control for s in on.segments] == ["load", "load", "approach", "load", "load"]
+    assert [s.end for s in on.segments] == pytest.approx([0.6, None, None, 1.2, 1.2])
+    assert on.segments[4].amplitude == pytest.approx(0.3)
+    assert on.corners == program.corners
+    assert on.largest_load == pytest.approx(1.5)
+    loads = rv.Program().load(1.0, over=1.0)
+    assert loads.on_area(3e-6) is loads

@@ -409,11 +409,11 @@ generate = "sphere"  =>  generat = "sphere"
     'generate'?
 
 load = "2 N"  =>  laod = "2 N"
-| program.0: found a table with laod, over: expected exactly one of load, approach, hold, cycle, table; did you
-    mean 'load'?
+| program.0: found a table with laod, over: expected exactly one of load, approach, pressure, hold, cycle, table; did
+    you mean 'load'?
 
 hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
-| program.1.control: found 'force': expected 'load' or 'approach'
+| program.1.control: found 'force': expected 'load', 'approach' or 'pressure'
 
 [material]  =>  [materials]
 | 2 problems

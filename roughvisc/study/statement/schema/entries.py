@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, WrapValidator
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity
+from roughvisc.units import bounded_quantity, range_in_words, shown, wanted_quantity
 
 Check = Callable[[Any], Any]
 
@@ -23,24 +23,6 @@ class Unit:
     symbol: str
 
 
-def shown(value: Any) -> str:
-    """What was found, short enough for a message."""
-    if isinstance(value, Mapping):
-        return f"a table with {', '.join(map(str, value)) or 'no keys'}"
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def range_in_words(above: float | None, least: float | None, most: float | None, below: float | None) -> str:
-    """``" above 0 and up to 0.5"`` and the like; empty without bounds."""
-    words = [
-        f"{word} {bound:g}"
-        for word, bound in (("above", above), ("at least", least), ("up to", most), ("below", below))
-        if bound is not None
-    ]
-    return " " + " and ".join(words) if words else ""
-
-
 def measured(
     unit: str,
     *,
@@ -48,28 +30,20 @@ def measured(
     least: float | None = None,
     most: float | None = None,
     below: float | None = None,
+    instead: Mapping[str, str] | None = None,
 ) -> Any:
     """Kind: a quantity in SI as a float, from a number or a string with a unit; ``unit="1"`` is a pure number.
 
     Values are rounded to 15 significant digits, so that ``"10 um"`` and ``1e-5`` are the same to the last bit.
+    ``instead`` are keys to suggest for quantities of other units.
     """
-    pure = unit == "1"
-    wanted = "a number" if pure else f"a number in {unit}, or a string with a unit of its kind,"
-    wanted = (wanted + range_in_words(above, least, most, below)).rstrip(",")
+    wanted = wanted_quantity(unit, above, least, most, below)
 
     def check(value: Any) -> float:
-        number = quantity(value, unit)
-        outside = (
-            (above is not None and not number > above)
-            or (least is not None and not number >= least)
-            or (most is not None and not number <= most)
-            or (below is not None and not number < below)
-        )
-        if outside:
-            raise InputError(f"found {shown(value)}: expected {wanted}")
+        number = bounded_quantity(value, unit, above=above, least=least, most=most, below=below, instead=instead)
         return float(f"{number:.15g}") + 0.0  # no negative zero
 
-    schema = {"type": "number"} if pure else {"type": ["number", "string"]}
+    schema = {"type": "number"} if unit == "1" else {"type": ["number", "string"]}
     return Annotated[float, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted), Unit(unit)]
 
 

@@ -1,0 +1,220 @@
+"""Loading programs from tables of test machines: columns, decimal marks, time zero, noise, thinning."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.study.statement.case import Case, read_cases, read_study
+from roughvisc.study.statement.histories import thinned
+
+STUDY = """
+[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.2 mm"
+shape = [8, 7]
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+"""
+NAMES = {"time": "t", "load": "F"}
+#: a trapezium of load: up within 1 s, held to 3 s, down within 0.5 s
+TIMES, LOADS = (0, 1, 3, 3.5), (0, 0.2, 0.2, 0)
+
+
+def write(folder, text, encoding="utf-8"):
+    path = folder / "machine.csv"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding", "names"),
+    [
+        ("Time [s],Load [mN]\n0,0\n1,200\n3,200\n3.5,0", "utf-8", {"time": "Time", "load": "Load"}),
+        ("Kraft/mN;Zeit/ms\n0;0\n200;1000\n200;3000\n0;3500", "utf-8-sig", {"time": "zeit", "load": "Kraft/mN"}),
+        (
+            '"Prüfung";"Gummi 3"\r\n"Rate";"1,5"\r\n\r\n"Prüfzeit";"Kraft"\r\n"s";"N"\r\n'
+            "0,0;0,0\r\n1,0;0,2\r\n3,0;0,2\r\n3,5;0,0",
+            "cp1252",
+            {"time": "Prüfzeit", "load": "Kraft"},
+        ),
+        ("t in s\tF in mN\n0\t0\n1,000\t200\n3,000\t200\n3,500\t0", "utf-16", {"time": "t", "load": "F in mN"}),
+        ("Time  Force\n(s)  (N)\n0 0\n1 2e-1\n3 2E-1\n3.5 0", "utf-8", {"time": "Time", "load": "Force"}),
+        ("time_s,F\n0,0\n1,0.2\n3,0.2\n3.5,0", "utf-8", {"time": "time_s", "load": "F [N]"}),
+        ("t [ms];F [uN]\n0;0\n1.000,0;200.000,0\n3.000,0;200.000,0\n3.500,0;0", "utf-8", NAMES),
+        (
+            '"t [ms]","F [mN]"\n"0","0"\n"1,000.0","200"\n"3,000.0","200"\n"3,500.0","0"',
+            "utf-8",
+            NAMES,
+        ),
+    ],
+    ids=["commas", "slashes", "german", "tabs", "blanks", "unit by hand", "points group", "commas group"],
+)
+def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
+    assert rv.read_program(write(tmp_path, text, encoding), **names) == rv.Program.table(TIMES, LOADS)
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "found"),
+    [
+        ("t [s],F [N]\n0,0", {"time": "t", "load": "Force"}, "has columns t [s], F [N]: expected load = 'Force'"),
+        (
+            "t [s],F\n0,0\n1,1",
+            NAMES,
+            "column 'F' tells no unit: expected one, such as load = 'F [N]'",
+        ),
+        ("t [s],F [mm]\n0,0\n1,1", NAMES, "unit of column 'F [mm]' is '1 mm', which is in"),
+        ("t [s],F [N]\n0,0\n1,1", {"time": "t", "load": "F [mN]"}, "column 'F [N]' is in 'N', and load says 'mN'"),
+        (
+            "t [s],F [N],F [mN]\n0,0,0",
+            NAMES,
+            "line 1: load = 'F' fits the columns 'F [N]', 'F [mN]'",
+        ),
+        ("t [s],F [N]\n0,0\n1,?", NAMES, "line 3: found '?': expected a number for load"),
+        ("t [s];F [N]\n0;0,5\n1;0.5", NAMES, "holds '0,5' and '0.5': expected one decimal mark"),
+        ("t [s],F [N]\n0,0\n2,1\n1,1", NAMES, "line 4: time 1 s after 2 s"),
+        ("t [s],F [N]\n0,0\n1,1\n1,2\n1,3", NAMES, "lines 3 to 5: three rows at 1 s"),
+        (
+            "t [s],F [N]\n0,0\n1,1\n2,-0.1",
+            NAMES,
+            "load falls to -0.1 N at 2 s: expected none below",
+        ),
+        ("t [s],F [N]\n0,0\n1,-1", NAMES, "count compression negative? Then factor = -1"),
+        ("t [s],F [N]\n1,0\n2,1", {"time": "t", "load": "F", "start": 0.5}, "in order from 1 to 2 s"),
+        ("t [s],F [N]", NAMES, "holds no rows below the heading in line 1"),
+    ],
+)
+def test_bad_tables__are_named(tmp_path, text, keys, found):
+    path = write(tmp_path, text)
+    with pytest.raises(rv.InputError) as error:
+        rv.read_program(path, **keys)
+    assert str(error.value).startswith(str(path))
+    assert found in str(error.value)
+
+
+def test_start_end_zero_factor__choose_the_part_that_counts(tmp_path):
+    path = write(tmp_path, "t [s],x [mm]\n10,5\n11,4\n13,3\n14,3")  # downward motion, touch at 4 mm
+    program = rv.read_program(path, time="t", approach="x", zero="4 mm", factor=-1, start="11 s", end=12, thin=0)
+    assert program == rv.Program.table([0, 1], [0, 0.5e-3], control="approach")
+    assert "11 s in the file is time zero" in program.note
+    between = rv.read_program(path, time="t", approach="x", zero="4 mm", factor=-1, start=11.5, end=13.5, thin=0)
+    assert between == rv.Program.table([0, 1.5, 2], [0.25e-3, 1e-3, 1e-3], control="approach")
+
+
+def test_noise_below_zero__counts_as_zero_up_to_its_limit(tmp_path):
+    path = write(tmp_path, "t [s],F [mN]\n0,-1\n1,100\n2,-0.5\n3,0")
+    program = rv.read_program(path, time="t", load="F", thin=0)
+    assert program == rv.Program.table([0, 1, 2, 3], [0, 0.1, 0, 0])
+    assert "2 rows below zero count as zero, the lowest -0.001 N" in program.note
+    rv.read_program(path, time="t", load="F", noise="1 mN")
+    with pytest.raises(rv.InputError, match=r"more than noise, 0\.0009 N"):
+        rv.read_program(path, time="t", load="F", noise="0.9 %")
+    with pytest.raises(rv.InputError, match="noise: found '1 s', which is in second: expected a number in N"):
+        rv.read_program(path, time="t", load="F", noise="1 s")
+
+
+def distance(times, values, kept):
+    """Largest distance of the rows from the straight lines between those kept, which include both rows of a jump."""
+    worst = 0.0
+    for first, last in itertools.pairwise(kept):
+        if times[last] > times[first]:
+            inside = slice(first, last + 1)
+            worst = max(
+                worst,
+                np.abs(np.interp(times[inside], times[[first, last]], values[[first, last]]) - values[inside]).max(),
+            )
+        else:
+            assert last == first + 1
+    return worst
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0, 3.0]), st.floats(0, 10)), min_size=3, max_size=80),
+    st.floats(0.01, 3),
+)
+def test_thinned__passes_every_row_within_the_tolerance(rows, tolerance):
+    steps, values = map(np.array, zip(*rows, strict=True))
+    steps[1:][(steps[1:] == 0) & (steps[:-1] == 0)] = 1.0  # at most two rows at one time
+    times = np.cumsum(steps)
+    kept = thinned(times, values, tolerance)
+    assert kept[0] == 0
+    assert kept[-1] == len(times) - 1
+    assert (np.diff(kept) > 0).all()
+    assert distance(times, values, kept) <= tolerance * (1 + 1e-9)
+
+
+def test_thinned__finds_the_corners_of_a_noisy_trapezium():
+    times = np.linspace(0, 10, 5001)
+    clean = np.interp(times, [0, 2, 7, 10], [0, 1, 1, 0.4])
+    noisy = clean + 0.004 * np.random.default_rng(1).uniform(-1, 1, times.size)
+    kept = thinned(times, noisy, 0.01)
+    assert 4 <= len(kept) <= 6  # three segments are there
+    assert distance(times, noisy, kept) <= 0.01
+    assert len(thinned(times, clean, 1e-6)) == 4
+    assert len(thinned(times, clean, 0)) == 5001
+
+
+def test_study__takes_columns_by_key_and_keeps_the_case_whole(tmp_path):
+    path = write(tmp_path, "Zeit [s];Druck [kPa];Weg [um]\n2,5;0;0\n3,5;20;2\n4,5;20;1")
+    study = tmp_path / "study.toml"
+    study.write_text(STUDY + 'table = { file = "machine.csv", time = "Zeit", pressure = "Druck" }')
+    case = read_study(study)
+    assert case.program() == rv.Program.table([0, 1, 2], [0, 2e4, 2e4], control="pressure")
+    assert case.program().note.startswith("machine.csv: 3 rows became 2 segments")
+    motion = STUDY + 'table = { file = "machine.csv", time = "Zeit", approach = "Weg", start = "3.5 s" }'
+    study.write_text(motion + '\n[sweep]\n"program.0.table.thin" = [0, "1 um"]')
+    exact, thin = read_cases(study)
+    assert exact.program() == rv.Program.table([0, 1], [2e-6, 1e-6], control="approach")
+    assert thin.varied == {"program.0.table.thin": "1 um"}
+    path.unlink()
+    again = Case.from_json(case.to_json())
+    assert again.key == case.key
+    assert again.program().note == case.program().note
+
+
+@pytest.mark.parametrize(
+    ("table", "found"),
+    [
+        ('{ file = "machine.csv", laod = "F" }', "program.0.table.laod: unknown key; did you mean 'load'?"),
+        ('{ file = "gone.csv" }', "program.0.table.file: found 'gone.csv', which does not exist"),
+        ('{ file = "machine.csv", zero = "1 mm" }', "program.0.table.zero: found '1 mm', which is in millimeter"),
+        ('{ file = "machine.csv", thin = "1 s" }', "program.0.table.thin: found '1 s', which is in second"),
+        ('{ file = "machine.csv", time = "t" }', "expected load = 'load'; the keys time and load choose by name"),
+    ],
+)
+def test_study__refuses_in_plain_words(tmp_path, table, found):
+    write(tmp_path, "t [s];F [N]\n0;0\n1;1")
+    study = tmp_path / "study.toml"
+    study.write_text(STUDY + f"table = {table}")
+    with pytest.raises(rv.InputError) as error:
+        read_study(study)
+    assert found in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_python__says_what_a_study_says(tmp_path):
+    study = tmp_path / "study.toml"
+    for key, value, make in (
+        ("load", '"2 MPa"', lambda: rv.Program().load("2 MPa", over="1 s")),
+        ("load", "-1.5", lambda: rv.Program().load(-1.5, over="1 s")),
+        ("approach", '"2 N"', lambda: rv.Program().approach("2 N", over="1 s")),
+        ("pressure", '"2 m"', lambda: rv.Program().pressure("2 m", over="1 s")),
+        ("pressure", '"2 kPa"\nover = "1 N"', lambda: rv.Program().pressure("2 kPa", over="1 N")),
+        ("hold", '"-1 s"', lambda: rv.Program().hold("-1 s")),
+    ):
+        over = "" if "over" in value or key == "hold" else '\nover = "1 s"'
+        study.write_text(STUDY + f"{key} = {value}{over}")
+        with pytest.raises(rv.InputError) as read:
+            read_study(study)
+        with pytest.raises(rv.InputError) as made:
+            make()
+        assert str(read.value) == f"{study}: {made.value}"
+    with pytest.raises(rv.InputError, match="did you mean pressure = '2 MPa'"):
+        rv.Program().load("2 MPa", over=0)
