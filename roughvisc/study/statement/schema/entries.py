@@ -48,17 +48,19 @@ def measured(
     least: float | None = None,
     most: float | None = None,
     below: float | None = None,
+    difference: bool = False,
 ) -> Any:
     """Kind: a quantity in SI as a float, from a number or a string with a unit; ``unit="1"`` is a pure number.
 
-    Values are rounded to 15 significant digits, so that ``"10 um"`` and ``1e-5`` are the same to the last bit.
+    ``difference``: it is a difference of temperatures. Values are rounded to 15 significant digits, so that ``"10 um"``
+    and ``1e-5`` are the same to the last bit.
     """
     pure = unit == "1"
     wanted = "a number" if pure else f"a number in {unit}, or a string with a unit of its kind,"
     wanted = (wanted + range_in_words(above, least, most, below)).rstrip(",")
 
     def check(value: Any) -> float:
-        number = quantity(value, unit)
+        number = quantity(value, unit, difference=difference)
         outside = (
             (above is not None and not number > above)
             or (least is not None and not number >= least)
