@@ -28,6 +28,7 @@ _PUBLIC = {
             "Prony PowerLaw Tabulated elastic maxwell kelvin_voigt zener from_relaxation pair "
             "from_creep_table from_relaxation_table from_dynamic"
         ),
+        "roughvisc.mechanics.materials.temperature": "shifted wlf_shift arrhenius_shift",
         "roughvisc.mechanics.stepping.program": "Program",
         "roughvisc.study.simulation.simulate": "simulate",
         "roughvisc.study.statement.histories": "read_program",

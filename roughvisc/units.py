@@ -29,7 +29,7 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def quantity(value: str | float, unit: str, name: str = "") -> float:
+def quantity(value: str | float, unit: str, name: str = "", *, difference: bool = False) -> float:
     """Value of a quantity in a given unit.
 
     Parameters
@@ -41,6 +41,8 @@ def quantity(value: str | float, unit: str, name: str = "") -> float:
         The unit expected, as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
     name : str, optional
         What the quantity is, for the message: a key of a study file, or a parameter.
+    difference : bool
+        Whether it is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are refused.
 
     Returns
     -------
@@ -57,11 +59,13 @@ def quantity(value: str | float, unit: str, name: str = "") -> float:
     --------
     >>> quantity("10 um", "m"), quantity("0.1 MPa s", "Pa s"), quantity(2, "N")
     (1e-05, 100000.0, 2.0)
+    >>> quantity("25 degC", "K"), quantity("25 °C", "K")
+    (298.15, 298.15)
     """
     label = f"{name} is {value!r}" if name else f"found {value!r}"
     wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
     if isinstance(value, str):
-        result = _parsed(value, unit, label, wanted)
+        result = _parsed(value, unit, label, wanted, difference)
     elif isinstance(value, Real) and not isinstance(value, bool):
         result = float(value)
     else:
@@ -119,6 +123,7 @@ def bounded_quantity(
     most: float | None = None,
     below: float | None = None,
     instead: Mapping[str, str] | None = None,
+    difference: bool = False,
 ) -> float:
     """Value of a quantity in a given unit and between bounds: the check of study files and of loading programs.
 
@@ -132,6 +137,8 @@ def bounded_quantity(
         Bounds, the first and the last excluded. [unit]
     instead : mapping of str to str, optional
         Key -> unit of quantities that may be meant where the unit is of another kind; the message suggests the key.
+    difference : bool
+        Whether it is a difference of temperatures.
 
     Returns
     -------
@@ -150,7 +157,7 @@ def bounded_quantity(
     InputError: found '2 MPa', which is in megapascal: expected ...; did you mean pressure = '2 MPa'?
     """
     try:
-        number = quantity(value, unit)
+        number = quantity(value, unit, difference=difference)
     except InputError as error:
         for key, other in (instead or {}).items():
             if is_quantity(value, other):
@@ -167,7 +174,8 @@ def bounded_quantity(
     return number
 
 
-def _parsed(text: str, unit: str, label: str, wanted: str) -> float:
+def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> float:
+    text = text.replace("°C", "degC").replace("°F", "degF")
     matched = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
     if matched is None:
         raise InputError(f"{label}, which is no quantity: expected {wanted}")
@@ -187,6 +195,9 @@ def _parsed(text: str, unit: str, label: str, wanted: str) -> float:
         raise InputError(f"{label}, which is in {given}: expected {wanted}")
     try:
         converted = float(_registry().Quantity(number, given).to(expected).magnitude)
-    except Exception as error:  # offset and logarithmic units: decibels, degrees Celsius
+        begins = float(_registry().Quantity(0.0, given).to(expected).magnitude)
+    except Exception as error:  # logarithmic units: decibels
         raise InputError(f"{label}, which does not convert: expected {wanted}") from error
+    if difference and begins:
+        raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")

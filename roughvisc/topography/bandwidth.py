@@ -141,20 +141,36 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int]) -> xr.DataArray:
     """
     h = checked(h, "resample")
     shape = counts("shape", shape)
-    present = np.isfinite(h.values)
-    along_x, along_y = (_weights(old, new) for old, new in zip(h.shape, shape, strict=True))
-    total = along_x @ np.where(present, h.values, 0.0) @ along_y.T
-    share = along_x @ present.astype(float) @ along_y.T
-    with np.errstate(invalid="ignore", divide="ignore"):
-        heights = np.where(share >= 0.5 - 1e-12, total / share, np.nan)
+    heights, filled = averaged(h, *(_weights(old, new) for old, new in zip(h.shape, shape, strict=True)))
     axes = []
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
     grid = with_coordinates(heights, *axes, h.attrs)
-    if "filled" in h.coords:
-        touched = along_x @ h["filled"].transpose("x", "y").values.astype(float) @ along_y.T > 0
-        grid = grid.assign_coords(filled=(("x", "y"), touched, h["filled"].attrs))
+    if filled is not None:
+        grid = grid.assign_coords(filled=(("x", "y"), filled, h["filled"].attrs))
     return noted(grid, f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells")
+
+
+def averaged(
+    h: xr.DataArray, along_x: scipy.sparse.csr_array, along_y: scipy.sparse.csr_array
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Heights on another grid by weights along each axis, whose rows sum to one.
+
+    Returns
+    -------
+    heights : ndarray
+        Means over the points present; missing where they have less than half the weight. [m]
+    filled : ndarray or None
+        Where a point that was filled in has a part.
+    """
+    present = np.isfinite(h.values)
+    total = along_x @ np.where(present, h.values, 0.0) @ along_y.T
+    share = along_x @ present.astype(float) @ along_y.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        heights = np.where(share >= 0.5 - 1e-12, total / share, np.nan)
+    if "filled" not in h.coords:
+        return heights, None
+    return heights, along_x @ h["filled"].transpose("x", "y").values.astype(float) @ along_y.T > 0
 
 
 def _polynomial(heights: np.ndarray, order: int) -> np.ndarray:

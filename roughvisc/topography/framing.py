@@ -10,6 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.grid import checked, like, noted, pair, spacing, valid_values, with_coordinates
+from roughvisc.topography.laying import laid_on
 
 
 def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> xr.DataArray:
@@ -92,48 +93,104 @@ def invert(h: xr.DataArray) -> xr.DataArray:
     return noted(like(h, -h.values), "inverted")
 
 
-def combine(h1: xr.DataArray, h2: xr.DataArray, flip: Literal["x", "y"] | None = None) -> xr.DataArray:
+def combine(
+    h1: xr.DataArray,
+    h2: xr.DataArray,
+    flip: Literal["x", "y"] | None = None,
+    *,
+    align: Literal["grid", "centre"] = "grid",
+    offset: tuple[float, float] = (0.0, 0.0),
+) -> xr.DataArray:
     """One rigid profile for two scanned faces that are pressed together: the sum of their heights.
 
     Parameters
     ----------
     h1, h2 : xarray.DataArray
-        Heights of the faces, each with its peaks towards the other, on one grid. [m]
+        Heights of the faces, each with its peaks towards the other. [m]
     flip : {"x", "y"}, optional
         The axis along which the second face is reversed, as it is when a scan taken from above is turned over onto
         the first. Default: `h2` is in the coordinates of `h1` already.
+    align : {"grid", "centre"}, default "grid"
+        "grid": the two are on one grid. "centre": the second face, turned over, is laid with its centre on that of the
+        first; the sum is on those cells of the first that the second covers wholly. Over them the second is
+        averaged by area where its cells are smaller, and linear between its cell centres where they are larger.
+    offset : pair of float
+        How far the second's centre lies from that of the first, along x and y; with `align` "centre". [m]
 
     Returns
     -------
     xarray.DataArray
-        Sum of heights, missing where either is, marked as filled where either was. [m]
+        Sum of heights on the grid of the first, missing where either is, marked as filled where either was. [m]
 
     Raises
     ------
     InputError
-        If the grids differ: resample and crop them to one first, nothing is aligned silently.
+        If the grids differ and are not aligned by their centres, or the faces have less than two cells in common along
+        an axis.
+
+    Notes
+    -----
+    Two elastic or viscoelastic half-spaces that touch without friction have the gap of one rigid profile, the sum of
+    both, before a flat half-space whose contact compliance is the sum of theirs, :func:`roughvisc.pair`.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
+    if flip not in (None, "x", "y"):
+        raise InputError(f"combine: flip is {flip!r}: expected 'x', 'y' or None")
+    if align not in ("grid", "centre"):
+        raise InputError(f"combine: align is {align!r}: expected 'grid' or 'centre'")
+    about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
+    sha = h2.attrs.get("source_sha256")
+    line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
+    h2 = h2 if flip is None else _reversed(h2, flip)
+    line += f", reversed along {flip}" if flip else ""
+    if align == "centre":
+        h1, h2 = laid_on(h1, h2, offset)
+        apart = ", ".join(f"{float(d):.6g}" for d in offset)
+        line += f", its centre ({apart}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
+    elif tuple(offset) != (0.0, 0.0):
+        raise InputError(f"combine: offset is {offset!r} with align='grid': expected align='centre'")
+    _refuse_another_grid(h1, h2)
+    both = like(h1, h1.values + h2.values)
+    both.attrs = {key: value for key, value in h1.attrs.items() if key not in ("recipe", "highest", "missing")}
+    if _absent_only(h1) and _absent_only(h2) and np.isnan(both.values).any():
+        both.attrs["missing"] = "absent"
+    marks = [_filled(h1), _filled(h2)]
+    if marks[0].any() or marks[1].any():
+        attrs = next(h["filled"].attrs for h in (h1, h2) if "filled" in h.coords)
+        both = both.assign_coords(filled=(("x", "y"), marks[0] | marks[1], attrs))
+    methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
+    return noted(
+        both,
+        line + (f"; the second face: {about}" if about else ""),
+        **({"fill_method": ", ".join(methods)} if methods else {}),
+    )
+
+
+def _absent_only(h: xr.DataArray) -> bool:
+    """Whether there is no material where no height is, if there is such a place at all."""
+    return h.attrs.get("missing") == "absent" or bool(np.isfinite(h.values).all())
+
+
+def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
     same = h1.shape == h2.shape and all(
         np.abs(h1[axis].values - h2[axis].values).max() <= 1e-6 * d
         for axis, d in zip(("x", "y"), spacing(h1), strict=True)
     )
     if not same:
         described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
-        raise InputError(f"combine: found {described[0]} and {described[1]}: expected one grid (see resample and crop)")
-    if flip not in (None, "x", "y"):
-        raise InputError(f"combine: flip is {flip!r}: expected 'x', 'y' or None")
-    second = h2.values if flip is None else np.flip(h2.values, "xy".index(flip))
-    line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (
-        f", reversed along {flip}" if flip else ""
-    )
-    both = like(h1, h1.values + second)
-    marks = [_filled(h1), _filled(h2) if flip is None else np.flip(_filled(h2), "xy".index(flip))]
-    if marks[0].any() or marks[1].any():
-        attrs = next(h["filled"].attrs for h in (h1, h2) if "filled" in h.coords)
-        both = both.assign_coords(filled=(("x", "y"), marks[0] | marks[1], attrs))
-    methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
-    return noted(both, line, **({"fill_method": ", ".join(methods)} if methods else {}))
+        raise InputError(
+            f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
+            "(see also resample and crop)"
+        )
+
+
+def _reversed(h: xr.DataArray, axis: str) -> xr.DataArray:
+    """The heights and marks in the opposite order along an axis whose coordinate stays. [m]"""
+    return h.isel({axis: slice(None, None, -1)}).assign_coords({axis: h[axis]})
 
 
 def _filled(h: xr.DataArray) -> np.ndarray:

@@ -36,6 +36,8 @@ class Tabulated:
         ascend: such decreases are evened out by isotonic regression.
     poisson : float
         Poisson ratio, constant in time.
+    remark : str
+        What the notes say further. No part of the comparison.
 
     Attributes
     ----------
@@ -55,6 +57,7 @@ class Tabulated:
     compliances: tuple[float, ...]
     noise: float = 0.0
     poisson: float = 0.5
+    remark: str = field(default="", compare=False)
     repaired: tuple[float, ...] = field(init=False, repr=False, compare=False)
     notes: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
@@ -73,7 +76,7 @@ class Tabulated:
                 f"nothing was measured before {times[0]:g} s: the compliance at once is taken as "
                 f"{_before(times, repaired)[0]:.3g} 1/Pa, from the course of the first decade"
             )
-        object.__setattr__(self, "notes", tuple(notes))
+        object.__setattr__(self, "notes", (*notes, self.remark) if self.remark else tuple(notes))
 
     @property
     def note(self) -> str:

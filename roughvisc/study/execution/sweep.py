@@ -18,6 +18,7 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import local_client
 from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.task import Outcome, bring, on_worker, outcome_of, stop_sweep
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, record_failure, recorded_failure
@@ -99,7 +100,8 @@ def sweep(
     Raises
     ------
     InputError
-        If the input is wrong and nothing ran, or the results have no times and grid in common.
+        If the input is wrong and nothing ran, the call stands at the top level of a script, or the results have no
+        times and grid in common.
     RoughviscError
         If no case could be finished. A case that failed beside others is recorded in the folder and logged as a
         warning.
@@ -160,6 +162,13 @@ def run_cases(
         index = index_of(folder)
         outcomes = _known(distinct, folder, index, retry_failed)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
+        if client is None and _processes(workers, len(todo)):
+            try:
+                refuse_unguarded_script()
+            except InputError:
+                with suppress(OSError):  # of other results in it
+                    folder.rmdir()
+                raise
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         book = _Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
@@ -239,16 +248,24 @@ def _compute(todo: Mapping[str, Case], folder: Path, book: _Book, client: Client
         luggage = folder / "inputs"
         texts = {key: pack(case, luggage) for key, case in todo.items()}
         _distributed(texts, folder, book, client, None, client.dashboard_link)
-    elif workers == 0 or (workers is None and len(todo) <= 1) or not todo:
+    elif not (processes := _processes(workers, len(todo))):
         book.begin()
         for case in todo.values():
             book.ended(_here(case, folder, book, CPU_COUNT))
     else:
-        processes = min(workers or CPU_COUNT, len(todo))
         texts = {key: case.to_json() for key, case in todo.items()}
         with local_client(processes) as own:
             link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
             _distributed(texts, folder, book, own, max(1, CPU_COUNT // processes), link)
+
+
+def _processes(workers: int | None, cases: int) -> int:
+    """Processes of the default cluster for so many cases; 0: this process."""
+    from dask.system import CPU_COUNT
+
+    if workers == 0 or (workers is None and cases <= 1):
+        return 0
+    return min(workers or CPU_COUNT, cases)
 
 
 def _here(case: Case, folder: Path, book: _Book, threads: int) -> Outcome:

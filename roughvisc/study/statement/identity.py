@@ -11,7 +11,7 @@ from typing import Any
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.statement.schema import Study
-from roughvisc.study.statement.schema.surface import FileSurface, SurfaceSection
+from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
@@ -57,8 +57,8 @@ def case_key(settings: Study) -> str:
     return _digest(stated)[:16]
 
 
-def surface_content(surface: SurfaceSection) -> tuple[str, dict[str, Any]]:
-    """Digest of what the surface is made of, and what is done to it.
+def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
+    """Digest of what the surface is made of, and what is done to it: the face that lies on it counts there.
 
     Returns
     -------
@@ -67,10 +67,14 @@ def surface_content(surface: SurfaceSection) -> tuple[str, dict[str, Any]]:
     treatment : dict
         The conditioning, of the card too.
     """
-    stated = surface.model_dump(mode="json", serialize_as_any=True)
-    if not isinstance(surface, FileSurface):
-        treatment = {key: stated.pop(key) for key in SurfaceSection.model_fields}
-        return _digest(stated), treatment
+    stated = surface.model_dump(mode="json", serialize_as_any=True, exclude={"second"})
+    second = getattr(surface, "second", None)
+    above = {} if second is None else {"second": surface_content(second)}
+    if not isinstance(surface, FromFile):
+        steps = SecondFace if isinstance(surface, SecondFace) else SurfaceSection
+        treatment = {key: stated.pop(key) for key in steps.model_fields if key != "second"}
+        return _digest(stated), treatment | above
+    stated |= above
     path = Path(stated.pop("file"))
     if path.suffix.lower() != ".toml":
         return _checksum(path), stated

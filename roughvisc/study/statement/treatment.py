@@ -21,7 +21,7 @@ class Treatment:
     steps : tuple of str
         What the result's history says of the surface, in order.
     before : xarray.DataArray or None
-        Heights as measured or made; None where they cannot be had again. [m]
+        Heights as measured or made; None where they cannot be had again, or two faces are pressed. [m]
     after : xarray.DataArray
         Heights as they were pressed. [m]
     """
@@ -53,6 +53,8 @@ def _measured(dataset: xr.Dataset) -> xr.DataArray | None:
         if case.surface_sha256 != dataset.attrs.get("surface_sha256"):
             return None
         surface = case.settings.surface
+        if surface.second is not None:
+            return None
         path = getattr(surface, "file", None)
         if path is not None and str(path).lower().endswith(".toml"):
             from roughvisc.topography.cards import open_card

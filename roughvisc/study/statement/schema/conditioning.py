@@ -95,8 +95,8 @@ def _filter(value: Any) -> Any:
     return Filter.model_validate(value if isinstance(value, dict | Filter) else {"cutoff": value})
 
 
-class Conditioned(Section):
-    """What every surface may have done to it; the steps act in the order of surface cards, which is this one."""
+class Prepared(Section):
+    """What every face may have done to it; the steps act in the order of surface cards, which is this one."""
 
     crop: optional(Crop) = None
     rotate90: optional(_argument(TURNS, {"type": "integer"})) = None
@@ -105,14 +105,28 @@ class Conditioned(Section):
     outliers: either(_outliers, ["boolean", "object"], _OUTLIERS, Outliers) = False
     fill: _argument(FILL, {"type": ["boolean", "string"]}, "harmonic") = False
     filter: either(_filter, ["boolean", "number", "string", "object"], _FILTER, Filter) = False
+
+    def prepared(self, height: xr.DataArray) -> xr.DataArray:
+        """Heights after the steps asked for. [m]"""
+        return _conditioned(self, Prepared, height)
+
+
+class Conditioned(Prepared):
+    """What every surface may have done to it: the steps of a face, then those of the profile that is pressed."""
+
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 
-    def conditioned(self, height: xr.DataArray) -> xr.DataArray:
-        """Heights after the steps asked for. [m]"""
-        from roughvisc.topography.cards import condition
+    def framed(self, height: xr.DataArray) -> xr.DataArray:
+        """Heights after the steps asked for that come last. [m]"""
+        return _conditioned(self, Conditioned, height)
 
-        stated = self.model_dump(include=set(Conditioned.model_fields) - {"missing"}, exclude_none=True)
-        return condition(height, stated)
+
+def _conditioned(stated: Prepared, steps: type[Prepared], height: xr.DataArray) -> xr.DataArray:
+    """Heights after the steps that a class of them names itself. [m]"""
+    from roughvisc.topography.cards import condition
+
+    names = set(steps.__annotations__) - {"missing"}
+    return condition(height, stated.model_dump(include=names, exclude_none=True))

@@ -31,16 +31,18 @@ def measured(
     most: float | None = None,
     below: float | None = None,
     instead: Mapping[str, str] | None = None,
+    difference: bool = False,
 ) -> Any:
     """Kind: a quantity in SI as a float, from a number or a string with a unit; ``unit="1"`` is a pure number.
 
     Values are rounded to 15 significant digits, so that ``"10 um"`` and ``1e-5`` are the same to the last bit.
-    ``instead`` are keys to suggest for quantities of other units.
+    ``instead`` are keys to suggest for quantities of other units; ``difference``: it is one of temperatures.
     """
     wanted = wanted_quantity(unit, above, least, most, below)
 
     def check(value: Any) -> float:
-        number = bounded_quantity(value, unit, above=above, least=least, most=most, below=below, instead=instead)
+        bounds = {"above": above, "least": least, "most": most, "below": below}
+        number = bounded_quantity(value, unit, **bounds, instead=instead, difference=difference)
         return float(f"{number:.15g}") + 0.0  # no negative zero
 
     schema = {"type": "number"} if unit == "1" else {"type": ["number", "string"]}

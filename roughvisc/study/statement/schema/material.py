@@ -13,9 +13,12 @@ from pydantic import Field, ValidationInfo, WrapValidator, create_model, model_v
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials import models as materials
+from roughvisc.mechanics.materials.temperature import shifted
 from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, optional, shown
 from roughvisc.study.statement.schema.section import Section, nearest, refuse
+from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.statement.schema.temperature import shift_factor
 
 MODULUS = measured("Pa", above=0)
 COMPLIANCE = measured("1/Pa", least=0)
@@ -139,17 +142,23 @@ class MaterialSection(Section):
 
     model: str
 
+    @property
+    def shift(self) -> float:
+        """What all its times are multiplied by at its temperature."""
+        return shift_factor({key: getattr(self, key) for key in TEMPERATURE})
+
     def build(self) -> materials.Material:
-        """The material itself."""
+        """The material itself, at its temperature."""
         constructor, kinds = MODELS[self.model]
         stated = {key: getattr(self, key) for key in kinds}
-        return constructor(
+        material = constructor(
             **{
                 key: value.build() if isinstance(value, MaterialSection) else value
                 for key, value in stated.items()
                 if value is not None
             }
         )
+        return material if self.shift == 1 else shifted(material, self.shift)
 
     def content(self) -> dict[str, Any]:
         """All that determines the material, the same however it was stated."""
@@ -161,6 +170,8 @@ class MaterialSection(Section):
                 stated[key] = value.content() if isinstance(value, MaterialSection) else value
         if "bulk_modulus" in kinds and "bulk_modulus" not in stated:
             stated.setdefault("poisson", 0.5)
+        if self.shift != 1:  # however it was stated
+            stated["shift_factor"] = self.shift
         return stated
 
     @model_validator(mode="after")
@@ -184,6 +195,7 @@ def _section(name: str) -> type[MaterialSection]:
         fields["file"] = (optional(FilePath), None)
         keys = {column.unit_key for column in columns.values()} - {"", *kinds}
         fields |= {key: (optional(Text), None) for key in sorted(keys)}
+    fields |= {key: (optional(kind), None) for key, kind in TEMPERATURE.items()}
     return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
 
 

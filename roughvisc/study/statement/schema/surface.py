@@ -9,9 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, WrapValidator, create_model
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, either
-from roughvisc.study.statement.schema.entries import FilePath, Flag, Text, measured, optional, paired, shown, whole
-from roughvisc.study.statement.schema.section import close, nearest, refuse
+from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, Prepared, either
+from roughvisc.study.statement.schema.entries import (
+    FilePath,
+    Flag,
+    Text,
+    choice,
+    measured,
+    optional,
+    paired,
+    shown,
+    whole,
+)
+from roughvisc.study.statement.schema.section import Section, close, nearest, refuse
 from roughvisc.topography import recipes
 from roughvisc.topography.recipes import UNITS
 
@@ -54,19 +64,15 @@ def _channel(value: Any) -> Any:
     return value
 
 
-class SurfaceSection(Conditioned):
-    """A surface, and what is done to its heights."""
+class Raw(Section):
+    """Whence heights come."""
 
     def raw(self) -> xr.DataArray:
         """The heights as read or made. [m]"""
         raise NotImplementedError
 
-    def height(self) -> xr.DataArray:
-        """The heights as conditioned, peaks up. [m]"""
-        return self.conditioned(self.raw())
 
-
-class FileSurface(SurfaceSection):
+class FromFile(Raw):
     """An instrument file or a surface card."""
 
     file: FilePath
@@ -81,8 +87,8 @@ class FileSurface(SurfaceSection):
         return open_scan(self.file, format=self.format, channel=self.channel, unit=self.unit, spacing=self.spacing)
 
 
-class RecipeSurface(SurfaceSection):
-    """A surface made by a recipe; each recipe has a class of its own, made from :data:`RECIPES`."""
+class FromRecipe(Raw):
+    """Heights made by a recipe; each recipe has a class of its own, made from :data:`RECIPES`."""
 
     generate: str
 
@@ -90,31 +96,91 @@ class RecipeSurface(SurfaceSection):
         return recipes.make(self.generate, {key: getattr(self, key) for key in RECIPES[self.generate]})
 
 
-GENERATED = {
-    name: create_model(name, __base__=RecipeSurface, generate=(Literal[name], ...), **keys)
-    for name, keys in RECIPES.items()
-}
+class SecondFace(Prepared, Raw):
+    """The face that lies on the first, its peaks towards it."""
+
+    flip: choice("x", "y", "none") = "x"
+    offset: paired(measured("m"), "a length") = (0.0, 0.0)
+
+    def laid(self, height: xr.DataArray) -> xr.DataArray:
+        """Sum of this face and the first, given as conditioned. [m]"""
+        from roughvisc.topography.framing import combine
+
+        flip = None if self.flip == "none" else self.flip
+        try:
+            own = self.prepared(self.raw())
+        except InputError as error:
+            raise InputError(f"second: {error}") from error
+        return combine(height, own, flip, align="centre", offset=self.offset)
 
 
-def _pick(data: Any, _: Any, info: Any) -> Any:
-    """The table as the class of the surface that it is."""
-    if isinstance(data, SurfaceSection):
-        return data
-    if not isinstance(data, dict):
-        raise InputError(f"found {shown(data)}: expected a table with a file, or with generate")
-    if ("file" in data) == ("generate" in data):
-        hints = [close(key, ("file", "generate")) for key in data if key not in ("file", "generate")]
-        raise InputError(f"found {shown(data)}: expected either file or generate{next(filter(None, hints), '')}")
-    if "file" in data:
-        return FileSurface.model_validate(data, context=info.context)
-    recipe = data["generate"]
-    if recipe not in GENERATED:
-        raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, GENERATED)}")
-    return GENERATED[recipe].model_validate(data, context=info.context)
+def _made(recipe: type[FromRecipe], prefix: str = "") -> dict[str, Any]:
+    return {
+        name: create_model(prefix + name, __base__=recipe, generate=(Literal[name], ...), **keys)
+        for name, keys in RECIPES.items()
+    }
 
 
+def _picker(whole: type[Section], of_file: type[FromFile], made: dict[str, Any]) -> Any:
+    """A table as the class of what it is; ``whole`` is the class that all of them share."""
+
+    def pick(data: Any, _: Any, info: Any) -> Any:
+        if isinstance(data, whole):
+            return data
+        if not isinstance(data, dict):
+            raise InputError(f"found {shown(data)}: expected a table with a file, or with generate")
+        if ("file" in data) == ("generate" in data):
+            hints = [close(key, ("file", "generate")) for key in data if key not in ("file", "generate")]
+            raise InputError(f"found {shown(data)}: expected either file or generate{next(filter(None, hints), '')}")
+        if "file" in data:
+            return of_file.model_validate(data, context=info.context)
+        recipe = data["generate"]
+        if recipe not in made:
+            raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, made)}")
+        return made[recipe].model_validate(data, context=info.context)
+
+    return WrapValidator(pick)
+
+
+class SecondFile(FromFile, SecondFace):
+    """A second face from an instrument file or a surface card."""
+
+
+class SecondRecipe(FromRecipe, SecondFace):
+    """A second face made by a recipe."""
+
+
+SECOND = _made(SecondRecipe, "second_")
+_SECOND_WANTED = "a [surface.second] table with a file, or with generate"
+AnySecond = Annotated[
+    reduce(or_, (SecondFile, *SECOND.values())),
+    _picker(SecondFace, SecondFile, SECOND),
+    Field(description=_SECOND_WANTED),
+]
+
+
+class SurfaceSection(Conditioned, Raw):
+    """A surface, what is done to its heights, and the face that lies on it if there is one."""
+
+    second: optional(AnySecond) = None
+
+    def height(self) -> xr.DataArray:
+        """The heights as conditioned, peaks up; of two faces: their sum. [m]"""
+        height = self.prepared(self.raw())
+        return self.framed(height if self.second is None else self.second.laid(height))
+
+
+class FileSurface(FromFile, SurfaceSection):
+    """A surface from an instrument file or a surface card."""
+
+
+class RecipeSurface(FromRecipe, SurfaceSection):
+    """A surface made by a recipe."""
+
+
+GENERATED = _made(RecipeSurface)
 AnySurface = Annotated[
     reduce(or_, (FileSurface, *GENERATED.values())),
-    WrapValidator(_pick),
+    _picker(SurfaceSection, FileSurface, GENERATED),
     Field(description="a [surface] table with a file, or with generate"),
 ]

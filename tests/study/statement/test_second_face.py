@@ -1,0 +1,128 @@
+"""``[surface.second]``: the face that lies on the first."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.study.execution.baggage import pack
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.treatment import treatment
+from roughvisc.study.trade.ladder import grid_change, is_data
+
+WORKFLOWS = Path(__file__).parents[3] / "workflows"
+ROUGH = {"generate": "self_affine", "hurst": 0.7, "rms_height": "0.5 um", "size": "1 mm", "shape": [64, 48], "seed": 4}
+HEAD = """
+[surface]
+generate = "wavy"
+amplitude = "5 um"
+wavelength = "0.3 mm"
+size = ["0.9 mm", "1.2 mm"]
+shape = [30, 40]
+"""
+REST = """
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+load = "1 mN"
+over = 0
+[solve]
+boundary = "periodic"
+"""
+
+
+@pytest.fixture
+def one(tmp_path):
+    (tmp_path / "one.toml").write_text(HEAD + REST)
+    return rv.read_study(tmp_path / "one.toml")
+
+
+@pytest.fixture
+def two(one):
+    return vary(one, {"surface.second": ROUGH})
+
+
+def test_second__is_the_sum_of_both_faces_the_second_turned_over(one, two):
+    other = rv.self_affine(1e-3, (64, 48), hurst=0.7, rms_height=5e-7, seed=4)
+    np.testing.assert_array_equal(two.height(), rv.combine(one.height(), other, "x", align="centre"))
+    moved = vary(two, {"surface.second.flip": "none", "surface.second.offset": ["20 um", 0]})
+    np.testing.assert_array_equal(moved.height(), rv.combine(one.height(), other, align="centre", offset=(2e-5, 0)))
+
+
+def test_second__each_face_is_conditioned_and_what_is_pressed_is_framed(one, two):
+    """Steps of a face come before the sum; resampling, taper and mirror after it."""
+    case = vary(
+        two, {"surface.invert": True, "surface.second.level": 2, "surface.resample": 20, "surface.mirror": True}
+    )
+    other = rv.level(rv.self_affine(1e-3, (64, 48), hurst=0.7, rms_height=5e-7, seed=4), 2)
+    both = rv.combine(rv.invert(one.height()), other, "x", align="centre")
+    np.testing.assert_array_equal(case.height(), rv.mirror(rv.resample(both, 20)))
+
+
+def test_second__counts_in_the_key_and_nothing_does_without_one(one, two):
+    keys = {one.key, two.key, vary(two, {"surface.second.flip": "y"}).key, vary(two, {"surface.second.seed": 5}).key}
+    assert len(keys) == 4
+    assert Case.from_json(two.to_json()).key == two.key
+    assert "second" not in json.loads(one.to_json())["surface"]
+    assert two.surface_sha256 == one.surface_sha256  # that of the first face
+
+
+def test_second__a_file_travels_with_the_case(one, tmp_path):
+    scan = tmp_path / "scan.toml"
+    scan.write_text('generate = "sphere"\nradius = 1e-2\nsize = 1e-3\nshape = 20\n')
+    case = vary(one, {"surface.second": {"file": str(scan)}})
+    moved = Case.from_json(pack(case, tmp_path / "inputs"))
+    assert Path(moved.settings.surface.second.file).is_relative_to(tmp_path / "inputs")
+    assert moved.key == case.key
+
+
+def test_second__runs_and_says_so(two, tmp_path):
+    ds = rv.run(two, tmp_path / "out", progress=False)
+    assert "combined with a second face, reversed along x" in ds.attrs["history"]
+    np.testing.assert_allclose(ds.height, two.height(), rtol=1e-12)
+    assert treatment(ds).before is None  # neither face alone is what was pressed
+    ds.close()
+
+
+def test_second__is_data_whose_grid_a_trade_coarsens_by_resampling(two):
+    assert is_data(two)
+    assert grid_change(two, (30, 40), 2.0) == ("surface.resample", [15, 20])
+    assert unit_of("surface.second.offset") == unit_of("surface.second.radius") == "m"
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"second": 3}, "surface.second: found 3: expected a table with a file, or with generate"),
+        (
+            {"second": {"generate": "con"}},
+            "surface.second.generate: found 'con', which is no known recipe; did you mean",
+        ),
+        ({"second.flip": "z"}, "surface.second.flip: found 'z': expected 'x' or 'y' or 'none'"),
+        ({"second.mirror": True}, "surface.second.mirror: unknown key"),
+        ({"second.second": ROUGH}, "surface.second.second: unknown key"),
+        ({"second": {"file": "gone.x3p"}}, "surface.second.file: found 'gone.x3p', which does not exist"),
+    ],
+)
+def test_second__refuses(two, table, said):
+    with pytest.raises(rv.InputError) as error:
+        vary(two, {f"surface.{key}": value for key, value in table.items()})
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"offset": ["1 m", 0]}, "surface: combine: the second face covers 0 of 30 cells of the first along x"),
+        ({"crop": {"x": [0, 1e-6]}}, "surface: second: crop: x is"),
+    ],
+)
+def test_second__that_does_not_fit_is_told_by_its_key(two, table, said):
+    case = vary(two, {f"surface.second.{key}": value for key, value in table.items()})
+    with pytest.raises(rv.InputError) as error:
+        case.height()
+    assert said in str(error.value)

@@ -1,0 +1,95 @@
+"""Temperature of a material in a study."""
+
+from pathlib import Path
+
+import pytest
+
+import roughvisc as rv
+from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.statement.schema.units import unit_of
+
+WORKFLOWS = Path(__file__).parents[3] / "workflows"
+WLF = {"temperature": "30 degC", "reference_temperature": 293.15, "wlf_c1": 8.0, "wlf_c2": "90 K"}
+ARRHENIUS = {"temperature": 303.15, "reference_temperature": "20 °C", "activation_energy": "80 kJ/mol"}
+
+
+@pytest.fixture
+def case():
+    return rv.read_study(WORKFLOWS / "quickstart.toml")
+
+
+def at(case, table, where="material"):
+    return vary(case, {f"{where}.{key}": value for key, value in table.items()})
+
+
+def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(case):
+    # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
+    warm = at(case, WLF)
+    assert warm.material().times == pytest.approx((0.1 * 10**-0.8,))
+    assert warm.key == at(case, {"shift_factor": 10**-0.8}).key != case.key
+    assert at(case, ARRHENIUS).material().times == pytest.approx((0.1 * rv.arrhenius_shift(303.15, 293.15, 8e4),))
+    again = Case.from_json(warm.to_json())
+    assert (again.key, again.material()) == (warm.key, warm.material())
+
+
+def test_temperature__at_the_reference_is_the_case_without(case):
+    assert at(case, {**WLF, "temperature": "20 degC"}).key == case.key
+    assert at(case, {"shift_factor": 1}).key == case.key
+    assert "temperature" not in case.to_json()
+    assert "shift_factor" not in case.settings.material.content()
+
+
+def test_temperature__both_bodies_of_a_pair_or_one(case):
+    steel = {"model": "elastic", "shear_modulus": 8e10}
+    rubber = {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}
+    two = vary(case, {"material": {"model": "pair", "a": steel, "b": rubber}})
+    both, one = at(two, WLF), at(two, WLF, "material.b")
+    assert both.material() == one.material() != two.material()
+    assert both.material().fluidity == pytest.approx(two.material().fluidity * 10**0.8)
+
+
+def test_temperature__sweeps_and_its_axis_has_a_unit(tmp_path):
+    text = (WORKFLOWS / "quickstart.toml").read_text().replace("../surfaces", str(WORKFLOWS.parent / "surfaces"))
+    law = 'reference_temperature = "20 degC"\nactivation_energy = "80 kJ/mol"\n'
+    study = tmp_path / "warm.toml"
+    swept = '\n[sweep]\n"material.temperature" = ["0 degC", "20 degC", "40 degC"]\n'
+    study.write_text(text.replace('model = "zener"\n', f'model = "zener"\n{law}') + swept)
+    cold, room, hot = read_cases(study)
+    assert [one.varied["material.temperature"] for one in (cold, room, hot)] == [273.15, 293.15, 313.15]
+    assert cold.material().times > room.material().times > hot.material().times
+    assert room.key == rv.read_study(WORKFLOWS / "quickstart.toml").key
+    assert unit_of("material.temperature") == "K"
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"temperature": 300}, "material.reference_temperature: missing: expected a temperature in K"),
+        ({"wlf_c1": 3}, "material.temperature: missing: expected a temperature in K, or with its unit, beside wlf_c1"),
+        (
+            {"temperature": 300, "reference_temperature": 290},
+            "material.wlf_c1: missing: expected wlf_c1 and wlf_c2, or",
+        ),
+        (
+            {**WLF, "wlf_c2": "90 degC"},
+            "found '90 degC', a temperature: expected a difference of temperatures, such as",
+        ),
+        (
+            {**WLF, "activation_energy": 8e4},
+            "material.activation_energy: found wlf_c1 and wlf_c2 and activation_energy",
+        ),
+        (
+            {**WLF, "temperature": "-75 degC"},
+            "material.temperature: found 198.15 K: expected above 203.15 K, where the",
+        ),
+        ({**ARRHENIUS, "temperature": 25}, "material.temperature: found 25 K and a reference of 293.15 K, a shift by"),
+        ({**ARRHENIUS, "temperature": "25 C"}, "found '25 C', which is in coulomb: expected a number in K"),
+        ({**ARRHENIUS, "shift_factor": 2}, "material.shift_factor: found beside temperature: expected one of them"),
+        ({"shift_factor": -2}, "material.shift_factor: found -2: expected a number at least 1e-30"),
+        ({"temperatur": 300}, "material.temperatur: unknown key; did you mean 'temperature'?"),
+    ],
+)
+def test_temperature__refuses(case, table, said):
+    with pytest.raises(rv.InputError) as error:
+        at(case, table)
+    assert said in str(error.value)

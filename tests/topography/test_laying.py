@@ -1,0 +1,128 @@
+"""Two faces on one grid."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+
+
+def plane(shape, spacing, slopes, at=(0.0, 0.0)):
+    """Heights ``sx (x - x0) + sy (y - y0)`` about the scan's centre, on coordinates that begin anywhere. [m]"""
+    h = rv.from_array(np.zeros(shape), spacing=spacing)
+    x, y = (h[a] - n * d / 2 for a, n, d in zip("xy", shape, spacing, strict=True))
+    return (h + slopes[0] * x + slopes[1] * y).assign_coords(x=h.x + at[0], y=h.y + at[1]).assign_attrs(h.attrs)
+
+
+@pytest.mark.parametrize("flip", [None, "x", "y"])
+@pytest.mark.parametrize(
+    ("shape", "cell"),
+    [((41, 30), (1e-6, 1.3e-6)), ((100, 95), (0.37e-6, 0.41e-6)), ((15, 14), (2.7e-6, 3.1e-6))],
+    ids=["odd and even", "finer", "coarser"],
+)
+def test_combine__a_plane_on_another_grid_stays_a_plane(flip, shape, cell):
+    """The line between two centres leaves a plane as it is, and so does the mean over whole cells.
+
+    A part ``a`` of a cell counts with the cell's height: in a mean over cells of ``d1`` that moves a plane of a slope
+    ``s`` by ``s a (1 - a) d2^2 / (2 d1)`` at each end, of opposite signs.
+    """
+    first, second = (
+        plane((30, 21), (1e-6, 1.3e-6), (0.1, 0.0), (5e-3, 0.0)),
+        plane(shape, cell, (0.03, -0.07), (0.0, 1)),
+    )
+    offset = (1.25e-6, -0.7e-6)
+    both = rv.combine(first, second, flip, align="centre", offset=offset)
+    x, y = both.x - 5e-3 - 15e-6, both.y - 21 * 1.3e-6 / 2
+    signs = {None: (1, 1), "x": (-1, 1), "y": (1, -1)}[flip]
+    expected = 0.1 * x + 0.03 * signs[0] * (x - offset[0]) - 0.07 * signs[1] * (y - offset[1])
+    inner = expected.isel(x=slice(3, -3), y=slice(3, -3))  # half a coarse cell at the border is held at its centre
+    parts = cell[0] < 1e-6
+    off = (0.03 * cell[0] ** 2 / 8e-6 + 0.07 * cell[1] ** 2 / 8 / 1.3e-6) if parts else 1e-18
+    np.testing.assert_allclose(both.sel(x=inner.x, y=inner.y), inner.transpose("x", "y"), rtol=0, atol=off)
+    for axis, side, own in (("x", 1e-6, (30, shape[0] * cell[0])), ("y", 1.3e-6, (21, shape[1] * cell[1]))):
+        assert np.isin(both[axis], first[axis]).all(), "the grid is that of the first"
+        covered = (
+            abs(first[axis] - float(first[axis].mean()) - offset["xy".index(axis)]) + side / 2 <= own[1] / 2 + 1e-15
+        )
+        np.testing.assert_array_equal(both[axis], first[axis][covered])
+
+
+def test_combine__smaller_cells_are_averaged_by_area():
+    rng = np.random.default_rng(3)
+    fine = rng.normal(0, 1e-7, (3 * 9, 2 * 8))
+    first = rv.from_array(np.zeros((9, 8)), spacing=(3e-6, 4e-6))
+    both = rv.combine(first, rv.from_array(fine, spacing=(1e-6, 2e-6)), align="centre")
+    np.testing.assert_allclose(both, fine.reshape(9, 3, 8, 2).mean(axis=(1, 3)), rtol=1e-12, atol=1e-20)
+
+
+def test_combine__on_one_grid_is_the_same_however_it_is_aligned():
+    rng = np.random.default_rng(4)
+    a, b = (rv.from_array(rng.normal(0, 1e-7, (7, 12)), spacing=(1e-6, 0.3e-6)) for _ in range(2))
+    xr.testing.assert_allclose(rv.combine(a, b, "x"), rv.combine(a, b, "x", align="centre"), rtol=1e-13)
+    # a whole number of cells apart: cells of one against cells of the other
+    both = rv.combine(a, b, align="centre", offset=(2e-6, -0.6e-6))
+    np.testing.assert_allclose(both, a.values[2:, :-2] + b.values[:-2, 2:], rtol=1e-12)
+    assert both.x[0] == a.x[2]
+
+
+def test_combine__a_spike_turned_over_lies_on_the_other_side():
+    first, heights = rv.from_array(np.zeros((8, 5)), spacing=1e-6), np.zeros((8, 5))
+    heights[1, 3] = 1e-6
+    spike = rv.from_array(heights, spacing=1e-6)
+    for flip, place in ((None, (1, 3)), ("x", (6, 3)), ("y", (1, 1))):
+        both = rv.combine(first, spike, flip, align="centre").values
+        assert np.unravel_index(both.argmax(), both.shape) == place
+
+
+def test_combine__points_missing_or_filled_in_the_second_are_so_in_the_sum():
+    first, heights = rv.from_array(np.zeros((4, 5)), spacing=2e-6), np.ones((8, 10)) * 1e-7
+    heights[0:2, 0] = heights[2, 2] = np.nan  # half of a cell of the first, and a quarter of one
+    second = rv.from_array(heights, spacing=1e-6)
+    both = rv.combine(first, second, align="centre")
+    assert np.isfinite(both.values).all()
+    second[0, 1] = np.nan  # three quarters
+    both = rv.combine(first, second, "x", align="centre")
+    assert np.argwhere(np.isnan(both.values)).tolist() == [[3, 0]]
+    marked = rv.combine(first, rv.fill(second, "nearest"), "x", align="centre")
+    assert np.argwhere(marked.filled.values).tolist() == [[2, 1], [3, 0]]
+    assert "; the second face: filled: 4 missing points, nearest" in marked.attrs["history"]
+
+
+def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
+    # 1/R = 1/R1 + 1/R2; contact compliances add: 1/E* = (1 - nu1)/(2 G1) + (1 - nu2)/(2 G2)
+    upper, lower = rv.sphere(1e-2, 1e-3, 41), rv.sphere(3e-2, (1.1e-3, 1.3e-3), (51, 45))
+    both = rv.combine(upper, lower, "x", align="centre")
+    material = rv.pair(rv.elastic(2e6, 0.3), rv.elastic(1e6))
+    ds = rv.simulate(both, material, rv.Program().load(0.02, over=0.0), tolerance=1e-4, progress=False)
+    modulus = 1 / (0.7 / (2 * 2e6) + 0.5 / (2 * 1e6))
+    exact = rv.closed_forms.hertz(1 / (1 / 1e-2 + 1 / 3e-2), modulus, 0.02)
+    assert ds.approach.values[-1] == pytest.approx(exact.approach, rel=5e-3)
+    assert ds.contact_area_corrected.values[-1] == pytest.approx(np.pi * exact.radius**2, rel=2e-2)
+
+
+def test_combine__a_recipe_is_no_longer_one_and_what_is_absent_stays_so():
+    punch, ball = rv.flat_punch(2e-5, 1e-4, 21), rv.sphere(1e-3, 1e-4, 21)
+    both = rv.combine(punch, ball, align="centre")
+    assert "recipe" not in both.attrs
+    assert both.attrs["missing"] == "absent"
+    assert rv.combine(ball, punch, align="centre").attrs["missing"] == "absent"
+    gaps = ball.copy()
+    gaps[0, 0] = np.nan  # of a measurement: what is there is not known
+    assert "missing" not in rv.combine(punch, gaps, align="centre").attrs
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"align": "corner"}, "align is 'corner': expected 'grid' or 'centre'"),
+        ({"offset": (1e-6, 0)}, "offset is .* with align='grid': expected align='centre'"),
+        ({"align": "centre", "offset": 1e-6}, "offset is 1e-06: expected a pair of lengths"),
+        ({"align": "centre", "offset": (np.nan, 0)}, "offset is nan: expected a finite number"),
+        ({"align": "centre", "offset": (0, 4e-6)}, "covers 1 of 5 cells of the first along y"),
+    ],
+)
+def test_combine__refuses(options, said):
+    h = rv.from_array(np.zeros((8, 5)), spacing=1e-6)
+    with pytest.raises(InputError, match=said):
+        rv.combine(h, h, **options)
