@@ -27,14 +27,28 @@ from roughvisc.views.observables import contact
 
 
 def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
-    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak."""
+    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak.
+
+    Lines at the border of a surface that repeats with a step are left out: what they carry is of the step.
+    """
     along = "x" if across == "y" else "y"
     if "pressure" in dataset:
         carried = dataset["pressure"].isel(time=frame).sum(along).values
+        carried = carried * _inner(dataset, len(carried))
         if carried.max() > 0:
             return int(carried.argmax())
     peaks = dataset["height"].max(along).values
+    peaks = np.where(_inner(dataset, len(peaks)), peaks, np.nan)
     return int(np.nanargmax(peaks)) if np.isfinite(peaks).any() else len(peaks) // 2
+
+
+def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
+    """Which lines of a direction are not at a seam: all of them, where the surface repeats without a step."""
+    inner = np.ones(count, dtype=bool)
+    if dataset.attrs.get("border_note") and count > 8:
+        margin = max(2, count // 16)
+        inner[:margin] = inner[-margin:] = False
+    return inner
 
 
 def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
