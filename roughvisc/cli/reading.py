@@ -55,13 +55,13 @@ def naming_options(message: str) -> str:
     Examples
     --------
     >>> naming_options("it states no unit of length: pass unit= (such as unit='um')")
-    'it states no unit of length: pass --unit (such as --unit um)'
+    'it states no unit of length: pass --unit (such as --unit=um)'
     >>> naming_options("it states no size: pass spacing=(dx, dy) [m]")
-    'it states no size: pass --spacing (such as --spacing 1um,1um)'
+    'it states no size: pass --spacing (such as --spacing=1um,1um)'
     """
-    message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", "--spacing (such as --spacing 1um,1um)", message)
+    message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", "--spacing (such as --spacing=1um,1um)", message)
     message = message.replace(" (see supported_formats())", "")
-    message = re.sub(rf"\b({_NAMES})='(\w+)'", r"--\1 \2", message)
+    message = re.sub(rf"\b({_NAMES})='(\w+)'", r"--\1=\2", message)
     message = re.sub(rf"\b({_NAMES})=(?=\W|$)", r"--\1", message)
     return re.sub(rf"(^|: )({_NAMES}) is ", r"\1--\2 is ", message)
 

@@ -175,5 +175,5 @@ tolerance = 1e-2                    # of pressure, force and approach; 1e-3 for 
 
 [keep]
 fields = ["pressure", "gap"]
-times = ["50 ms", "0.1 s", "0.2 s", "0.4 s", "1 s"]
+times = ["10 ms", "25 ms", "50 ms", "0.1 s", "0.15 s", "0.2 s", "0.3 s", "0.5 s", "1 s"]
 """
