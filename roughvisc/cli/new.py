@@ -42,7 +42,7 @@ def new(file: Path, out: Path | None, **given: str | None) -> None:
     if out.exists():
         raise InputError(f"{out}: exists already, and is not written over: expected another name (--out)")
     found = inspect_scan(open_scan(file, **options))
-    text = starter_study(file, out.parent, options, found)
+    text = starter_study(file, out, options, found)
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()

@@ -32,7 +32,7 @@ _REMARKS = {
 
 def starter_study(
     file: str | os.PathLike[str],
-    folder: str | os.PathLike[str],
+    study: str | os.PathLike[str],
     options: Mapping[str, Any],
     found: Inspection,
 ) -> str:
@@ -42,7 +42,7 @@ def starter_study(
     ----------
     file : path
         The scan.
-    folder : path
+    study : path
         Where the study is going to be.
     options : mapping
         ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
@@ -62,7 +62,7 @@ def starter_study(
         ]
     if "outliers" not in steps:
         remarks["fill"] = "missing points are filled in; the result keeps their mask"
-    surface = surface_table(file, folder, options, steps, remarks)
+    surface = surface_table(file, Path(study).parent, options, steps, remarks)
     if math.prod(found.shape) > _LARGE:
         coarse = [max(16, n // (4 if "mirror" in steps else 2)) for n in found.shape]
         surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
@@ -73,6 +73,7 @@ def starter_study(
     return _TEXT.format(
         title=title.replace("\\", "").replace('"', ""),
         name=Path(file).name,
+        study=Path(study).name,
         surface=surface,
         shear=written_quantity(SHEAR_MODULUS, "Pa"),
         kelvin=written_quantity(KELVIN_MODULUS, "Pa"),
@@ -146,8 +147,8 @@ def written_area(area: float) -> str:
 
 _TEXT = """\
 # A first study of {name}: pressed on a rubber, and held while the contact creeps.
-#   roughvisc plan THIS_FILE     what it will model and cost
-#   roughvisc run THIS_FILE      results and figures, in a folder results/ beside it
+#   roughvisc plan {study}     what it will model and cost
+#   roughvisc run {study}      results and figures, in the folder results/ beside it
 # Quantities are numbers in SI, or texts with a unit. Change what you like; what cannot be is refused by name.
 title = "{title} on a rubber"
 
