@@ -2,14 +2,17 @@
 
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 import pytest
+import xarray as xr
 from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.execution import run as run_module
+from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import write_result
 
 
@@ -166,6 +169,55 @@ def test_scan__says_what_is_there_and_draws_it(invoke, tmp_path, scan_file):
     assert (tmp_path / "a" / "b.pdf").exists()
 
 
+def test_scan__says_what_it_sees_and_prints_a_surface_table_that_a_study_takes(invoke, tmp_path, scan_file):
+    status, out, _ = invoke("scan", scan_file)
+    assert status == 0
+    for words in ("Missing points", "3 (0.25 %)", "Spikes", "° along x", "neighbouring rows", "Noise", "-> "):
+        assert words in out
+    table = tomllib.loads(out[out.index("[surface]") : out.index("Picture: ")])["surface"]
+    assert table == {"file": "tilted.nc", "level": 1, "fill": "harmonic", "mirror": True}
+
+
+def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(invoke, tmp_path, scan_file):
+    status, out, err = invoke("new", scan_file)
+    assert (status, err) == (0, "")
+    assert "Study: tilted-study.toml\nNext: roughvisc plan tilted-study.toml\n" in out
+    text = (tmp_path / "tilted-study.toml").read_text()
+    assert "#" in text.splitlines()[0]
+    (case,) = read_cases("tilted-study.toml")
+    height = case.settings.surface.height()
+    assert height.shape == (80, 60)
+    assert not height.isnull().any()
+    assert invoke("plan", "tilted-study.toml")[0] == 0
+    assert invoke("run", "tilted-study.toml", "--no-plots", "-q") == (0, "", "")
+    (result,) = (tmp_path / "results" / "tilted-study").glob("*.nc")
+    with xr.open_dataset(result) as ds:
+        assert 0.02 < float(ds.contact_fraction[-1]) < 0.15
+        assert float(ds.contact_fraction[0]) < float(ds.contact_fraction[-1])
+
+
+def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan_file):
+    (tmp_path / "mine.toml").write_text("# mine\n")
+    for arguments, words in (
+        ([scan_file, "-o", "mine.toml"], "mine.toml: exists already"),
+        ([scan_file, "-o", "mine.txt"], "expected the name of a study, .toml"),
+        ([scan_file, "--channel", "7"], "--channel is 7"),
+    ):
+        status, _, err = invoke("new", *arguments)
+        assert status == 2
+        assert words in err
+    assert (tmp_path / "mine.toml").read_text() == "# mine\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.toml", "tilted.nc"]
+
+
+def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):
+    np.save(tmp_path / "plain.npy", np.random.default_rng(0).normal(size=(20, 30)))
+    assert invoke("new", "plain.npy", "--unit", "um", "--spacing", "1um,2um", "-o", "a/plain.toml")[0] == 0
+    (case,) = read_cases("a/plain.toml")
+    height = case.settings.surface.raw()
+    assert (height.shape, float(height.x[0]), float(height.y[0])) == ((20, 30), 5e-7, 1e-6)
+
+
 def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
     for arguments, words in (
         (["gone.sur"], "gone.sur"),
@@ -224,7 +276,10 @@ def test_scan__lists_channels_and_parameters(invoke, tmp_path):
     np.save(tmp_path / "plain.npy", z[0])
     status, _, err = invoke("scan", "plain.npy")
     assert status == 2
-    assert "unit=" in err
+    assert err.endswith("it states no unit of length: pass --unit (such as --unit=um)\n")
+    status, _, err = invoke("scan", "plain.npy", "--unit", "m")
+    assert status == 2
+    assert err.endswith("it states no size: pass --spacing (such as --spacing=1um,1um)\n")
     assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
     assert rv.open_scan(tmp_path / "plain.toml").shape == (20, 30)
 

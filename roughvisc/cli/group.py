@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from roughvisc.cli.reading import naming_keys, naming_options
 from roughvisc.errors import InputError, RoughviscError
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+#: Commands that take options for what a scan file does not state; the others take a study, which has keys for it.
+_READING = ("scan", "new")
 
 
 class Failure(click.ClickException):
@@ -39,7 +43,8 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            raise Failure(str(error), 2) from error
+            named = naming_options if ctx.invoked_subcommand in _READING else naming_keys
+            raise Failure(named(str(error)), 2) from error
         except RoughviscError as error:
             raise Failure(str(error), 1) from error
         except OSError as error:  # a full disk, a file taken away

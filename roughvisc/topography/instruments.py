@@ -1,33 +1,37 @@
 """Instrument files through the libraries that parse them: x3pio, sdfio and SurfaceTopography.
 
-Orientation, checked against each other in the tests: x3pio and sdfio give rows along y, ascending, so that
-``height(x, y)`` is the transpose; SurfaceTopography gives (x, y) already. Where a format stores its top line first,
-SurfaceTopography turns it over; of plain text, row j of the file is ``y[j]``, as it stands there.
+Orientation: y points up, as on the map of a microscope. x3pio and sdfio give rows along y, ascending, so that
+``height(x, y)`` is the transpose. SurfaceTopography gives (x, y), for many formats with the top line first: those are
+turned over here, and :mod:`roughvisc.topography.orientation` says of each format how that was told. Of plain text,
+row j of the file is ``y[j]``, as it stands there.
 """
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
 from roughvisc.errors import InputError
+from roughvisc.topography.orientation import top_line_first
+from roughvisc.topography.separated_values import separated_by_blanks
 
 #: Formats that other libraries than SurfaceTopography read here.
 OWN_SUFFIXES: dict[str, tuple[str, ...]] = {
     "x3p": ("x3p",),
     "sdf": ("sdf",),
+    "csv": ("csv",),
     "nc": ("nc", "nc4", "cdf", "hdf5", "zarr"),
     "card": ("toml",),
 }
 _TEXT = ("xyz", "asc")
 #: Where suffixes are shared by formats: those to try, in this order.
-_SHARED = {"txt": _TEXT, "asc": _TEXT, "csv": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
+_SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
 #: Formats without compression: a point takes a byte at least.
 _PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metropro", "mi", "nms", "npy", "opd", "os3d"}
 _PLAIN |= {"plu", "tmd", "wsxm", "xyz"}
@@ -233,8 +237,19 @@ def _sdf(path: Path) -> Opened:
 
 
 #: Format -> what reads the header of its files; of those that SurfaceTopography does not read here.
-READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf}
+READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf, "csv": lambda path: _csv(path)}
 _BUILT_IN = frozenset(OWN_SUFFIXES)
+
+
+def _csv(path: Path) -> Opened:
+    """Points x, y, z one a line, as SurfaceTopography takes them, or else a matrix."""
+    try:
+        return _surface_topography(path, "xyz")
+    except InputError:
+        raise
+    except Exception as error:  # no such points
+        forget(error)
+    return replace(_surface_topography(path, "asc", source=separated_by_blanks(path)), format="csv")
 
 
 def _npy(path: Path) -> Opened:
@@ -253,14 +268,14 @@ def _detected(path: Path) -> str:
     return detect_format(str(path))
 
 
-def _surface_topography(path: Path, format: str) -> Opened:
+def _surface_topography(path: Path, format: str, source: TextIO | None = None) -> Opened:
     from SurfaceTopography.IO import lookup_reader_by_format
     from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
 
     if format not in lookup_reader_by_format:
         known = sorted({*lookup_reader_by_format, *OWN_SUFFIXES})
         raise InputError(f"format is {format!r}: expected one of {', '.join(known)}, or 'auto'")
-    reader = lookup_reader_by_format[format](str(path))
+    reader = lookup_reader_by_format[format](str(path) if source is None else source)
     theirs = list(reader.channels)
 
     def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
@@ -271,6 +286,8 @@ def _surface_topography(path: Path, format: str) -> Opened:
         sized = found.physical_sizes is not None
         topography = found.topography() if sized else found.topography(physical_sizes=channel.shape)
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * metres(channel, unit)
+        if top_line_first(format):
+            heights = heights[:, ::-1]
         return heights, cells(topography.physical_sizes, heights.shape, channel, unit) if sized else None
 
     def sides(channel: Channel, unit: float | None) -> tuple[float, float] | None:

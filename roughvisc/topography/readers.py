@@ -24,10 +24,16 @@ from roughvisc.topography import gridfiles, instruments
 from roughvisc.topography.grid import checked, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.instruments import Channel, Opened, brief, forget
+from roughvisc.topography.orientation import orientation
 from roughvisc.units import quantity
 
-#: No scan is wider, no spacing finer, no height further from zero. [m] Scans of 150 mm exist; absolute heights too.
-WIDEST, FINEST, FARTHEST = 1.0, 1e-11, 1e3
+#: No scan is wider, no spacing finer, no height in a file further from zero. [m] Scans of 150 mm exist; absolute
+#: heights of 76 mm too.
+WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
+#: Points from which heights are judged.
+_FEWEST = 16
+#: No height in an array is further from zero: beyond, numbers stand for missing points. [m]
+FARTHEST = 1e3
 _READER = threading.RLock()
 
 
@@ -51,6 +57,7 @@ def read_file(
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
     others = [other.name for other in opened.channels if other.index != chosen.index]
+    attrs["orientation"] = orientation(opened.format)
     attrs |= {"instrument": opened.instrument} if opened.instrument else {}
     attrs |= {"other_channels": ", ".join(others)} if others else {}
     how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
@@ -58,6 +65,7 @@ def read_file(
     h = noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
     if heights:
         finite(h, str(path))
+        _low_enough(h, path)
     return h
 
 
@@ -264,6 +272,16 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
                 f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
                 f"(at most {WIDEST:g} m, at least {FINEST:g} m): pass spacing=(dx, dy) [m]"
             )
+
+
+def _low_enough(h: xr.DataArray, path: Path) -> None:
+    """Refuse heights of metres, whose unit is another; not in a file of a dozen points, which is an example."""
+    beyond = np.abs(h.values) > HIGHEST
+    if beyond.any() and h.size >= _FEWEST:
+        raise InputError(
+            f"{path}: {beyond.sum()} heights are like {h.values[beyond][0]:.6g} m, which is not plausible (at most "
+            f"{HIGHEST:g} m from zero): expected heights in the unit that the file states, or that unit= states"
+        )
 
 
 def finite(h: xr.DataArray, source: str) -> None:

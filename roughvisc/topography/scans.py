@@ -23,7 +23,7 @@ def open_scan(
     Parameters
     ----------
     path : path
-        X3P, SDF, NetCDF, a surface card (``.toml``), or any format that SurfaceTopography reads.
+        X3P, SDF, NetCDF, CSV, a surface card (``.toml``), or any format that SurfaceTopography reads.
     format : str, optional
         A key of :func:`~roughvisc.supported_formats`; ``"auto"`` has the format guessed from the content. Default: by
         the suffix.
@@ -40,14 +40,14 @@ def open_scan(
     -------
     xarray.DataArray
         Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
-        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel
-        and ``history``.
+        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel,
+        orientation (whether y is known to point up, or the map may be a mirror image) and ``history``.
 
     Raises
     ------
     InputError
         If the file is absent, damaged, of unknown format, no areal height scan, without unit or size, or implausible:
-        wider than 1 m, finer than 10 pm, heights beyond 1 km.
+        wider than 1 m, finer than 10 pm, heights beyond 1 m.
 
     Warns
     -----

@@ -1,4 +1,4 @@
-"""Writers: a height grid to netCDF, X3P or SDF, and a surface card for a file.
+"""Writers: a height grid to netCDF, X3P or SDF; a surface card, and the [surface] table of a study, for a file.
 
 Libraries write, as they read.
 """
@@ -6,6 +6,7 @@ Libraries write, as they read.
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -103,6 +104,73 @@ _REST = """
 # outliers = true                           # spikes become missing points, before anything is filled in
 # fill = "harmonic"                         # missing points are filled in; the mask stays in the result
 """
+
+
+def surface_table(
+    file: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    options: Mapping[str, Any],
+    steps: Mapping[str, Any],
+    remarks: Mapping[str, str] | None = None,
+) -> str:
+    """The ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
+
+    Parameters
+    ----------
+    file : path
+        The scan, or a surface card.
+    folder : path
+        Where the study is going to be: a file below it is named relative to it, any other by its whole path.
+    options : mapping
+        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+    steps : mapping
+        Conditioning steps, as :func:`~roughvisc.topography.cards.condition` takes them. [m]
+    remarks : mapping, optional
+        What stands behind a line, by its key.
+    """
+    file, remarks = Path(file), remarks or {}
+    near = Path(os.path.relpath(file, folder))
+    entries = {"file": _text((file.resolve() if near.parts[0] == ".." else near).as_posix())}
+    for key in ("format", "channel", "unit"):
+        if options.get(key) is not None:
+            entries[key] = _text(options[key]) if isinstance(options[key], str) else str(options[key])
+    if options.get("spacing") is not None:
+        entries["spacing"] = _lengths(options["spacing"])
+    for key, value in steps.items():
+        if key == "crop":
+            entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
+        elif key in ("filter", "taper"):
+            entries[key] = _lengths(value)
+        else:
+            entries[key] = json.dumps(value)
+    lines = [f"{key} = {value}" for key, value in entries.items()]
+    width = max((len(line) for line, key in zip(lines, entries, strict=True) if key in remarks), default=0)
+    shown = [
+        f"{line:<{width}}  # {remarks[key]}" if key in remarks else line
+        for line, key in zip(lines, entries, strict=True)
+    ]
+    return "\n".join(["[surface]", *shown]) + "\n"
+
+
+def written_quantity(value: float, unit: str, digits: int = 6) -> str:
+    """A quantity as study files have it, with a prefix.
+
+    Examples
+    --------
+    >>> written_quantity(1.9e-5, "m"), written_quantity(7500.0, "Pa"), written_quantity(0.03, "N")
+    ('19 um', '7.5 kPa', '30 mN')
+    """
+    prefixes = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+    exponent = 3 * math.floor(math.log10(abs(value) * (1 + 1e-12)) / 3) if value else 0
+    exponent = min(max(exponent, -12), 0 if unit == "m" else 9)
+    return f"{float(f'{value / 10.0**exponent:.{digits}g}'):g} {prefixes[exponent]}{unit}"
+
+
+def _lengths(value: Any) -> str:
+    """One length, or a list of them."""
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(_lengths(part) for part in value) + "]"
+    return _text(written_quantity(float(value), "m"))
 
 
 def _text(value: str) -> str:

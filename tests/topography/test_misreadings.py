@@ -42,6 +42,48 @@ def rewritten(source, target, pattern, replacement):
     return target
 
 
+# -- separated values, heights of metres -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (", ", ".")]
+)
+def test_separated_values__open_as_the_same_numbers_in_text_do(separator, decimal, tmp_path):
+    plain = write_text(tmp_path / "scan.txt")
+    lines = plain.read_text().splitlines()
+    changed = [line if line.startswith("#") else separator.join(line.split()).replace(".", decimal) for line in lines]
+    (tmp_path / "scan.csv").write_text("\n".join(changed) + "\n")
+    h = open_scan(tmp_path / "scan.csv")
+    xr.testing.assert_equal(h, open_scan(plain))
+    assert h.attrs["format"] == "csv"
+
+
+def test_separated_values__empty_ones_are_missing_and_words_are_refused(tmp_path):
+    path = tmp_path / "scan.csv"
+    path.write_text("1,2,3,4\n5,,7,8\n9,10,11,12\n")
+    h = open_scan(path, unit="um", spacing=1e-6)
+    assert h.shape == (4, 3)
+    assert np.argwhere(np.isnan(h.values)).tolist() == [[1, 1]]
+    assert float(h[2, 1]) == pytest.approx(7e-6)
+    path.write_text("1,2,3,4\n5,six,7,8\n9,10,11,12\n")
+    assert "line 2: found 'six' among numbers" in refusal(path, unit="um", spacing=1e-6)
+
+
+def test_separated_values__points_are_placed_by_their_coordinates(tmp_path):
+    text = write_xyz(tmp_path / "scan.xyz").read_text()
+    (tmp_path / "scan.csv").write_text(text.replace(" ", ","))
+    np.testing.assert_allclose(open_scan(tmp_path / "scan.csv", unit="m"), tilted(missing=False), rtol=1e-8)
+
+
+def test_heights_of_metres__are_refused_as_widths_are(tmp_path):
+    from_array(1e6 * tilted(), CELL).to_netcdf(tmp_path / "scan.nc")
+    message = refusal(tmp_path / "scan.nc")
+    assert "heights are like" in message
+    assert "not plausible (at most 1 m from zero)" in message
+    from_array(0.9 + tilted(), CELL).to_netcdf(tmp_path / "high.nc")
+    assert open_scan(tmp_path / "high.nc").shape == SHAPE
+
+
 # -- channels, units, sizes --------------------------------------------------------------------------------------------
 
 

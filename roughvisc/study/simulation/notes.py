@@ -8,6 +8,7 @@ import xarray as xr
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.settings import Settings
+from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import FIELDS
 
@@ -67,6 +68,32 @@ def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
             f"worst (stated_error).{fixed}"
         )
     return " ".join(notes)
+
+
+def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
+    """What to say of a periodic surface with a step where it repeats; empty if it has none.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    dataset : Dataset
+        The result; where it holds the pressure, what the outermost cells carry of it is told.
+    """
+    borders = border_mismatch(height)
+    if not borders.jumps:
+        return ""
+    (x, y), (nx, ny) = borders.of_rms, borders.of_neighbours
+    note = (
+        f"The surface repeats with a step: opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, "
+        f"{nx:.2g} and {ny:.2g} times as much as neighbouring rows."
+    )
+    if "pressure" in dataset and float(dataset["force"][-1]) > 0:
+        last = dataset["pressure"].isel(time=-1)
+        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
+        ratio = max(float(side.mean()) for side in sides) / float(last.mean())
+        note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
+    return note + " Use mirror = true or taper under [surface]."
 
 
 def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:

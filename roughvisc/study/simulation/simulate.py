@@ -21,7 +21,7 @@ from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
-from roughvisc.study.simulation.notes import accuracy_note, left_out, slope_note
+from roughvisc.study.simulation.notes import accuracy_note, border_note, left_out, slope_note
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
 from roughvisc.study.simulation.scene import Ground, follows, nominal_area, prepare
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
@@ -197,6 +197,7 @@ def _press(
         "program_note": program.note,
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
+        "border_note": _border_note(ground, settings, dataset),
         "left_out": left_out(choice, settings, followed, ground.mirrored),
     }
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
@@ -245,6 +246,16 @@ def _slope_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
     """What to say of a surface that is too steep where it was loaded, in the log too."""
     deepest = float(dataset["approach"].max()) - ground.least_gap  # below the highest cell
     note = slope_note(ground.height[ground.window.surface_cells], settings.boundary, deepest)
+    if note:
+        log.warning("%s", note)
+    return note
+
+
+def _border_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
+    """What to say of a periodic surface whose opposite borders do not meet, in the log too."""
+    if settings.boundary != "periodic" or ground.mirrored:
+        return ""
+    note = border_note(ground.height, dataset)
     if note:
         log.warning("%s", note)
     return note

@@ -284,6 +284,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
         ("Channel", str(height.attrs.get("channel", "")) + (", of these:" if len(channels) > 1 else "")),
         ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
         *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
+        ("Orientation", str(height.attrs.get("orientation", ""))),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),
         ("Spacing", " x ".join(readable(d, "m") for d in sides)),

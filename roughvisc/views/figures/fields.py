@@ -52,6 +52,13 @@ def plane_ratio(dataset: xr.Dataset | xr.DataArray) -> float:
     return float(np.ptp(cell_edges(dataset["y"])) / np.ptp(cell_edges(dataset["x"])))
 
 
+def measured_part(dataset: xr.Dataset) -> xr.Dataset:
+    """The part of a result that was measured, where the surface was made to repeat by its mirror images."""
+    if "mirrored along x and y" not in str(dataset.attrs.get("history", "")):
+        return dataset
+    return dataset.isel({axis: slice(0, dataset.sizes[axis] // 2) for axis in ("x", "y")})
+
+
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -> AxesImage:
     """One map, x to the right and y upwards, with equal scales along both.
 
@@ -143,6 +150,8 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
     """Maps of fields at chosen times, with the outline of the contact; one colour scale a field.
 
+    Of a surface that repeats by its mirror images the part that was measured is drawn.
+
     Parameters
     ----------
     dataset : xarray.Dataset
@@ -170,11 +179,14 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
     stored = [name for name in fields if name in dataset]
     if not stored:
         require(dataset, *fields)
+    whole, dataset = dataset, measured_part(dataset)
     frames = _chosen_frames(dataset, times)
     figure, axes = _map_panels(dataset, len(frames), len(stored))
     for name, panels in zip(stored, axes, strict=True):
         _draw_field(figure, panels, dataset, name, frames)
     _label_maps(axes, dataset, frames)
+    if dataset is not whole:
+        figure.suptitle("The part that was measured; its mirror images are not drawn", fontsize=7)
     return figure
 
 

@@ -22,19 +22,35 @@ from roughvisc.views.figures.axes import (
     time_text,
     unit_for,
 )
-from roughvisc.views.figures.fields import plane_unit
+from roughvisc.views.figures.fields import measured_part, plane_unit
 from roughvisc.views.observables import contact
 
 
 def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
-    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak."""
+    """Index of the cut: the line that carries most or, without pressure, the one through the highest peak.
+
+    Lines at the border of a surface that repeats with a step, or by its mirror images, are left out: what they carry
+    is of the step or of the fold.
+    """
     along = "x" if across == "y" else "y"
     if "pressure" in dataset:
         carried = dataset["pressure"].isel(time=frame).sum(along).values
+        carried = carried * _inner(dataset, len(carried))
         if carried.max() > 0:
             return int(carried.argmax())
     peaks = dataset["height"].max(along).values
+    peaks = np.where(_inner(dataset, len(peaks)), peaks, np.nan)
     return int(np.nanargmax(peaks)) if np.isfinite(peaks).any() else len(peaks) // 2
+
+
+def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
+    """Which lines of a direction are not at a seam: all of them, where the surface itself repeats."""
+    inner = np.ones(count, dtype=bool)
+    mirrored = "mirrored along x and y" in str(dataset.attrs.get("history", ""))
+    if (dataset.attrs.get("border_note") or mirrored) and count > 8:
+        margin = max(2, count // 16)
+        inner[:margin] = inner[-margin:] = False
+    return inner
 
 
 def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
@@ -76,6 +92,7 @@ def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | 
     require(dataset, "time", "x", "y", "height")
     if axis not in ("x", "y"):
         raise InputError(f"axis is {axis!r}: expected 'x' or 'y'")
+    dataset = measured_part(dataset)
     across = "y" if axis == "x" else "x"
     frame = frame_at(dataset["time"], time)
     index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -24,7 +25,12 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
-from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import COLOUR_MAPS, draw_map, label_plane, plane_ratio, plane_unit
+
+#: Missing points: a colour that the map of heights has not, in grey print neither.
+MISSING = "#e60000"
+#: Robust standard deviations from the median to which the scale of heights reaches.
+_REACH = 5.0
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
@@ -41,6 +47,34 @@ def _checked(height: xr.DataArray) -> xr.DataArray:
     return height
 
 
+def robust_limits(values: np.ndarray) -> tuple[float, float]:
+    """Limits that hold the heights but for spikes: five deviations about the median, as the quartiles give them.
+
+    Parameters
+    ----------
+    values : ndarray
+        Heights, NaN where missing. [m]
+
+    Returns
+    -------
+    tuple of float
+        The lowest and the highest height where no point is beyond. [m]
+    """
+    known = values[np.isfinite(values)]
+    lower, median, upper = np.percentile(known, (25, 50, 75))
+    reach = _REACH * (upper - lower) / 1.349  # the quartiles of the normal distribution are 1.349 deviations apart
+    lowest, highest = float(known.min()), float(known.max())
+    if not reach > 0:
+        return lowest, highest
+    return max(lowest, float(median - reach)), min(highest, float(median + reach))
+
+
+def _label(height: xr.DataArray) -> str:
+    """What the heights are: as they were, or levelled."""
+    levelled = "levelled: polynomial" in str(height.attrs.get("history", ""))
+    return f"{VARIABLES['height'].label}, levelled" if levelled else VARIABLES["height"].label
+
+
 @styled
 def surface(height: xr.DataArray) -> Figure:
     """Quick look at a surface: map, profile through its middle, distribution of heights, power spectrum.
@@ -48,7 +82,8 @@ def surface(height: xr.DataArray) -> Figure:
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset that holds one as ``height``
-        Heights, peaks up; missing points are drawn in light grey and counted. [m]
+        Heights, peaks up; missing points are drawn in red, which the colours of heights have not, and counted. The
+        colours reach over five robust deviations at most: a spike does not flatten the rest. [m]
 
     Returns
     -------
@@ -61,17 +96,25 @@ def surface(height: xr.DataArray) -> Figure:
     Hann window, missing points on the plane: a quick look, not a measurement.
     """
     height = _checked(height)
-    unit, plane = unit_for(height - height.mean(), "m"), plane_unit(height)
+    low, high = robust_limits(height.values)
+    unit, plane = unit_for([high - height.mean(), low - height.mean()], "m"), plane_unit(height)
     figure, panels = _panels(plane_ratio(height))
     on_map = panels["map"]
-    image = draw_map(on_map, height, unit, plane)
+    image = draw_map(on_map, height, unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
+    image.set_cmap(matplotlib.colormaps[COLOUR_MAPS["height"]].with_extremes(bad=MISSING))
     flat = plane_ratio(height) < 0.4
-    bar = figure.colorbar(image, ax=on_map, location="top" if flat else "right", pad=0.02, aspect=50 if flat else 20)
-    bar.set_label(unit.label(VARIABLES["height"].label))
+    beyond = (float((height < low).mean()), float((height > high).mean()))
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    where = "top" if flat else "right"
+    arrows = extend[beyond[0] > 0, beyond[1] > 0]
+    bar = figure.colorbar(image, ax=on_map, location=where, pad=0.02, aspect=50 if flat else 20, extend=arrows)
+    bar.set_label(unit.label(_label(height)))
     label_plane(on_map, height, plane)
     missing = float(height.isnull().mean())
-    if missing:
-        figure.suptitle(f"{100 * missing:.2g} % of the points are missing (grey)", fontsize=8.5)
+    notes = [f"{100 * missing:.2g} % of the points are missing (red)"] if missing else []
+    notes += [f"{100 * sum(beyond):.2g} % lie beyond the scale of heights"] if sum(beyond) else []
+    if notes:
+        figure.suptitle(", ".join(notes), fontsize=8.5)
     _draw_profile(panels["profile"], on_map, height, unit, plane)
     levelled = off_plane(height)
     _draw_heights(panels["heights"], levelled, unit_for(levelled, "m"))
@@ -97,6 +140,8 @@ def _panels(ratio: float) -> tuple[Figure, dict[str, Axes]]:
 def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plane: Unit) -> None:
     middle = height.sizes["y"] // 2
     ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=BLUE, lw=0.9)
+    if not height.isel(y=middle).notnull().any():
+        ax.text(0.5, 0.5, "all missing", transform=ax.transAxes, ha="center", va="center", color="0.4")
     place = float(height["y"][middle])
     on_map.axhline(plane(place), color="w", lw=0.8, ls=(0, (4, 2)))
     limits = plane(cell_edges(height["x"]))
@@ -109,6 +154,7 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
 
 def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
     values = unit(levelled.values[np.isfinite(levelled.values)])
+    low, high = (float(unit(limit)) for limit in robust_limits(levelled.values))
     deviation = float(values.std())
     bins = int(np.clip(math.sqrt(values.size) / 1.5, 8, 100))
     if deviation == 0:
@@ -116,8 +162,19 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
         ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
-    ax.hist(values, bins=bins, density=True, color=BLUE, alpha=0.45, histtype="stepfilled", label="measured")
-    shown = np.linspace(values.min(), values.max(), 200)
+    inside = values[(values >= low) & (values <= high)]
+    weights = np.full(inside.shape, bins / ((high - low) * values.size))
+    ax.hist(
+        inside,
+        bins=bins,
+        range=(low, high),
+        weights=weights,
+        color=BLUE,
+        alpha=0.45,
+        histtype="stepfilled",
+        label="measured",
+    )
+    shown = np.linspace(low, high, 200)
     bell = np.exp(-(((shown - values.mean()) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])

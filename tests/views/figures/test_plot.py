@@ -429,7 +429,7 @@ def test_surface__panels_and_missing_points():
     figure = plot.surface(h)
     on_map, profile, heights, spectrum = figure.axes[:4]
     np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * h.T)
-    assert figure.get_suptitle() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (grey)"
+    assert figure.get_suptitle() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (red)"
     np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * h.isel(y=37))
     assert f"normal, Sq = {1e6 * float(rv.parameters(rv.level(h))['Sq']):.3g} µm" in lines(heights)
     assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
@@ -570,3 +570,32 @@ def test_plot__shows_figures_only():
     for name in rv.plot.__all__:
         assert inspect.isfunction(getattr(rv.plot, name))
         assert getattr(rv.plot, name).__module__.startswith("roughvisc.views")
+
+
+def test_surface__scale_is_not_moved_by_spikes_and_missing_points_have_a_colour_of_their_own():
+    rng = np.random.default_rng(4)
+    values = rng.normal(0, 1e-7, (41, 30))
+    values[3, 4], values[5:7, 8] = 1e-4, np.nan
+    figure = plot.surface(rv.level(rv.from_array(values, 1e-6)))
+    (image,) = figure.axes[0].get_images()
+    low, high = image.get_clim()
+    assert -1500 < low < high < 1500  # nm: five deviations of a plane that the spike tilts; it is 100,000 away
+    text = figure._suptitle.get_text()
+    assert "0.16 % of the points are missing (red)" in text
+    assert "0.081 % lie beyond the scale" in text
+    bad = np.array(image.get_cmap().get_bad())
+    shades = image.get_cmap()(np.linspace(0, 1, 256))
+    assert np.abs(shades - bad)[:, :3].max(axis=1).min() > 0.3
+    assert any(label.endswith("levelled [nm]") for label in (ax.get_ylabel() for ax in figure.axes))
+    spread = [patch.get_xy()[:, 0] for patch in figure.axes[2].patches]
+    assert all(abs(x).max() < 1500 for x in spread)
+
+
+def test_maps_and_section__of_a_mirrored_surface_show_what_was_measured():
+    ds = made.rough_creep((22, 16))
+    whole = ds.assign_attrs(history="read a.x3p\nmirrored along x and y")
+    (first, *_) = plot.maps(whole).axes
+    assert first.get_images()[0].get_array().shape == (8, 11)
+    assert plot.maps(ds).axes[0].get_images()[0].get_array().shape == (16, 22)
+    profiles = [plot.section(one).axes[1].lines[0].get_xdata() for one in (whole, ds)]
+    assert [len(x) for x in profiles] == [11, 22]

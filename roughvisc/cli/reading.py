@@ -1,0 +1,80 @@
+"""How a command reads a scan: the options that say what its file does not, and messages that name them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from roughvisc.errors import InputError
+
+_OPTIONS = (
+    click.option("--unit", help="Unit of length, where the file states none: um."),
+    click.option("--channel", help="Name or number of the channel. [default: the height]"),
+    click.option("--spacing", help="Distance of the points, where the file states none: 1um, or 1um,2um."),
+    click.option("--format", help="Format, where the suffix does not tell; auto: have it guessed."),
+)
+_NAMES = "unit|spacing|format|channel"
+
+
+def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorator: a command takes ``--unit``, ``--channel``, ``--spacing`` and ``--format``."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def read_options(unit: str | None, channel: str | None, spacing: str | None, format: str | None) -> dict[str, Any]:
+    """The options as :func:`roughvisc.open_scan` takes them."""
+    return {
+        "format": format,
+        "unit": unit,
+        "channel": int(channel) if channel is not None and channel.isdecimal() else channel,
+        "spacing": _sides(spacing),
+    }
+
+
+def _sides(text: str | None) -> Any:
+    """Distance of the points along x and y, or one for both. [m]"""
+    from roughvisc.units import quantity
+
+    if text is None:
+        return None
+    sides = [float(part) if part.strip().replace(".", "").isdecimal() else part for part in text.split(",")]
+    if len(sides) > 2:
+        raise InputError(f"--spacing: found {text!r}: expected one length, or two with a comma between them")
+    metres = [quantity(side, "m", "--spacing") for side in sides]
+    return metres[0] if len(metres) == 1 else tuple(metres)
+
+
+def naming_options(message: str) -> str:
+    """A message of the readers with the options of the command line in place of Python's keywords.
+
+    Examples
+    --------
+    >>> naming_options("it states no unit of length: pass unit= (such as unit='um')")
+    'it states no unit of length: pass --unit (such as --unit=um)'
+    >>> naming_options("it states no size: pass spacing=(dx, dy) [m]")
+    'it states no size: pass --spacing (such as --spacing=1um,1um)'
+    """
+    message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", "--spacing (such as --spacing=1um,1um)", message)
+    message = message.replace(" (see supported_formats())", "")
+    message = re.sub(rf"\b({_NAMES})='(\w+)'", r"--\1=\2", message)
+    message = re.sub(rf"\b({_NAMES})=(?=\W|$)", r"--\1", message)
+    return re.sub(rf"(^|: )({_NAMES}) is ", r"\1--\2 is ", message)
+
+
+def naming_keys(message: str) -> str:
+    """The same with the keys of a study's ``[surface]``.
+
+    Examples
+    --------
+    >>> naming_keys("it states no unit of length: pass unit= (such as unit='um')")
+    'it states no unit of length: pass the key unit (such as unit = "um")'
+    """
+    message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", 'the key spacing (such as spacing = "1 um")', message)
+    message = message.replace(" (see supported_formats())", "")
+    message = re.sub(rf"\b({_NAMES})='(\w+)'", r'\1 = "\2"', message)
+    return re.sub(rf"\b({_NAMES})=(?=\W|$)", r"the key \1", message)

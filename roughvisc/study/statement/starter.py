@@ -1,0 +1,180 @@
+"""The text of a first study for a scan, with comments."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from roughvisc.mechanics.materials.models import zener
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.topography.inspection import Inspection
+from roughvisc.topography.writers import surface_table, written_quantity
+
+#: The material of a first study: a rubber. [Pa, Pa, Pa s]
+SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY = 3e6, 1e6, 1e5
+#: Share of the area that is to be in contact in the end.
+CONTACT = 0.05
+#: Points from which a coarser grid is proposed for the first run.
+_LARGE = 400_000
+
+_REMARKS = {
+    "crop": "the largest part without large holes",
+    "level": "a plane is taken off",
+    "outliers": "spikes become missing points ...",
+    "fill": "... and missing points are filled in; the result keeps their mask",
+    "filter": "shorter waves are noise",
+    "mirror": "opposite borders do not meet: with its mirror images the scan repeats without a step",
+}
+
+
+def starter_study(
+    file: str | os.PathLike[str],
+    study: str | os.PathLike[str],
+    options: Mapping[str, Any],
+    found: Inspection,
+) -> str:
+    """A study of a scan pressed on a rubber, as TOML, ready to be run and to be changed.
+
+    Parameters
+    ----------
+    file : path
+        The scan.
+    study : path
+        Where the study is going to be.
+    options : mapping
+        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+    found : Inspection
+        What is seen in the scan.
+
+    Returns
+    -------
+    str
+        With the pressure that :func:`pressure_for` gives for 5 % of the area in contact in the end.
+    """
+    steps = dict(found.steps)
+    remarks = dict(_REMARKS)
+    if steps["level"] != 1:
+        remarks["level"] = ("the mean is taken off", "", "plane and curvature are taken off; 1: the plane alone")[
+            steps["level"]
+        ]
+    if "outliers" not in steps:
+        remarks["fill"] = "missing points are filled in; the result keeps their mask"
+    surface = surface_table(file, Path(study).parent, options, steps, remarks)
+    if math.prod(found.shape) > _LARGE:
+        coarse = [max(16, n // (4 if "mirror" in steps else 2)) for n in found.shape]
+        surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
+    rubber = zener(SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY)
+    early, late = (1 / float(rubber.contact_compliance(time)) for time in (0.0, math.inf))
+    pressure = pressure_for(CONTACT, late, found.rms_slope)
+    title = Path(file).stem.replace("_", " ")
+    return _TEXT.format(
+        title=title.replace("\\", "").replace('"', ""),
+        name=Path(file).name,
+        study=Path(study).name,
+        surface=surface,
+        shear=written_quantity(SHEAR_MODULUS, "Pa"),
+        kelvin=written_quantity(KELVIN_MODULUS, "Pa"),
+        viscosity=written_quantity(KELVIN_VISCOSITY, "Pa") + " s",
+        late=written_quantity(late, "Pa", 3),
+        slope=f"{found.rms_slope:.2g}",
+        percent=f"{100 * CONTACT:g}",
+        first=f"{100 * CONTACT * late / early:.2g}",
+        program=_program(pressure, found),
+    )
+
+
+def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
+    r"""Nominal pressure that brings a small fraction of a rough surface into contact, rounded to two digits.
+
+    Parameters
+    ----------
+    fraction : float
+        Real over nominal contact area, well below one. [-]
+    modulus : float
+        Contact modulus :math:`E^* = E / (1 - \nu^2)`. [Pa]
+    rms_slope : float
+        Root mean square slope of the surface. [-]
+
+    Returns
+    -------
+    float
+        :math:`p = f E^* h'_{rms} / 2`. [Pa]
+
+    Notes
+    -----
+    At small loads :math:`A / A_0 = \kappa p / (E^* h'_{rms})`, with :math:`\kappa = \sqrt{8 / \pi} = 1.6` in Persson's
+    theory [1]_ and :math:`\sqrt{2 \pi} = 2.5` in that of Bush, Gibson and Thomas [2]_: here 2.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
+    .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, Wear 35 (1975) 87.
+
+    Examples
+    --------
+    >>> pressure_for(0.05, 3e6, 0.1)
+    7500.0
+    """
+    return float(f"{fraction * modulus * rms_slope / 2:.2g}")
+
+
+def _program(pressure: float, found: Inspection) -> str:
+    """The line that sets the load, with the pressure and the force that it stands for."""
+    force = written_quantity(pressure * found.area, "N", 4)
+    area = written_area(found.area)
+    whole = " with the mirror images" if "mirror" in found.steps else ""
+    if hasattr(Program, "pressure"):
+        return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {area}{whole}'
+    return f'load = "{force}"  # a nominal pressure of {written_quantity(pressure, "Pa")} over {area}{whole}'
+
+
+def written_area(area: float) -> str:
+    """An area in the largest unit of which it has a hundredth.
+
+    Examples
+    --------
+    >>> written_area(4.5e-8), written_area(4e-10)
+    ('0.045 mm^2', '400 um^2')
+    """
+    for side, unit in ((1.0, "m"), (1e-3, "mm"), (1e-6, "um")):
+        if area >= 0.01 * side**2:
+            return f"{area / side**2:.4g} {unit}^2"
+    return f"{area / 1e-18:.4g} nm^2"
+
+
+_TEXT = """\
+# A first study of {name}: pressed on a rubber, and held while the contact creeps.
+#   roughvisc plan {study}     what it will model and cost
+#   roughvisc run {study}      results and figures, in the folder results/ beside it
+# Quantities are numbers in SI, or texts with a unit. Change what you like; what cannot be is refused by name.
+title = "{title} on a rubber"
+
+{surface}
+[material]                          # a spring in series with a Kelvin element; put your own numbers here
+model = "zener"
+shear_modulus = "{shear}"             # at once
+kelvin_modulus = "{kelvin}"            # softer in the end ...
+kelvin_viscosity = "{viscosity}"      # ... after some 0.1 s: viscosity over modulus
+poisson = 0.5
+
+# The pressure brings about {percent} % of the area into contact in the end, and {first} % at once. It is a rough
+# estimate: real over nominal area = 2 p / (E* h'), with the long-term contact modulus E* = E / (1 - nu^2) = {late}
+# and the rms slope h' = {slope}.
+[[program]]
+{program}
+over = "50 ms"                      # within this time, linearly
+
+[[program]]
+hold = "0.95 s"                     # ten times the time of the creep
+
+[solve]
+boundary = "periodic"               # the scan stands for a larger, nominally flat surface
+tolerance = 1e-2                    # of pressure, force and approach; 1e-3 for the final answer
+
+[keep]
+fields = ["pressure", "gap"]
+times = ["10 ms", "25 ms", "50 ms", "0.1 s", "0.15 s", "0.2 s", "0.3 s", "0.5 s", "1 s"]
+"""

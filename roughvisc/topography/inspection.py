@@ -1,0 +1,257 @@
+"""What a scan has to be treated for before it is pressed: spikes, holes, tilt, form, borders that jump, noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.ndimage
+import xarray as xr
+
+from roughvisc.topography.borders import BorderMismatch, border_mismatch
+from roughvisc.topography.cards import condition
+from roughvisc.topography.conditioning import crop, gaussian_filter, level, mask_outliers, mirror
+from roughvisc.topography.grid import cell_edges, checked, spacing, valid_values
+from roughvisc.topography.parameters import parameters, psd
+
+#: Share of the surface in large holes from which a part without them is proposed; window that tells large from small.
+_HOLES, _WINDOW = 0.01, 9
+#: Beyond this share of the points, what looks like spikes may be the surface itself.
+MOST_SPIKES = 0.02
+#: Share of the mean square height that a curved form has from which it is called one.
+FORM = 0.5
+#: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave; and where
+#: the spectrum is less than so many times the tail, noise is as strong as the surface.
+_WHITE, _ABOVE = -1.5, 2.0
+#: A floor this far below the root mean square height is rounding; one that has no more of the mean square slope than
+#: this is left in.
+_ROUNDING, _HARMLESS = 1e-6, 0.02
+#: Waves of fewer cells than this are not resolved in contact.
+RESOLVED = 8
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Short-wave end of the spectrum of a scan.
+
+    Attributes
+    ----------
+    rms : float
+        Root mean square of white noise as strong as the spectrum at its short-wave end. [m]
+    floor : bool
+        Whether the spectrum is flat there: whether `rms` is the noise, and not a bound of it.
+    wavelength : float
+        The shortest wave that stands above the noise; two cells where no floor is seen. [m]
+    fine_slopes : float
+        Share of the mean square slope that waves shorter than eight cells have. [-]
+    noisy_slopes : float
+        Share of the mean square slope that waves below the floor have. [-]
+    """
+
+    rms: float
+    floor: bool
+    wavelength: float
+    fine_slopes: float
+    noisy_slopes: float
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is seen in a scan, and the conditioning steps that follow from it.
+
+    Attributes
+    ----------
+    points, missing, spikes : int
+        Number of points of the part that is proposed, how many are missing, how many are spikes.
+    holes : float
+        Share of the whole scan that lies in large holes. [-]
+    rms_raw, rms_levelled, rms_despiked, rms_flat : float
+        Root mean square height less its mean; less its plane; without spikes; less its quadratic form. [m]
+    tilt : pair of float
+        Slope of the mean plane along x and y. [-]
+    borders : BorderMismatch
+        How opposite borders differ after levelling.
+    noise : Noise or None
+        None where the scan is flat, or too small for a spectrum.
+    rms_slope : float
+        Of the surface after the steps. [-]
+    area : float
+        Of the surface after the steps, mirror images included. [m2]
+    shape : pair of int
+        Points of the surface after the steps.
+    steps : dict
+        Conditioning steps as surface cards and studies write them.
+    """
+
+    points: int
+    missing: int
+    spikes: int
+    holes: float
+    rms_raw: float
+    rms_levelled: float
+    rms_despiked: float
+    rms_flat: float
+    tilt: tuple[float, float]
+    borders: BorderMismatch
+    noise: Noise | None
+    rms_slope: float
+    area: float
+    shape: tuple[int, int]
+    steps: dict[str, Any]
+
+    @property
+    def form_share(self) -> float:
+        """Share of the mean square height, less its plane, that a quadratic form has. [-]"""
+        return 1 - (self.rms_flat / self.rms_despiked) ** 2 if self.rms_despiked > 0 else 0.0
+
+
+def inspect_scan(h: xr.DataArray) -> Inspection:
+    """What is to be seen in a scan, and what to do with it before it is pressed.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights as read, NaN where missing. [m]
+
+    Returns
+    -------
+    Inspection
+
+    Raises
+    ------
+    InputError
+        If all points are missing, or those present determine no plane.
+    """
+    h = checked(h, "inspect_scan")
+    limits, holes = _without_holes(h)
+    part = crop(h, **limits) if limits else h
+    levelled = level(part)
+    masked = mask_outliers(levelled)
+    missing = int(part.isnull().sum())
+    spikes = int(masked.isnull().sum()) - missing
+    doubtful = spikes > MOST_SPIKES * part.size
+    kept = levelled if doubtful else masked
+    straight, flat = _rms(level(kept)), _rms(level(kept, 2)) if min(part.shape) > 2 else np.nan
+    curved = flat < np.sqrt(1 - FORM) * straight
+    steps: dict[str, Any] = {"crop": limits} if limits else {}
+    steps |= {"level": 2 if curved else _order(part, kept)}
+    steps |= {"outliers": True} if spikes and not doubtful else {}
+    steps |= {"fill": "harmonic"} if missing or "outliers" in steps else {}
+    treated = condition(h, steps)
+    borders = border_mismatch(treated)
+    noise = _noise(treated)
+    if noise is not None and noise.noisy_slopes > _HARMLESS and noise.wavelength >= 3 * max(spacing(treated)):
+        steps["filter"] = float(f"{noise.wavelength:.2g}")
+        steps["filter"] = max(steps["filter"], 3.001 * max(spacing(treated)))
+        treated = gaussian_filter(treated, steps["filter"])
+    slope = float(parameters(treated)["rms_slope"])
+    if borders.jumps:
+        steps["mirror"] = True
+        treated = mirror(treated)
+    area = float(np.prod([n * d for n, d in zip(treated.shape, spacing(treated), strict=True)]))
+    return Inspection(
+        points=part.size,
+        missing=missing,
+        spikes=spikes,
+        holes=holes,
+        rms_raw=_rms(part),
+        rms_levelled=_rms(levelled),
+        rms_despiked=straight,
+        rms_flat=flat,
+        tilt=_tilt(part, levelled),
+        borders=borders,
+        noise=noise,
+        rms_slope=slope,
+        area=area,
+        shape=(treated.shape[0], treated.shape[1]),
+        steps=steps,
+    )
+
+
+def _order(part: xr.DataArray, levelled: xr.DataArray) -> int:
+    """Order of the polynomial to take off: a plane, unless that would tear open a surface that repeats as it is."""
+    return 0 if border_mismatch(levelled).jumps and not border_mismatch(part).jumps else 1
+
+
+def _rms(h: xr.DataArray) -> float:
+    return float(valid_values(h, "inspect_scan").std())
+
+
+def _tilt(before: xr.DataArray, after: xr.DataArray) -> tuple[float, float]:
+    """Slopes of the plane that was taken off. [-]"""
+    plane = before.values - after.values
+    nx, ny = plane.shape
+    dx, dy = spacing(before)
+    with np.errstate(invalid="ignore"):
+        known = np.isfinite(plane)
+    x, y = np.meshgrid((np.arange(nx) - nx / 2) * dx, (np.arange(ny) - ny / 2) * dy, indexing="ij")
+    design = np.stack([np.ones(known.sum()), x[known], y[known]], axis=1)
+    values = plane[known] - plane[known].mean()
+    slopes = np.linalg.lstsq(design / np.abs(design).max(axis=0), values, rcond=None)[0] / np.abs(design).max(axis=0)
+    return float(slopes[1]), float(slopes[2])
+
+
+def _without_holes(h: xr.DataArray) -> tuple[dict[str, tuple[float, float]], float]:
+    """Limits of the largest rectangle without large holes [m], empty if there are none, and the share in them."""
+    missing = h.isnull().values
+    if not missing.any():
+        return {}, 0.0
+    void = scipy.ndimage.uniform_filter(missing.astype(float), _WINDOW, mode="nearest") > 0.5
+    share = float(void.mean())
+    if share < _HOLES:
+        return {}, share
+    block = [max(1, n // 128) for n in h.shape]
+    coarse = np.logical_or.reduceat(void, np.arange(0, h.shape[0], block[0]), axis=0)
+    coarse = np.logical_or.reduceat(coarse, np.arange(0, h.shape[1], block[1]), axis=1)
+    rows, columns = _largest_rectangle(~coarse)
+    limits = {}
+    for axis, (first, last), step in zip(("x", "y"), (rows, columns), block, strict=True):
+        first, last = first * step, min(last * step, h.sizes[axis])
+        if last - first < 16:
+            return {}, share
+        edges = cell_edges(h[axis])
+        limits[axis] = (float(f"{edges[first]:.6g}"), float(f"{edges[last]:.6g}"))
+    return limits, share
+
+
+def _largest_rectangle(present: np.ndarray) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Rows and columns, the last excluded, of the rectangle of the most cells of which all are present."""
+    best, found = 0, ((0, 0), (0, 0))
+    run = np.zeros(present.shape[1], dtype=int)  # cells present above, up to this row
+    for row, line in enumerate(present):
+        run = np.where(line, run + 1, 0)
+        for height in np.unique(run[run > 0]):
+            labels, count = scipy.ndimage.label(run >= height)
+            for (piece,) in scipy.ndimage.find_objects(labels, count):
+                size = int(height) * (piece.stop - piece.start)
+                if size > best:
+                    best, found = size, ((row + 1 - int(height), row + 1), (piece.start, piece.stop))
+    return found
+
+
+def _noise(h: xr.DataArray) -> Noise | None:
+    """Short-wave end of the spectrum; None where the surface is flat, small, or has missing points."""
+    values, sides = h.values, spacing(h)
+    if min(h.shape) < 16 or np.isnan(values).any() or not values.std() > 1e-12 * np.abs(values).max(initial=1e-300):
+        return None
+    spectrum = psd(h, "hann")
+    q, density, modes = (spectrum[name].values for name in ("wavevector", "psd", "modes"))
+    seen = q <= np.pi / max(sides)
+    q, density, modes = q[seen], density[seen], modes[seen]
+    octave = q > q[-1] / 2
+    tail = float(np.median(density[octave]))
+    power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
+    smooth = scipy.ndimage.median_filter(density, 5, mode="nearest")
+    below = np.flatnonzero(smooth < _ABOVE * tail)
+    strength = float(np.sqrt(tail / (sides[0] * sides[1])))
+    floor = bool(power > _WHITE and below.size and below[0] > 0 and strength > _ROUNDING * values.std())
+    shortest = float(2 * np.pi / q[below[0] - 1]) if floor else 2 * max(sides)
+    slopes = density * modes * q**2
+
+    def share(wavelength: float) -> float:
+        return float(slopes[q > 2 * np.pi / wavelength].sum() / slopes.sum())
+
+    if not floor:
+        strength = float(np.sqrt(np.median(density[q > 0.8 * q[-1]]) / (sides[0] * sides[1])))
+    return Noise(strength, floor, shortest, share(RESOLVED * max(sides)), share(shortest) if floor else 0.0)

@@ -1,0 +1,56 @@
+"""How the map of each format lies, and how that was told: a scan read the wrong way round is a mirror image."""
+
+from __future__ import annotations
+
+#: Formats whose reader gives the top line of the map first, and how that was told. The first two by a feature in a
+#: real file; the others by what two programs that read them say of each other.
+_GWYDDION = "the reader matches the map of Gwyddion, whose first line is the top one; by no feature in a real file"
+_TOP_FIRST = {
+    "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
+    "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
+    "di": _GWYDDION,
+    "ezd": _GWYDDION,
+    "frt": _GWYDDION,
+    "gwy": "Gwyddion's own format, whose first line is the top one; by no feature in a real file",
+    "ibw": _GWYDDION,
+    "jpk": _GWYDDION,
+    "mdt": _GWYDDION,
+    "mi": _GWYDDION,
+    "opd": "two programs draw the same line at the top; by no feature in a real file",
+    "ps": _GWYDDION,
+    "wsxm": _GWYDDION,
+}
+#: Formats that say themselves which way y goes.
+_STATED = {
+    "nc": "verified: the coordinates in the file",
+    "xyz": "verified: the coordinates in the file",
+}
+
+
+def top_line_first(format: str) -> bool:
+    """Whether a format's reader gives the line of the largest y first."""
+    return format in _TOP_FIRST
+
+
+def orientation(format: str) -> str:
+    """How the orientation of a format was told.
+
+    Parameters
+    ----------
+    format : str
+        Its name, as ``format=`` of :func:`roughvisc.open_scan` takes it.
+
+    Returns
+    -------
+    str
+        Begins with ``verified`` where a feature in a real file, or the file itself, tells; else with ``not verified``.
+
+    Examples
+    --------
+    >>> orientation("tmd").partition(":")[0], orientation("plu").partition(":")[0]
+    ('verified', 'not verified')
+    """
+    told = _TOP_FIRST.get(format) or _STATED.get(format)
+    if told is None:
+        return "not verified: the first line of the file is taken to be y = 0; it may be a mirror image"
+    return told if told.startswith("verified") else f"not verified: {told}"

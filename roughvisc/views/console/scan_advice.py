@@ -1,0 +1,159 @@
+"""What is seen in a scan and what to do about it, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from roughvisc.topography.inspection import MOST_SPIKES, RESOLVED, Inspection
+from roughvisc.views.console.tables import readable
+
+#: What is to be done where nothing is.
+_NOTHING = "nothing to do"
+
+
+def advice_table(found: Inspection) -> Group:
+    """What is seen in a scan, each with what follows from it.
+
+    Parameters
+    ----------
+    found : Inspection
+        Of :func:`~roughvisc.topography.inspection.inspect_scan`.
+    """
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for what, seen, do in advice(found):
+        table.add_row(what, Text(seen))
+        table.add_row("", Text(f"-> {do}", style="" if do == _NOTHING else "bold"))
+    return Group(Text("What is seen, and what to do", style="bold"), table)
+
+
+def advice(found: Inspection) -> Iterator[tuple[str, str, str]]:
+    """What is looked at, what is seen, and what to do, of a scan."""
+    if found.holes or "crop" in found.steps:
+        yield _holes(found)
+    yield _missing(found)
+    yield _spikes(found)
+    yield _tilt(found)
+    yield _form(found)
+    yield _borders(found)
+    yield from _noise(found)
+
+
+def _holes(found: Inspection) -> tuple[str, str, str]:
+    seen = f"{100 * found.holes:.2g} % of the scan lie in holes that are wider than a few points"
+    if "crop" in found.steps:
+        nx, ny = found.shape if "mirror" not in found.steps else (found.shape[0] // 2, found.shape[1] // 2)
+        return (
+            "Holes",
+            seen,
+            (
+                f"crop to the largest part without them, {nx} x {ny} points, which all that follows is of; or keep the "
+                'whole with missing = "absent" if there is no material there'
+            ),
+        )
+    return "Holes", seen, "too few of them to crop: they are filled in with the other missing points"
+
+
+def _missing(found: Inspection) -> tuple[str, str, str]:
+    if not found.missing:
+        return "Missing points", "none", _NOTHING
+    seen = f"{found.missing} ({100 * found.missing / found.points:.2g} %)"
+    return "Missing points", seen, 'fill = "harmonic"; the result keeps the mask of the points filled in'
+
+
+def _spikes(found: Inspection) -> tuple[str, str, str]:
+    if not found.spikes:
+        return "Spikes", "none", _NOTHING
+    points = "point" if found.spikes == 1 else "points"
+    share = f"{found.spikes} {points} ({100 * found.spikes / found.points:.2g} %)"
+    if found.spikes > MOST_SPIKES * found.points:
+        return (
+            "Spikes",
+            f"{share} stand out of their neighbourhood",
+            ("too many for spikes: look at the picture; outliers = true only if the surface has no such features"),
+        )
+    effect = f"Sq is {_height(found.rms_levelled)} with them and {_height(found.rms_despiked)} without"
+    return "Spikes", f"{share}: {effect}", "outliers = true; in a contact a spike would carry the load"
+
+
+def _tilt(found: Inspection) -> tuple[str, str, str]:
+    angles = " and ".join(f"{_angle(slope)} along {axis}" for slope, axis in zip(found.tilt, "xy", strict=True))
+    effect = f"Sq is {_height(found.rms_raw)} before and {_height(found.rms_levelled)} after levelling"
+    seen = f"{angles}: {effect}"
+    order = found.steps["level"]
+    if order == 0:
+        return (
+            "Tilt",
+            seen,
+            "level = 0 takes off the mean alone: the surface repeats as it is, which a plane would end",
+        )
+    return "Tilt", seen, f"level = {order} takes the plane off{' too' if order > 1 else ''}"
+
+
+def _form(found: Inspection) -> tuple[str, str, str]:
+    seen = f"a quadratic form has {100 * found.form_share:.2g} % of Sq squared"
+    if found.steps["level"] == 2:
+        return (
+            "Form",
+            f"{seen}; Sq is {_height(found.rms_flat)} without it",
+            ('level = 2 for the roughness alone; level = 1 and boundary = "free" if the form itself is pressed'),
+        )
+    return "Form", seen, _NOTHING
+
+
+def _borders(found: Inspection) -> tuple[str, str, str]:
+    (x, y), (nx, ny) = found.borders.of_rms, found.borders.of_neighbours
+    seen = (
+        f"opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, {nx:.2g} and {ny:.2g} times as much as "
+        "neighbouring rows"
+    )
+    if found.borders.jumps:
+        return (
+            "Borders",
+            seen,
+            (
+                'for boundary = "periodic" mirror = true (at no more cost), or taper = a margin; without either '
+                "the seam carries load that is not real"
+            ),
+        )
+    return "Borders", seen, 'boundary = "periodic" as it is: neither mirror nor taper'
+
+
+def _noise(found: Inspection) -> Iterator[tuple[str, str, str]]:
+    noise = found.noise
+    if noise is None:
+        yield "Noise", "not known: the scan is flat, or smaller than 16 points", _NOTHING
+        return
+    if noise.floor:
+        seen = (
+            f"a floor of {_height(noise.rms)} rms, which drowns the waves below {_height(noise.wavelength)}; they have "
+            f"{100 * noise.noisy_slopes:.2g} % of the mean square slope"
+        )
+        do = "filter to the waves above it" if "filter" in found.steps else _NOTHING
+        yield "Noise", seen, do
+    else:
+        yield "Noise", f"no floor is seen down to two cells; it is less than {_height(noise.rms)} rms", _NOTHING
+    seen = (
+        f"the shortest wave resolved is {_height(noise.wavelength)}; waves below {RESOLVED} cells have "
+        f"{100 * noise.fine_slopes:.2g} % of the mean square slope"
+    )
+    if noise.fine_slopes > 0.5 and "filter" not in found.steps:
+        do = "spots of contact will be about a cell wide: ask for grid_error = true, or filter to longer waves"
+    else:
+        do = _NOTHING
+    yield "Resolution", seen, do
+
+
+def _height(value: float) -> str:
+    return readable(value, "m")
+
+
+def _angle(slope: float) -> str:
+    degrees = math.degrees(math.atan(abs(slope)))
+    return f"{degrees:.2g}°" if degrees >= 1e-3 else "less than 0.001°"

@@ -1,0 +1,133 @@
+"""What is seen in a scan: planted spikes, holes, noise, tilt, form and borders are found by their numbers."""
+
+import itertools
+
+import numpy as np
+import pytest
+import xarray as xr
+from scan_files import CELL
+
+import roughvisc as rv
+from roughvisc.topography.borders import border_mismatch
+from roughvisc.topography.cards import condition
+from roughvisc.topography.inspection import _largest_rectangle, inspect_scan
+from roughvisc.topography.readers import from_array
+
+SMOOTH = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3)
+
+
+def with_values(values):
+    return from_array(values, 1e-6)
+
+
+def test_spikes__are_counted_and_what_they_do_to_sq():
+    values = SMOOTH.values.copy()
+    places = [(5, 7), (50, 60), (80, 12)]
+    for place in places:
+        values[place] += 5e-6
+    found = inspect_scan(with_values(values))
+    assert found.spikes == len(places)
+    assert found.steps["outliers"] is True
+    assert found.rms_levelled == pytest.approx(float(rv.level(with_values(values)).std()), rel=1e-12)
+    assert found.rms_levelled > 1.3 * found.rms_despiked
+    plane = rv.level(SMOOTH)
+    assert found.rms_despiked == pytest.approx(float(plane.std()), rel=1e-3)
+    assert inspect_scan(SMOOTH).spikes == 0
+
+
+def test_steps__leave_out_what_is_not_needed():
+    """Of a surface that repeats not even a plane: that would tear it open."""
+    assert inspect_scan(SMOOTH).steps == {"level": 0}
+
+
+def test_tilt__and_form_by_their_coefficients():
+    x, y = np.meshgrid(SMOOTH.x.values, SMOOTH.y.values, indexing="ij")
+    tilted = inspect_scan(with_values(SMOOTH.values + 0.02 * x - 0.03 * y))
+    both = inspect_scan(SMOOTH)
+    np.testing.assert_allclose(tilted.tilt, (0.02 + both.tilt[0], -0.03 + both.tilt[1]), rtol=1e-9)
+    assert tilted.steps["level"] == 1
+    ball = (x - x.mean()) ** 2 / (2 * 1e-3)
+    curved = inspect_scan(with_values(SMOOTH.values + ball))
+    assert curved.steps["level"] == 2
+    assert curved.form_share > 0.9
+    assert curved.rms_flat == pytest.approx(float(rv.level(SMOOTH, 2).std()), rel=1e-9)
+
+
+def test_borders__of_a_surface_that_repeats_meet_and_of_a_part_do_not():
+    whole = border_mismatch(SMOOTH)
+    z = SMOOTH.values
+    across = [np.sqrt(np.mean((z[0] - z[-1]) ** 2)), np.sqrt(np.mean((z[:, 0] - z[:, -1]) ** 2))]
+    beside = [np.sqrt(np.mean((np.roll(z, 1, axis) - z)[1:] ** 2)) for axis in (0,)]
+    np.testing.assert_allclose(whole.of_rms, np.array(across) / z.std(), rtol=1e-12)
+    assert whole.of_neighbours[0] == pytest.approx(across[0] / beside[0], rel=1e-12)
+    assert not whole.jumps
+    part = with_values(z[:50, :41])
+    assert border_mismatch(part).jumps
+    assert inspect_scan(part).steps["mirror"] is True
+    assert not border_mismatch(rv.mirror(part)).jumps
+    assert border_mismatch(xr.zeros_like(part)).of_rms == (0.0, 0.0)
+
+
+def test_mirror__is_in_the_area_and_the_shape():
+    part = with_values(SMOOTH.values[:50, :41])
+    found = inspect_scan(part)
+    assert found.shape == (100, 82)
+    assert found.area == pytest.approx(4 * 50e-6 * 41e-6)
+
+
+@pytest.mark.parametrize("shape", [(96, 80), (97, 61)])
+def test_noise__of_known_strength_is_found(shape):
+    smooth = rv.self_affine(
+        (shape[0] * 1e-6, shape[1] * 1e-6), shape, hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3
+    )
+    noise = np.random.default_rng(5).normal(0, 2e-9, shape)
+    found = inspect_scan(with_values(smooth.values + noise))
+    assert found.noise.floor
+    assert found.noise.rms == pytest.approx(2e-9, rel=0.1)
+    assert found.noise.wavelength == pytest.approx(1.2e-5, rel=0.25)  # the surface has no shorter waves
+    assert found.steps["filter"] == pytest.approx(found.noise.wavelength, rel=0.05)
+    assert found.rms_slope == pytest.approx(
+        float(rv.parameters(smooth).rms_slope), rel=0.2
+    )  # and a little of the surface
+
+
+def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():
+    steep = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, seed=3)
+    found = inspect_scan(steep)
+    assert not found.noise.floor
+    assert found.noise.wavelength == pytest.approx(2e-6)
+    assert "filter" not in found.steps
+
+
+def test_large_holes__are_cropped_away_and_small_ones_filled():
+    values = SMOOTH.values.copy()
+    values[70:, :] = np.nan
+    values[10, 10] = values[30, 40] = np.nan
+    found = inspect_scan(with_values(values))
+    assert found.missing == 2
+    assert found.holes == pytest.approx(26 / 96, rel=0.05)
+    treated = condition(with_values(values), found.steps)
+    assert not treated.isnull().any()
+    assert int(treated.filled.sum()) == 2 * (4 if "mirror" in found.steps else 1)
+    assert found.shape == treated.shape
+    assert treated.sizes["x"] == 70 * (2 if "mirror" in found.steps else 1)
+
+
+def test_largest_rectangle__is_that_of_brute_force():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        present = rng.random((7, 9)) < 0.8
+        (a, b), (c, d) = _largest_rectangle(present)
+        assert present[a:b, c:d].all()
+        best = max(
+            (i1 - i0) * (j1 - j0)
+            for i0, i1 in itertools.combinations(range(8), 2)
+            for j0, j1 in itertools.combinations(range(10), 2)
+            if present[i0:i1, j0:j1].all()
+        )
+        assert (b - a) * (d - c) == best
+
+
+def test_small_or_flat__has_no_spectrum():
+    assert inspect_scan(from_array(np.arange(12.0).reshape(4, 3) * 1e-6, CELL)).noise is None
+    assert inspect_scan(from_array(np.zeros((20, 20)), CELL)).noise is None
