@@ -13,7 +13,8 @@ from roughvisc.topography.borders import BorderMismatch, border_mismatch
 from roughvisc.topography.cards import condition
 from roughvisc.topography.conditioning import crop, gaussian_filter, level, mask_outliers, mirror
 from roughvisc.topography.grid import cell_edges, checked, spacing, valid_values
-from roughvisc.topography.parameters import parameters, psd
+from roughvisc.topography.parameters import parameters
+from roughvisc.topography.spectrum import psd
 
 #: Share of the surface in large holes from which a part without them is proposed; window that tells large from small.
 _HOLES, _WINDOW = 0.01, 9

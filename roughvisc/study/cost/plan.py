@@ -19,11 +19,12 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.simulation.notes import left_out, loaded_slope
+from roughvisc.study.simulation.notes import left_out
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.results import parameters_of
+from roughvisc.topography.parameters import rms_slope
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
@@ -181,7 +182,7 @@ def _surface(case: Case) -> _Surface:
         ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored, loaded_slope(height, np.inf))
+    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
