@@ -1,23 +1,26 @@
 """Sphinx: ``sphinx-build -W -b html docs docs/_build``."""
 
 import importlib.metadata
-import importlib.util
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # study_keys.py
 
 project = "roughvisc"
 author = "The roughvisc developers"
 version = release = importlib.metadata.version("roughvisc")
 
 extensions = [
-    "myst_parser",
+    "myst_nb",  # pages in Markdown, and a notebook
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",  # formulas without a network
 ]
-if importlib.util.find_spec("sphinx-mathjax-offline"):  # equations without a network, where it is installed
-    extensions.append("sphinx-mathjax-offline")
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+nb_execution_mode = "off"  # docs/make_gallery.py runs the notebook
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
 suppress_warnings = ["ref.footnote"]  # sources named at the end of a docstring, not in its text
@@ -30,6 +33,8 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 
 html_theme = "pydata_sphinx_theme"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 html_title = f"roughvisc {version}"
 html_theme_options = {
     "show_prev_next": True,
@@ -42,13 +47,14 @@ html_theme_options = {
 }
 html_sidebars = {
     "**": ["sidebar-nav-bs"],
-    **{page: [] for page in ("index", "tutorial", "gallery", "theory", "limits", "nomenclature", "changelog")},
+    **{key: [] for key in ("index", "tutorial", "gallery", "first_contact", "theory", "limits")},
+    **{key: [] for key in ("nomenclature", "study-files", "changelog")},
 }
 copyright = author
 
 
-def _with_variables(app, docname, source):
-    """Put the table of the vocabulary where the page asks for it."""
+def _with_tables(app, docname, source):
+    """Put the table of the vocabulary, and those of the keys of study files, where the pages ask for them."""
     from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
     if docname == "nomenclature":
@@ -56,11 +62,17 @@ def _with_variables(app, docname, source):
         for name, one in VARIABLES.items():
             meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
             if name == "status":
-                meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
+                meaning += ": " + ", ".join(
+                    f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS)
+                )
             rows.append(f"| `{name}` | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |")
         source[0] = source[0].replace("VARIABLES_TABLE", "\n".join(rows))
+    if docname == "study-files":
+        from study_keys import filled
+
+        source[0] = filled(source[0])
 
 
 def setup(app):
     """Hook of Sphinx."""
-    app.connect("source-read", _with_variables)
+    app.connect("source-read", _with_tables)

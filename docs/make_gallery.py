@@ -2,7 +2,8 @@
 
     python docs/make_gallery.py [STUDY ...]
 
-writes gallery.md and small PNG files; the page is written whole, figures only of the studies named (default: all).
+writes gallery.md and small PNG files; the page is written whole, figures only of the studies named (default: all). The
+notebook ``first_contact`` is run as well, if it is named or nothing is.
 """
 
 import sys
@@ -19,7 +20,10 @@ HERE = Path(__file__).parent
 WORKFLOWS = HERE.parent / "workflows"
 #: study -> figures drawn of it: of each case's result, or of all cases
 FIGURES = {
-    "quickstart": {"maps": lambda ds: rv.plot.maps(ds, fields=["pressure"]), "history": rv.plot.history},
+    "quickstart": {
+        "maps": lambda ds: rv.plot.maps(ds, fields=["pressure"]),
+        "history": rv.plot.history,
+    },
     "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
     "load_sweep": {
         "sweep": rv.plot.sweep,
@@ -28,7 +32,9 @@ FIGURES = {
     },
     "two_parameters": {
         "map": lambda results: rv.plot.sweep(results, "contact_area_corrected"),
-        "lines": lambda results: rv.plot.sweep(results, "approach", times=[0.01, 0.05], kind="lines"),
+        "lines": lambda results: rv.plot.sweep(
+            results, "approach", times=[0.01, 0.05], kind="lines"
+        ),
     },
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
@@ -37,7 +43,26 @@ FIGURES = {
     },
     "stability_map": {},  # drawn by its script
 }
-SCRIPTS = {name: f"figures/{name}.png" for name in ("maxwell_step", "zener_step", "stability_map")}
+SCRIPTS = {
+    name: f"figures/{name}.png" for name in ("maxwell_step", "zener_step", "stability_map")
+}
+
+
+NOTEBOOK = "first_contact"
+
+
+def run_notebook(path):
+    """Run a notebook, and keep its outputs in it."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(
+        notebook, timeout=300, resources={"metadata": {"path": str(path.parent)}}
+    ).execute()
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)  # when it ran
+    nbformat.write(notebook, path)
 
 
 def by_load(results):
@@ -45,7 +70,10 @@ def by_load(results):
     loads = results["program.0.load"].values
     surface = {"height": results.height} if "height" in results else {}
     drop = [name for name in results.coords if name not in ("time", "x", "y")]
-    return {f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface) for i, load in enumerate(loads)}
+    return {
+        f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface)
+        for i, load in enumerate(loads)
+    }
 
 
 def draw(name, folder):
@@ -68,16 +96,48 @@ def draw(name, folder):
 
 def page():
     """Text of the gallery."""
-    lines = ["# Gallery", "", "Made by `docs/make_gallery.py`, which runs the studies of `workflows/`.", ""]
+    lines = [
+        "# Gallery",
+        "",
+        "Made by `docs/make_gallery.py`, which runs the studies of `workflows/`.",
+        "",
+    ]
+    lines += [
+        f"From a scan to real contact area at three temperatures, in Python: [a notebook]({NOTEBOOK}.ipynb).",
+        "",
+    ]
     for name in FIGURES:
         study = WORKFLOWS / f"{name}.toml"
         text = study.read_text()
-        lines += [f"## {tomllib.loads(text)['title']}", "", "```sh", f"roughvisc run workflows/{name}.toml", "```", ""]
+        lines += [
+            f"## {tomllib.loads(text)['title']}",
+            "",
+            "```sh",
+            f"roughvisc run workflows/{name}.toml",
+            "```",
+            "",
+        ]
         lines += [f"![{kind}](gallery/{name}-{kind}.png)\n" for kind in FIGURES[name]]
-        lines += ["<details><summary>The study</summary>", "", "```toml", text.rstrip(), "```", "", "</details>", ""]
+        lines += [
+            "<details><summary>The study</summary>",
+            "",
+            "```toml",
+            text.rstrip(),
+            "```",
+            "",
+            "</details>",
+            "",
+        ]
     for name, figure in SCRIPTS.items():
         summary = (WORKFLOWS / f"{name}.py").read_text().split('"""')[1].strip().partition("\n")
-        lines += [f"## {summary[0].rstrip('.')}", "", "```sh", f"python workflows/{name}.py", "```", ""]
+        lines += [
+            f"## {summary[0].rstrip('.')}",
+            "",
+            "```sh",
+            f"python workflows/{name}.py",
+            "```",
+            "",
+        ]
         lines += [f"![{name}]({figure})", ""]
     return "\n".join(lines)
 
@@ -85,8 +145,10 @@ def page():
 def main(names):
     folder = HERE / "gallery"
     folder.mkdir(exist_ok=True)
-    for name in names or FIGURES:
-        if FIGURES[name]:
+    for name in names or [*FIGURES, NOTEBOOK]:
+        if name == NOTEBOOK:
+            run_notebook(HERE / f"{name}.ipynb")
+        elif FIGURES[name]:
             draw(name, folder)
     (HERE / "gallery.md").write_text(page(), encoding="utf-8")
 

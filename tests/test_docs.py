@@ -1,6 +1,7 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
 import inspect
+import json
 import re
 import shutil
 import sys
@@ -128,6 +129,33 @@ def test_gallery__is_made_by_running_a_study(tmp_path, monkeypatch):
     make_gallery.draw("load_sweep", tmp_path)
     assert (tmp_path / "load_sweep-area.png").stat().st_size > 5000
     assert make_gallery.page() == (DOCS / "gallery.md").read_text(encoding="utf-8")
+
+
+def test_notebook__runs_and_shows_what_it_gives(there, monkeypatch):
+    cells = [
+        one for one in json.loads((DOCS / "first_contact.ipynb").read_text())["cells"] if one["cell_type"] == "code"
+    ]
+    assert all(cell["execution_count"] == number for number, cell in enumerate(cells, 1)), "run docs/make_gallery.py"
+    kinds = {kind for cell in cells for output in cell["outputs"] for kind in output.get("data", ())}
+    assert {"image/png", "text/html"} <= kinds
+    assert not any(output["output_type"] == "error" for cell in cells for output in cell["outputs"])
+    monkeypatch.chdir(there / "workflows")  # beside surfaces/, as docs/ is
+    space = {}
+    with matplotlib.rc_context({"backend": "agg"}):
+        for cell in cells:
+            exec("".join(line for line in cell["source"] if not line.startswith("%")), space)
+    sys.modules["matplotlib.pyplot"].close("all")
+    assert space["both"].shape == (64, 60)
+
+
+def test_code__fits_its_page():
+    """A line of 98 characters fits beside the sidebars; the gallery, which has none, shows studies as they are."""
+    for path in PAGES:
+        for block in _BLOCK.finditer(path.read_text(encoding="utf-8")):
+            longest = max(block["text"].splitlines(), key=len)
+            assert len(longest) <= (120 if path.stem == "gallery" else 98), f"{named(path)}: {longest}"
+    for cell in json.loads((DOCS / "first_contact.ipynb").read_text())["cells"]:
+        assert cell["cell_type"] != "code" or all(len(line) <= 98 for line in cell["source"])
 
 
 def test_links__lead_somewhere():

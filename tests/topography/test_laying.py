@@ -86,7 +86,7 @@ def test_combine__points_missing_or_filled_in_the_second_are_so_in_the_sum():
     assert np.argwhere(np.isnan(both.values)).tolist() == [[3, 0]]
     marked = rv.combine(first, rv.fill(second, "nearest"), "x", align="centre")
     assert np.argwhere(marked.filled.values).tolist() == [[2, 1], [3, 0]]
-    assert "; the second face: filled: 4 missing points, nearest" in marked.attrs["history"]
+    assert "filled: 4 missing points, nearest" in marked.attrs["history"]
 
 
 def test_combine__two_balls_press_as_one_of_the_harmonic_radius():

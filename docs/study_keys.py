@@ -1,0 +1,160 @@
+"""The tables of the page on study files: keys, kinds, units and defaults from the schema, meanings from a file.
+
+``rows(name)`` gives those of one table of ``study_keys.toml``, ``table(name)`` the same in Markdown.
+"""
+
+import re
+import tomllib
+from pathlib import Path
+
+from roughvisc.study.statement.schema import (
+    StudyFile,
+    conditioning,
+    material,
+    program,
+    settings,
+    surface,
+)
+from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.statement.schema.units import unit_of
+
+FILE = Path(__file__).with_name("study_keys.toml")
+MEANINGS = tomllib.loads(FILE.read_text(encoding="utf-8"))
+HEAD = ("key", "expected", "unit", "default", "meaning", "example")
+_STEPS = conditioning.Prepared.model_fields
+_GENERATED = {f"generate: {name}": one for name, one in surface.GENERATED.items()}
+_MODELS = {f"material: {name}": one for name, one in material.SECTIONS.items()}
+_CASES = {
+    **{f"generate: {name}": {"surface": {"generate": name}} for name in surface.GENERATED},
+    **{f"material: {name}": {"material": {"model": name}} for name in material.SECTIONS},
+}
+
+
+def _only(section, names):
+    return {name: section.model_fields[name] for name in names}
+
+
+def _own(section, other):
+    return {name: field for name, field in section.model_fields.items() if name not in other}
+
+
+#: table -> where its keys stand in a study, and the schema's fields
+TABLES = {
+    "study": ("", StudyFile.model_fields),
+    "surface: a file": ("surface", surface.FromFile.model_fields),
+    "surface: steps of a face": ("surface", _STEPS),
+    "surface: steps of the profile": ("surface", _own(surface.SurfaceSection, _STEPS)),
+    "surface.crop": ("surface.crop", conditioning.Crop.model_fields),
+    "surface.outliers": ("surface.outliers", conditioning.Outliers.model_fields),
+    "surface.filter": ("surface.filter", conditioning.Filter.model_fields),
+    "surface.second": ("surface.second", _own(surface.SecondFace, _STEPS)),
+    "generate: any": (
+        "surface",
+        _only(surface.GENERATED["sphere"], ("generate", "size", "shape")),
+    ),
+    **{
+        name: (
+            "surface",
+            _own(one, {*surface.SurfaceSection.model_fields, "generate", "size", "shape"}),
+        )
+        for name, one in _GENERATED.items()
+    },
+    **{name: ("material", _own(one, {"model", *TEMPERATURE})) for name, one in _MODELS.items()},
+    "material: temperature": ("material", _only(material.SECTIONS["elastic"], TEMPERATURE)),
+    **{
+        f"program: {name}": ("program.0", kind["load"].model_fields)
+        for name, kind in program.KINDS.items()
+    },
+    "program.cycle": ("program.0.cycle", program.LoadWave.model_fields),
+    "program.table": ("program.0.table", program.LoadRows.model_fields),
+    "solve": ("solve", settings.SolveSection.model_fields),
+    "keep": ("keep", settings.KeepSection.model_fields),
+}
+#: first word of a table's name -> the table whose meanings hold where it has none of its own
+_SHARED = {"generate": "generate: any", "material": "material: any"}
+_WORDS = {
+    "control": "'load' or 'approach'",
+    "cycle": "a table",
+    "table": "a table, or the path of a CSV file",
+    "crop": "a table of x and y limits",
+    "solve": "a table",
+    "keep": "a table",
+    "sweep": "a table of lists, or several",
+    "precision": "a number above 0 and below 1",
+    "generate": "one of " + ", ".join(surface.GENERATED),
+}
+#: units that depend on another key
+_UNITS = {
+    **dict.fromkeys(("mean", "amplitude", "values"), "N or m"),
+    "frequencies": "Hz or rad/s",
+}
+
+
+def meaning(name, key):
+    """Meaning and example of a key."""
+    for table in (name, _SHARED.get(name.partition(":")[0])):
+        if key in MEANINGS.get(table, {}):
+            return MEANINGS[table][key]
+    raise KeyError(f"{FILE.name}: [{name!r}] has no {key}: expected its meaning and an example")
+
+
+def rows(name):
+    """Key, what is expected, unit, default, meaning and example of each key of a table."""
+    above, fields = TABLES[name]
+    found = []
+    for key, field in fields.items():
+        words = field.description or _WORDS[key]
+        unit = unit_of(f"{above}.{key}" if above else key, _CASES.get(name))
+        unit = (
+            _UNITS.get(key, unit) if name.startswith(("program.", "material: dynamic")) else unit
+        )
+        about, example = meaning(name, key)
+        found.append((key, _short(words), unit, _default(field), about, example))
+    return found
+
+
+def _short(words):
+    """What is expected, without the units, which have a column."""
+    words = re.sub(
+        r"^a number in [^,]+, or a string with a unit of its kind,?", "a quantity", words
+    )
+    words = re.sub(r" \[[^\[\]]+\]| in s\b", "", words)
+    return re.sub(r"(\w)'(\w)", r"\1’\2", words)
+
+
+def _default(field):
+    if field.is_required():
+        return "required"
+    value = field.get_default(call_default_factory=True)
+    if value is None or hasattr(value, "model_fields") or value == ():
+        return "none"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    shown = list(value) if isinstance(value, tuple) else value
+    return (
+        f"`{shown:g}`" if isinstance(shown, float) else "`" + str(shown).replace("'", '"') + "`"
+    )
+
+
+def _cells(row):
+    key, words, unit, default, about, example = row
+    cells = (
+        f"`{key}`",
+        re.sub(r"'([^']*)'", r"`\1`", words),
+        unit,
+        default,
+        about,
+        f"`{example}`",
+    )
+    return [cell.replace("|", "\\|") for cell in cells]
+
+
+def table(name):
+    """Markdown of a table."""
+    lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
+    return "\n".join([*lines, *("| " + " | ".join(_cells(row)) + " |" for row in rows(name))])
+
+
+def filled(page):
+    """A page with its marks ``STUDY_KEYS name`` replaced by the tables."""
+    return re.sub(r"^STUDY_KEYS (.+)$", lambda found: table(found[1]), page, flags=re.M)
