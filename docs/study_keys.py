@@ -75,6 +75,7 @@ _SHARED = {"generate": "generate: any", "material": "material: any"}
 _WORDS = {
     "control": "'load' or 'approach'",
     "cycle": "a table",
+    "note": "a text",
     "table": "a table, or the path of a CSV file",
     "crop": "a table of x and y limits",
     "solve": "a table",
@@ -85,7 +86,7 @@ _WORDS = {
 }
 #: units that depend on another key
 _UNITS = {
-    **dict.fromkeys(("mean", "amplitude", "values"), "N or m"),
+    **dict.fromkeys(("mean", "amplitude", "values"), "N, m or Pa"),
     "frequencies": "Hz or rad/s",
 }
 
@@ -126,7 +127,7 @@ def _default(field):
     if field.is_required():
         return "required"
     value = field.get_default(call_default_factory=True)
-    if value is None or hasattr(value, "model_fields") or value == ():
+    if value is None or hasattr(type(value), "model_fields") or value == ():
         return "none"
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"

@@ -1,19 +1,13 @@
 """The vocabulary: every variable that a result Dataset may hold or that is derived from one, declared once.
 
-Dimensions, units and prose of each variable stand here and nowhere else; :func:`annotate` writes them on a Dataset
-and refuses a variable that is not declared or whose dimensions differ.
+Dimensions, units and prose of each variable stand here and nowhere else; :mod:`roughvisc.labels` writes them on
+a Dataset.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
+from typing import Any
 
 #: How an accepted step ended; the values of ``status``, in order.
 STATUS_MEANINGS = (
@@ -332,7 +326,7 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
 
 
-#: What is known of every accepted step, also between the kept times.
+#: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
 STEPPED = (
     "force",
     "approach",
@@ -343,14 +337,7 @@ STEPPED = (
     "work",
     "stored_energy",
     "dissipated_energy",
-    "stated_error",
     "time_error",
-    "residual",
-    "force_error",
-    "approach_error",
-    "work_error",
-    "contact_area_lower",
-    "contact_area_upper",
     "status",
 )
 
@@ -367,70 +354,3 @@ def _over_steps(name: str) -> Variable:
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
-
-
-def annotate(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset with the declared dtype and attributes on every variable.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Holds declared variables only; extra leading dimensions (``case``) are allowed.
-
-    Raises
-    ------
-    KeyError
-        If a variable is not declared.
-    ValueError
-        If a variable's dimensions are not the declared ones.
-    """
-    other = {}
-    for name, variable in dataset.variables.items():
-        declared = _declared(str(name), variable.dims)
-        if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
-            other[name] = variable.astype(declared.dtype)
-    annotated = dataset.assign(other)  # once: each assignment merges the whole
-    for name, variable in annotated.variables.items():
-        declared = VARIABLES[str(name)]
-        variable.attrs.update(declared.attributes())
-        if stated := " ".join(other for other in declared.ancillary if other in annotated):
-            variable.attrs["ancillary_variables"] = stated
-    for name in {"status", of_step("status")} & set(annotated.variables):
-        annotated.variables[name].attrs.update(
-            flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),
-            flag_meanings=" ".join(STATUS_MEANINGS),
-        )
-    return annotated
-
-
-def describe(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset of derived variables alone, with the declared attributes and no others.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Holds declared variables only; coordinates that are not declared, such as ``case``, stay as they are.
-
-    Raises
-    ------
-    KeyError
-        If a variable is not declared.
-    ValueError
-        If a variable's dimensions do not end in the declared ones.
-    """
-    described = dataset.copy()
-    for name, variable in described.variables.items():
-        if name in described.coords and (name not in VARIABLES or name not in described.dims):
-            continue
-        variable.attrs = _declared(str(name), variable.dims).attributes()
-    described.attrs = {}
-    return described
-
-
-def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
-    if name not in VARIABLES:
-        raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-    declared = VARIABLES[name]
-    if dims[-len(declared.dims) :] != declared.dims:
-        raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
-    return declared

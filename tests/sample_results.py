@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 from scipy import ndimage
 
-from roughvisc.variables import annotate
+from roughvisc.labels import annotate
 
 
 def _cells(shape, size):

@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 PACKAGE = ROOT / "roughvisc"
 
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
-_LABELS = {"errors", "variables", "units"}
+_LABELS = {"errors", "labels", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
 _SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact"}
@@ -22,6 +22,7 @@ _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "variables": set(),
+    "labels": {"variables"},
     "units": {"errors"},
     "mechanics.materials": {"errors"},
     "mechanics.halfspace": {"errors"},

@@ -131,6 +131,6 @@ def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, m
     assert (np.diff(areas, axis=1) > 0).all(), "and with load"
     results = [run(vary(case, coarse), tmp_path, progress=False) for case in read_cases(FOLDER / "scan_to_area.toml")]
     for i, ds in enumerate(results):
-        ends = ds.contact_area[[0, -1]] * 1e6  # the axis is in mm2
+        ends = ds.contact_area_corrected[[0, -1]] * 1e6  # the axis is in mm2
         np.testing.assert_allclose(ends, areas[[0, -1], i], rtol=0.01)
         assert "filled" in ds.variables, "what was invented stays marked in the result"

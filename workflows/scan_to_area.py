@@ -39,7 +39,12 @@ def main(folder=STUDY.parent / "results" / STUDY.stem, changes=None):
 
 def at_age(results, time):
     """The states of all cases at one age, as one Dataset along the loads."""
-    return xr.concat([ds.sel(time=[time]) for ds in results], "time", data_vars="minimal", join="exact")
+    return xr.concat(
+        [ds.drop_dims("step", errors="ignore").sel(time=[time]) for ds in results],
+        "time",
+        data_vars="minimal",
+        join="exact",
+    )
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ class Case:
     height: xr.DataArray
     material: object
     program: rv.Program
-    times: int | list | None
+    times: list | None
     settings: dict
     families: dict = field(default_factory=dict)
 
@@ -61,7 +61,8 @@ def case(seed, number):
     program = PROGRAMS[families["program"]](rng, load, deepest, can_jump)
     end = program.duration
     times = {"every step": None, "20 logarithmic": np.geomspace(1e-4 * end, end, 20).tolist()}
-    kept = times[families["kept"]] if families["kept"] in times else int(families["kept"].split()[0])
+    times |= {f"{count} even": np.linspace(0, end, count).tolist() for count in (8, 40, 200)}
+    kept = times[families["kept"]]
     settings = {"boundary": boundary, "tolerance": tolerance, "edge": "accept", "missing": "absent"}
     return Case(number, height, material, program, kept, settings, families)
 

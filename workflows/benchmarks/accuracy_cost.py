@@ -49,7 +49,7 @@ def compare(drawn, this, that, ladder):
     """Ratio of the costs of two checkouts, other over this, at equal error."""
     end = drawn.program.duration
     kept = np.linspace(0, end, ROWS).tolist() if drawn.times is None else drawn.times
-    exact = this(ladder[-1] / SHARPER, [*np.ravel(_listed(kept, end)), *watched(drawn.program)])
+    exact = this(ladder[-1] / SHARPER, [*kept, *watched(drawn.program)])
     points = {this: [], that: []}
     for i, tolerance in enumerate((ladder[0], *ladder)):  # the first is to warm up
         for run in (this, that) if i % 2 else (that, this):  # nobody is always first
@@ -65,10 +65,6 @@ def compare(drawn, this, that, ladder):
 def _is_short(ds):
     """Whether a run is worth timing twice: other programs on the machine disturb it."""
     return ds.attrs["cpu"] < 0.3
-
-
-def _listed(times, end):
-    return np.linspace(0, end, times) if isinstance(times, int) else times
 
 
 def error(drawn, ds, exact):

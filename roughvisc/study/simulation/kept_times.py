@@ -65,8 +65,8 @@ def spread_times(program: Program, count: int) -> Array:
     Notes
     -----
     A hold takes three parts of the times between the corners where a ramp takes two and a cycle sixteen. In a hold they
-    lie evenly in the logarithm of the time since it began, from a third of the segment before it or from a thousandth
-    of its own length, whichever is less; elsewhere evenly in time.
+    lie evenly in the logarithm of the time since it began, between a third of the segment before it or a thousandth of
+    its own length, whichever is less, and its end; elsewhere evenly in time.
     """
     corners = np.unique(program.corners)
     if count <= len(corners):
@@ -78,7 +78,7 @@ def spread_times(program: Program, count: int) -> Array:
         parts = np.arange(1, number + 1) / (number + 1)
         if _is_hold(segment) and number:
             shortest = min(_FIRST, before / (3 * segment.duration))
-            parts = shortest ** (1 - np.arange(number) / number)
+            parts = shortest ** (1 - parts)
         found.append(began + parts * segment.duration)
         before = segment.duration
     return np.unique(np.concatenate(found))

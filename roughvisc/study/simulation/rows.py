@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.mirror import quarter, unfold
@@ -17,7 +18,7 @@ from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
-from roughvisc.variables import STATUS_MEANINGS, STEPPED, annotate, of_step
+from roughvisc.variables import STATUS_MEANINGS, STEPPED, of_step
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).

@@ -10,6 +10,7 @@ from dataclasses import replace
 import xarray as xr
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
@@ -27,7 +28,6 @@ from roughvisc.study.simulation.scene import Ground, follows, nominal_area, prep
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
-from roughvisc.variables import annotate
 
 log = logging.getLogger("roughvisc")
 
@@ -115,8 +115,8 @@ def simulate(
     >>> rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
     >>> press = rv.Program().load(1e-4, over=0).hold(0.5)
     >>> ds = rv.simulate(ball, rubber, press, times=[0, 0.5], progress=False)
-    >>> dict(ds.sizes)
-    {'time': 2, 'x': 45, 'y': 45}
+    >>> ds.pressure.shape
+    (2, 45, 45)
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """

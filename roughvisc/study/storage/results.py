@@ -12,11 +12,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.index import NETCDF, Entry, index_of, save_index
 from roughvisc.study.storage.store import no_results
-from roughvisc.variables import VARIABLES, annotate
+from roughvisc.variables import VARIABLES
 
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20

@@ -21,7 +21,8 @@ import numpy as np
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
-from roughvisc.variables import annotate, of_step
+from roughvisc.labels import annotate
+from roughvisc.variables import of_step
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.progress import reporting
 from roughvisc.study.simulation.kept_times import kept_times
@@ -22,7 +23,6 @@ from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
 from roughvisc.study.trade.finest import Finest
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
-from roughvisc.variables import annotate
 
 #: Kept times where a study keeps all accepted steps, which differ from setting to setting.
 _INSTANTS = 9

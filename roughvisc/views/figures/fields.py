@@ -18,6 +18,7 @@ from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     ABSENT,
+    VERMILION,
     Unit,
     frame_at,
     new_figure,
@@ -32,13 +33,20 @@ from roughvisc.views.observables import contact
 #: Perceptually even maps, the same order of lightness in grey: pressure darkens as it rises, gap as it closes.
 COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
 _MOST_MAPS = 24
+#: Colour of cells in contact on maps of the gap that have no outline; values from which some may lie beyond a scale.
+_TOUCHING, _MANY = VERMILION, 10_000
+#: Faces between contact and gap a cell, beyond which they are not outlined: cells in contact have a colour then.
+_RAGGED = 0.04
+#: Share of the values within the colour scale; a few higher ones are drawn as its end.
+_SHOWN = 99.8
 #: A map's short over its long side below which ticks along the short one would lie on each other.
 _THIN = 0.1
 
 
 def colour_map(name: str) -> Colormap:
-    """Colour map of a field: absent cells in light grey, cells without pressure in white."""
-    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT, under="w")
+    """Colour map of a field: absent cells in light grey, cells without pressure in white, no gap as the least one."""
+    found = matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT)
+    return found if name == "gap" else found.with_extremes(bad=ABSENT, under="w")
 
 
 def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
@@ -111,7 +119,7 @@ def label_plane(
 def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
     """Outline of the cells in contact; None where there is nothing to outline."""
     mask = touching.transpose("y", "x").values
-    if mask.all() or not mask.any() or min(mask.shape) < 2:
+    if mask.all() or not mask.any() or min(mask.shape) < 2 or is_ragged(mask):
         return None
     # a rim out of contact closes the outline at the border of the map
     x, y = (plane(_with_rim(touching[name].values)) for name in ("x", "y"))
@@ -119,6 +127,12 @@ def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
     lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=width)
     lines.set_gid("contact outline")
     return lines
+
+
+def is_ragged(mask: np.ndarray) -> bool:
+    """Whether so many faces lie between contact and gap that their outline would bury what is drawn."""
+    faces = sum(np.count_nonzero(np.diff(mask, axis=axis)) for axis in (0, 1))
+    return mask.size >= 2e4 and faces > _RAGGED * mask.size
 
 
 def _with_rim(centres: np.ndarray) -> np.ndarray:
@@ -148,9 +162,11 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
 
 @styled
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
-    """Maps of fields at chosen times, with the outline of the contact; one colour scale a field.
+    """Maps of fields at chosen times, with the outline of the contact; one colour scale a field for all times.
 
-    Of a surface that repeats by its mirror images the part that was measured is drawn.
+    Contact that is too ragged for an outline has a colour of its own on maps of the gap. The scale holds all but two of
+    a thousand values: an arrow says that there are higher ones. Of a surface that repeats by its mirror images the
+    part that was measured is drawn.
 
     Parameters
     ----------
@@ -206,11 +222,9 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
 
 def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
     shown = [present(dataset, name, frame) for frame in frames]
-    finite = [float(one.max()) for one in shown if one.notnull().any()]
-    lowest = min((float(one.min()) for one in shown if one.notnull().any()), default=0.0)
-    unit, plane = unit_for(finite, VARIABLES[name].units), plane_unit(dataset)
-    low = 0.0 if name != "displacement" else float(unit(lowest))
-    high = float(unit(max(finite, default=0.0)))
+    low, high, beyond = _scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
+    unit, plane = unit_for([high], VARIABLES[name].units), plane_unit(dataset)
+    low, high = float(unit(low)), float(unit(high))
     limits = {"vmin": low, "vmax": high if high > low else low + 1.0}
     if name == "pressure":
         limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
@@ -218,13 +232,29 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
         image = draw_map(ax, field, unit, plane, **limits)
         if "pressure" in dataset or "gap" in dataset:
             touching = contact(dataset.isel(time=frame)).load()
-            draw_outline(ax, touching, plane, outline_colour(name))
-    bar = figure.colorbar(image, ax=list(axes.ravel()), pad=0.02, aspect=max(15, 15 * len(axes)), fraction=0.06)
+            outline = draw_outline(ax, touching, plane, outline_colour(name))
+            if name == "gap" and outline is None and touching.any():
+                image.set(cmap=colour_map(name).with_extremes(bad=ABSENT, under=_TOUCHING))
+                image.set_clim(1e-12 * limits["vmax"], limits["vmax"])  # so that no gap lies under the scale
+    extend = "max" if beyond else "neither"
+    across = {"pad": 0.02, "aspect": max(15, 15 * len(axes)), "fraction": 0.06}
+    bar = figure.colorbar(image, ax=list(axes.ravel()), extend=extend, **across)
     bar.set_label(unit.label(VARIABLES[name].label))
     bar.locator = (
         MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
     )
     bar.outline.set_linewidth(0.6)
+
+
+def _scale(name: str, values: np.ndarray) -> tuple[float, float, bool]:
+    """Ends of the colour scale of a field over all frames, and whether values lie beyond. [SI]"""
+    low = float(values.min()) if name == "displacement" and values.size else 0.0
+    telling = values if name == "displacement" else values[values > 0]
+    if not telling.size:
+        return low, float(values.max(initial=0.0)), False
+    highest = float(telling.max())
+    high = float(np.percentile(telling, _SHOWN)) if telling.size > _MANY else highest
+    return low, high, highest > high
 
 
 def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> None:

@@ -113,16 +113,16 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
         right.set_ylabel("of nominal [%]")
 
 
-def _draw_accuracy(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, steps: xr.Dataset) -> None:
+def _draw_accuracy(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
+    """What the kept times state of themselves."""
     floor, ceiling = math.inf, 0.0
     for name, label, colour, width in _ERRORS:
-        source = steps if name in steps else dataset
-        if name not in source:
+        if name not in dataset:
             continue
-        times, values = axis.unit(source["time"]), source[name].values.astype(float)
+        times, values = axis.unit(dataset["time"]), dataset[name].values.astype(float)
         known = np.isfinite(values) & (values > 0)
         if known.any():
-            style = {"marker": marker_of(dataset.sizes["time"]) if source is dataset else "", "ms": 2.5, "lw": width}
+            style = {"marker": marker_of(len(times)), "ms": 2.5, "lw": width}
             ax.plot(times[known], values[known], color=colour, label=label, **style)
             floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
     tolerance = dataset.attrs.get("tolerance")
@@ -160,7 +160,7 @@ def _draw_cost(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
 
 @styled
 def history(dataset: xr.Dataset) -> Figure:
-    """Force, approach, contact area, mean gap and work at every accepted step; cost and accuracy below.
+    """Force, approach, contact area, mean gap and work at every accepted step; cost and accuracy at kept times.
 
     Kept times are dots, where these are few. What the result does not hold is left out. The time axis is linear or
     logarithmic as the steps suit. Steps that did not converge are crossed out. Work is that of the force so far, in
@@ -196,7 +196,7 @@ def history(dataset: xr.Dataset) -> Figure:
             _fraction_axis(ax, steps)
     if costs:
         _draw_cost(axes[-2], axis, dataset)
-    _draw_accuracy(axes[-1], axis, dataset, steps)
+    _draw_accuracy(axes[-1], axis, dataset)
     for ax in axes:
         axis.apply(ax, steps["time"])
         lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)

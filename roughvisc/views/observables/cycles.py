@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import describe
+from roughvisc.labels import describe
 from roughvisc.views.observables.derived import need
 from roughvisc.views.observables.response import history
 

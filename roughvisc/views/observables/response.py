@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import STEPPED, describe, of_step
+from roughvisc.labels import describe
+from roughvisc.variables import STEPPED, of_step
 from roughvisc.views.observables.derived import along_time, need
 
 

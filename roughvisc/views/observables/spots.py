@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import describe
 from roughvisc.topography.grid import spacing
-from roughvisc.variables import describe
 from roughvisc.views.observables.connectivity import cluster_sizes, percolates
 from roughvisc.views.observables.derived import frame_by_frame, need
 

@@ -19,7 +19,7 @@ _DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
 
 
 @styled
-def histories_of_cases(results: Any, quantity: str = "contact_area_corrected", *, by: str | None = None) -> Figure:
+def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
     """A history of every case over time, coloured by what was varied; a dot for each kept time, where these are few.
 
     Up to eight values have a legend, more a colour bar. A second parameter of up to four values has line styles.
@@ -28,8 +28,8 @@ def histories_of_cases(results: Any, quantity: str = "contact_area_corrected", *
     ----------
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree the times may differ.
-    quantity : str
-        A history of every case, such as ``"contact_area_corrected"`` or ``"approach"``.
+    quantity : str, optional
+        A history of every case, such as ``"approach"``; by default the contact area, corrected where all have it.
     by : str, optional
         Dotted key of the parameter that colours the lines; by default the one with the most numbers.
 
@@ -43,6 +43,7 @@ def histories_of_cases(results: Any, quantity: str = "contact_area_corrected", *
         If the results are no sweep, or a name is unknown.
     """
     cases = cases_of(results)
+    quantity = quantity or cases.area
     cases.need(quantity)
     ordered = sorted(cases.parameters, key=lambda one: (not one.numeric, -len(one.levels)))
     first = cases.parameter(by) if by else ordered[0] if ordered else _numbered(len(cases.members))

@@ -136,6 +136,12 @@ class Cases:
                 return one
         raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
 
+    @property
+    def area(self) -> str:
+        """Name of the contact area that every case has: the corrected one, or the counted one."""
+        corrected = all("contact_area_corrected" in member for member in self.members)
+        return "contact_area_corrected" if corrected else "contact_area"
+
     def need(self, quantity: str) -> None:
         """Refuse a quantity that is no history of every case."""
         for member in self.members:

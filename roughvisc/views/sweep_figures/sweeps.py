@@ -33,7 +33,7 @@ _MOST_PANELS = 6
 @styled
 def sweep(
     results: Any,
-    quantity: str = "contact_area_corrected",
+    quantity: str | None = None,
     *,
     times: float | Sequence[float] | None = None,
     along: str | Sequence[str] | None = None,
@@ -48,8 +48,9 @@ def sweep(
     ----------
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
-    quantity : str
-        A history of every case, such as ``"contact_area_corrected"``, ``"approach"`` or ``"wall_time"``.
+    quantity : str, optional
+        A history of every case, such as ``"approach"`` or ``"wall_time"``; by default the contact area, corrected where
+        all have it.
     times : float or sequence of float, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
         by default up to four, a line each; else by default the last. Where several were, a panel each. [s]
@@ -72,6 +73,7 @@ def sweep(
     if kind not in ("auto", "lines", "map"):
         raise InputError(f"kind is {kind!r}: expected 'auto', 'lines' or 'map'")
     cases = cases_of(results)
+    quantity = quantity or cases.area
     cases.need(quantity)
     across = _across(cases, along)
     as_map = kind == "map" or (kind == "auto" and _suits_map(cases, along))

@@ -19,7 +19,7 @@ from roughvisc.study.trade.exact import closed_form
 
 FIELDS = ("pressure", "gap", "displacement")
 #: What counts time, and what knows a closed form of the half-space.
-_NOT_ALIKE = {"wall_time", "mean_gap"}
+_NOT_ALIKE = {"wall_time", "mean_gap", "step_mean_gap"}
 
 
 @dataclass(frozen=True)

@@ -273,7 +273,10 @@ def test_maps__data_scale_and_absent_cells():
         np.testing.assert_allclose(image.get_array().filled(np.nan), expected)
     for image, frame in zip(shown[3:], frames, strict=True):
         np.testing.assert_allclose(image.get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
-        assert image.get_clim() == (0.0, pytest.approx(1e6 * float(ds["gap"].max())))
+        assert image.get_clim()[0] == 0
+        gaps = 1e6 * ds["gap"].isel(time=frames).values
+        beyond = np.mean(gaps[gaps > 0] > image.get_clim()[1])
+        assert 0 < beyond <= 2.01e-3, "but for two of a thousand values, the scale holds all"
     absent = ds["height"].isnull().values.T
     for image in shown:
         assert np.array_equal(np.ma.getmaskarray(image.get_array()), absent)
