@@ -8,7 +8,7 @@ import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap
+from matplotlib.colors import Colormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
@@ -228,8 +228,9 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
     limits = {"vmin": low, "vmax": high if high > low else low + 1.0}
     if name == "pressure":
         limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
+    images = []
     for ax, field, frame in zip(axes.ravel(), shown, frames, strict=False):
-        image = draw_map(ax, field, unit, plane, **limits)
+        images.append(image := draw_map(ax, field, unit, plane, **limits))
         if "pressure" in dataset or "gap" in dataset:
             touching = contact(dataset.isel(time=frame)).load()
             outline = draw_outline(ax, touching, plane, outline_colour(name))
@@ -239,7 +240,8 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
     extend = "max" if beyond else "neither"
     across = {"pad": 0.02, "aspect": max(15, 15 * len(axes)), "fraction": 0.06}
     bar = figure.colorbar(image, ax=list(axes.ravel()), extend=extend, **across)
-    bar.set_label(unit.label(VARIABLES[name].label))
+    coloured = any(one.get_cmap().get_under()[:3].tolist() == list(to_rgb(_TOUCHING)) for one in images)
+    bar.set_label(unit.label(VARIABLES[name].label) + (", contact in orange" if coloured else ""))
     bar.locator = (
         MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
     )
