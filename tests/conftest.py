@@ -10,6 +10,9 @@ from click.testing import CliRunner
 
 os.environ["ROUGHVISC_TRANSFORMS"] = "scipy"
 
+import strategies  # noqa: F401  (loads the profile of the random examples)
+from matplotlib.figure import Figure
+
 from roughvisc.cli import main
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.study.execution import run as run_module
@@ -40,6 +43,13 @@ def invoke(tmp_path, monkeypatch):
         return done.exit_code, done.stdout, done.stderr
 
     return run
+
+
+@pytest.fixture
+def coarse_pictures(monkeypatch):
+    """Pictures are written with few points, where nobody looks at them."""
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda self, *to, **how: save(self, *to, **how | {"dpi": 40}))
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ def write_study(text=BALL, *replacements):
     return "ball.toml"
 
 
-def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path):
+def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pictures):
     status, out, err = invoke("run", write_study())
     assert (status, err) == (0, "")
     (result,) = (tmp_path / "results" / "ball").glob("*.nc")
@@ -298,7 +298,7 @@ def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_p
     assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
 
 
-def test_plot__draws_a_file_or_a_folder(invoke, tmp_path):
+def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures):
     from sample_results import rough_creep
 
     path = write_result(rough_creep(shape=(24, 20), frames=4), tmp_path / "out" / "case.nc")

@@ -24,9 +24,10 @@ def test_ting__triangle_of_load_on_a_sphere(cells):
     assert radius_of(ds)[1:] == pytest.approx([0.6328325328, 0.4796704874], rel=allowed)
     exact = closed_forms.ting(closed_forms.Paraboloid(1.0), ZENER, TRIANGLE)
     distance = np.hypot(ds.x - 1.35, ds.y - 1.35).values
+    radii, which = np.unique(np.round(distance, 12), return_inverse=True)
     area = float((ds.x[1] - ds.x[0]) * (ds.y[1] - ds.y[0]))
     for i in (0, 1, 2):
-        pressure = exact.pressure(distance.ravel(), float(ds.time[i])).reshape(distance.shape)
+        pressure = exact.pressure(radii, float(ds.time[i]))[which].reshape(distance.shape)
         error = np.abs(ds.pressure.values[i] - pressure).sum() * area
         assert error < 6e-3 * float(ds.force.max())
 
@@ -51,7 +52,7 @@ def test_settled_cycles__dissipate_as_the_element_reduction_does():
     """W = 1 + 0.9 sin, period 3, on the Zener solid: work of a settled cycle."""
     program = rv.Program().load(1.0, over=0.5) + rv.Program.cycle(1.0, 0.9, period=3.0, cycles=4)
     ends = 0.5 + 3.0 * np.arange(1, 5)
-    exact = closed_forms.reduced_contact(closed_forms.Paraboloid(1.0), ZENER, program, ends, steps=400)
+    exact = closed_forms.reduced_contact(closed_forms.Paraboloid(1.0), ZENER, program, ends, steps=200)
     sphere = rv.sphere(1.0, size=3.4, shape=(65, 63))
     ds = rv.simulate(sphere, ZENER, program, times=ends, fields=(), tolerance=1e-3, progress=False)
     found, expected = np.diff(ds.work.values), np.diff(exact.work)

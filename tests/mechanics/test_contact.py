@@ -6,9 +6,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize
+from strategies import boundaries, examples, shapes
 from support import direct, rough_gap
 
 import roughvisc as rv
@@ -143,8 +144,8 @@ def test_cold_start__is_guessed_on_a_coarser_grid_where_contact_is_sparse(bounda
     assert guessed[1].pressure.tobytes() == cold[1].pressure.tobytes()
 
 
-@given(exponent=st.integers(-290, 12), boundary=st.sampled_from(["free", "periodic"]))
-@settings(max_examples=30, deadline=None)
+@given(exponent=st.integers(-290, 12), boundary=boundaries)
+@examples(30)
 def test_loads__of_any_size_are_balanced(exponent, boundary):
     gap = rough_gap((15, 17))
     load = 10.0**exponent
@@ -155,7 +156,7 @@ def test_loads__of_any_size_are_balanced(exponent, boundary):
 
 
 @given(scale=st.floats(1e-12, 1e6))
-@settings(max_examples=20, deadline=None)
+@examples(20)
 def test_lengths__are_neutral(scale):
     gap = rough_gap((21, 16))
     unit = solve_contact(HalfSpace(gap.shape, (1.0, 0.5)), gap, load=5.0, tolerance=1e-12)
@@ -247,11 +248,11 @@ def test_hertz__converges_at_order_two_in_approach_and_three_halves_in_pressure(
 
 @given(
     approach=st.floats(1e-9, 0.5),
-    shape=st.tuples(st.integers(1, 9), st.integers(1, 9)),
-    boundary=st.sampled_from(["free", "periodic"]),
+    shape=shapes(1, 9),
+    boundary=boundaries,
     tolerance=st.sampled_from([1e-3, 1e-14]),
 )
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_given_approach__is_finite_down_to_rounding(approach, shape, boundary, tolerance):
     """A step that has already arrived has neither slope nor curvature left."""
     gap = rough_gap((9, 9), seed=1)[: shape[0], : shape[1]]

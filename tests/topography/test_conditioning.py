@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples, shapes
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import less_polynomial
@@ -98,7 +99,7 @@ def test_step__refuses_what_is_no_grid(step, wrong, fragment):
     assert fragment in str(refused.value)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
     order=st.integers(0, 3),
     missing=st.floats(0, 0.6),
@@ -229,8 +230,8 @@ def test_fill__refuses():
         fill(rough() * np.nan)
 
 
-@settings(max_examples=40, deadline=None)
-@given(old=st.tuples(st.integers(2, 30), st.integers(2, 30)), share=st.tuples(st.floats(0.1, 1), st.floats(0.1, 1)))
+@examples(40)
+@given(old=shapes(2, 30), share=st.tuples(st.floats(0.1, 1), st.floats(0.1, 1)))
 def test_resample__coarsening_conserves_the_volume(old, share):
     new = tuple(max(2, int(n * s)) for n, s in zip(old, share, strict=True))
     h = from_array(np.random.default_rng(0).random(old), CELL)

@@ -8,8 +8,9 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples, shapes
 
 from roughvisc.errors import InputError
 from roughvisc.topography.synthesis import cone, flat_punch, grown, self_affine, sphere, wavy
@@ -94,9 +95,9 @@ def test_wavy__holds_the_modes_of_its_wavelength_alone(waves, modes):
     assert float(fine[0, 0]) == pytest.approx(2e-6, rel=1e-2)  # a crest at the corner
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(
-    shape=st.tuples(st.integers(8, 41), st.integers(8, 41)),
+    shape=shapes(8, 41),
     hurst=st.floats(0.1, 1.0),
     anisotropy=st.floats(0.5, 2.0),
     seed=st.integers(0, 2**32),

@@ -25,7 +25,7 @@ SMALL = {
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
     "contact_mechanics": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
     "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96, "sparse": 40},
-    "sweep": {"count": 3, "workers": 1, "cells": 32},
+    "sweep": {"count": 3, "workers": 1, "cells": 32, "swept": ("periodic",)},
 }
 PARTS = {
     "seed": against_seed.measure,

@@ -29,8 +29,8 @@ STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": 
 "solve": {"boundary": "periodic", "tolerance": 2e-4}, "keep": {"fields": ["pressure", "gap"], "times": 20}}"""
 
 
-def measure(count=200, workers=CPU_COUNT, cells=512):
-    for boundary in ("periodic", "free"):
+def measure(count=200, workers=CPU_COUNT, cells=512, swept=("periodic", "free")):
+    for boundary in swept:
         yield sweep(count, workers, boundary)
     for boundary in ("periodic", "free"):
         yield storing(cells, boundary)

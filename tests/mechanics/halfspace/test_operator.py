@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given
+from strategies import boundaries, examples, seeds, shapes
 from support import direct
 
 from roughvisc.errors import InputError
@@ -32,11 +32,11 @@ def test_periodic_displacement__of_a_wave(shape, waves):
 
 
 @given(
-    shape=st.tuples(st.integers(1, 12), st.integers(1, 12)),
-    boundary=st.sampled_from(["free", "periodic"]),
-    seed=st.integers(0, 2**32 - 1),
+    shape=shapes(1, 12),
+    boundary=boundaries,
+    seed=seeds,
 )
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_operators__are_symmetric_and_positive(shape, boundary, seed):
     halfspace = HalfSpace(shape, (1.0, 0.6), boundary)
     a, b = np.random.default_rng(seed).standard_normal((2, *shape))

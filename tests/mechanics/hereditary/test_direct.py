@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples, seeds, series
 
 import roughvisc as rv
 from roughvisc.mechanics.hereditary.direct import _BLOCK, History, history_bytes
@@ -23,19 +24,12 @@ def run(memory, steps, fields):
     return found, state
 
 
-@st.composite
-def series(draw):
-    branches = draw(st.lists(st.tuples(st.floats(0.01, 10), st.floats(1e-3, 1e3)), max_size=3))
-    fluidity = draw(st.sampled_from([0.0, 0.2]))
-    return rv.Prony(draw(st.floats(0.01, 1)), fluidity, tuple(c for c, _ in branches), tuple(t for _, t in branches))
-
-
 @given(
-    material=series(),
+    material=series(st.floats(0.01, 1), st.floats(0.01, 10), st.floats(1e-3, 1e3), (0.0, 0.2)),
     steps=st.lists(st.one_of(st.just(0.0), st.floats(1e-3, 10.0)), min_size=1, max_size=80),
-    seed=st.integers(0, 2**32 - 1),
+    seed=seeds,
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_direct_and_recursive_memory__agree(material, steps, seed):
     """The same weights, to rounding: jumps are steps of no length; cells come into contact and leave it."""
     rng = np.random.default_rng(seed)

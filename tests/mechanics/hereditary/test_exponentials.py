@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples, series
 from support import direct as displaced
 
 import roughvisc as rv
@@ -44,18 +45,12 @@ def histories(draw):
     steps = draw(st.lists(st.floats(1e-2, 10.0), min_size=2, max_size=12))
     times = np.concatenate([[0.0], np.cumsum(steps)])
     pressures = draw(st.lists(st.floats(0, 1e3), min_size=times.size, max_size=times.size))
-    branches = draw(st.lists(st.tuples(st.floats(0.01, 10), st.floats(1e-2, 1e2)), max_size=3))
-    material = rv.Prony(
-        draw(st.floats(0.01, 10)),
-        draw(st.sampled_from([0.0, 0.3])),
-        tuple(c for c, _ in branches),
-        tuple(t for _, t in branches),
-    )
+    material = draw(series(st.floats(0.01, 10), st.floats(0.01, 10), st.floats(1e-2, 1e2), (0.0, 0.3)))
     return material, times, np.array(pressures)
 
 
 @given(histories())
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_linear_rule__is_exact_for_piecewise_linear_pressure(history):
     material, times, pressures = history
     found = remembered(material, times, pressures, ["linear"] * (times.size - 1))

@@ -5,15 +5,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate
+from strategies import examples, positive, series, series_with_common_times
 
 import roughvisc as rv
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.models import one_less_mean_decay
-
-positive = st.floats(1e-6, 1e6)
 
 
 def test_zener__creep_from_glassy_to_rubbery():
@@ -31,15 +30,12 @@ def test_maxwell__flows():
 
 
 @given(
-    compliances=st.lists(st.tuples(positive, st.floats(1e-3, 1e3)), min_size=1, max_size=4),
-    glassy=positive,
-    fluidity=st.one_of(st.just(0.0), positive),
+    material=series(positive, positive, st.floats(1e-3, 1e3), (0.0, positive), least=1, most=4),
     t=st.floats(1e-3, 1e3),
 )
-@settings(max_examples=50, deadline=None)
-def test_contact_integral__is_the_integral(compliances, glassy, fluidity, t):
-    material = rv.Prony(glassy, fluidity, tuple(c for c, _ in compliances), tuple(x for _, x in compliances))
-    breaks = sorted({0.0, t, *(b for _, x in compliances for b in (x / 10, x, 10 * x, 100 * x) if b < t)})
+@examples(50)
+def test_contact_integral__is_the_integral(material, t):
+    breaks = sorted({0.0, t, *(b for x in material.times for b in (x / 10, x, 10 * x, 100 * x) if b < t)})
     parts = [
         integrate.quad(material.contact_compliance, a, b, epsabs=0, epsrel=1e-12)[0]
         for a, b in itertools.pairwise(breaks)
@@ -184,7 +180,7 @@ OF_EACH_KIND["pair"] = materials.pair(OF_EACH_KIND["power_law"], OF_EACH_KIND["t
 
 @pytest.mark.parametrize("name", OF_EACH_KIND)
 @given(s=st.floats(0, 400), h=st.floats(1e-3, 400))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_mean_contact_compliance__is_the_mean(name, s, h):
     material = OF_EACH_KIND[name]
     corners = {0.5, 2.0, 30.0, *(s + h * 10.0**k for k in range(-12, 0))}
@@ -198,7 +194,7 @@ def test_mean_contact_compliance__is_the_mean(name, s, h):
 
 @pytest.mark.parametrize("name", OF_EACH_KIND)
 @given(s=st.floats(1e-3, 900), exponent=st.floats(-300, -9))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_mean_contact_compliance__loses_nothing_over_a_short_step(name, s, exponent):
     """The mean lies between the compliances at both ends, whatever the step; an antiderivative would lose it all."""
     material = OF_EACH_KIND[name]
@@ -242,17 +238,8 @@ def test_power_law__mean_spans_24_decades():
 
 # --- pairs ----------------------------------------------------------------------------------------------------------
 
-series = st.builds(
-    materials.Prony,
-    st.floats(0.01, 10),
-    st.sampled_from([0.0, 0.3]),
-    st.just((1.0, 2.0)),
-    st.tuples(st.sampled_from([0.1, 1.0]), st.floats(2, 10)),
-    st.floats(-0.9, 0.5),
-)
 
-
-@given(series, series, st.floats(0, 100))
+@given(series_with_common_times, series_with_common_times, st.floats(0, 100))
 def test_pair__of_series_is_a_series(a, b, t):
     both = materials.pair(a, b)
     assert isinstance(both, materials.Prony)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.tabulated import Tabulated
@@ -133,7 +134,7 @@ def test_noise__counts_from_the_largest_earlier_row():
 
 
 @given(st.lists(st.floats(0.96, 1.04), min_size=4, max_size=30), st.floats(0.05, 0.9))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_repair__ascends_within_the_noise(noise, exponent):
     t = np.geomspace(1e-3, 1e3, len(noise))
     raw = t**exponent * np.array(noise)

@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
@@ -164,7 +165,7 @@ def test_contact_at_the_very_first_instant__is_not_put_off(lead):
 heights = st.floats(-1.0, 1.0)
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(
     values=st.lists(heights, min_size=2, max_size=6),
     rates=st.lists(st.floats(0.01, 20.0), min_size=1, max_size=3),

@@ -6,8 +6,9 @@ import pickle
 import textwrap
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from strategies import examples
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials import models as materials
@@ -650,7 +651,7 @@ def test_key__knows_a_scan_by_its_content(study, tmp_path):
 PREFIXES = st.sampled_from([("um", 1e-6), ("nm", 1e-9), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)])
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(digits=st.integers(1, 10**12), unit=PREFIXES)
 def test_key__does_not_see_how_a_length_is_written(digits, unit):
     name, factor = unit
