@@ -440,7 +440,7 @@ def test_fields_not_kept__are_neither_stored_nor_paid_for():
     assert not {"pressure", "gap", "displacement"} & set(none.variables)
     assert int(none.convolutions.sum()) == int(every.convolutions.sum())
     assert "pressure and gap and displacement in the file" in none.attrs["left_out"]
-    assert "in the file" not in every.attrs["left_out"].replace("steps between kept times in the file", "")
+    assert "in the file" not in every.attrs["left_out"].replace("fields between kept times in the file", "")
 
 
 def test_periodic__is_not_padded(monkeypatch):
@@ -470,5 +470,5 @@ def test_left_out__is_what_plan_says(tmp_path):
     assert ds.attrs["left_out"] == planned
     assert planned == (
         "history (the material is elastic), padding, three quarters of the surface (they are its mirror images), "
-        "pressure and displacement in the file, steps between kept times in the file"
+        "pressure and displacement in the file, fields between kept times in the file"
     )

@@ -42,7 +42,7 @@ def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored:
     if absent:
         out.append(f"{' and '.join(absent)} in the file")
     if settings.times is not None:
-        out.append("steps between kept times in the file")
+        out.append("fields between kept times in the file")
     return ", ".join(out)
 
 
