@@ -190,11 +190,15 @@ def test_growing__grows_before_and_after_the_cut(whole, tmp_path, text):
 
 
 def test_direct__keeps_every_pressure(whole, tmp_path):
+    """Those of 32 instants are gathered into one block; the jump of the program has two instants and is one row."""
     case, _, steps = whole(DIRECT)
-    folder = stopped(case, tmp_path, steps // 2)
+    folder = stopped(case, tmp_path, steps - 5)
+    instants = steps - 5 + 1
     memory = load_checkpoint(folder / "checkpoint.0", case.key).state.memory
     assert isinstance(memory, HistoryState)
-    assert any(len(block.pressures) > 1 for block in memory.blocks) or steps < 64
+    assert [len(block.pressures) for block in memory.blocks] == [32] + [1] * (instants - 32)
+    assert len(memory.times) == instants
+    assert np.count_nonzero(np.diff(memory.times) == 0) == 1
 
 
 def test_checkpoint__holds_the_state_exactly(tmp_path):
