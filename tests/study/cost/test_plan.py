@@ -293,29 +293,48 @@ def test_wall_time__is_that_of_the_convolutions_of_the_fields_passed_through_and
 
 
 def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
-    """A convolution takes N log N nanoseconds by a clock that the test moves."""
+    """A convolution takes N log N microseconds by a clock that the test moves; the first on each grid takes longer."""
     clock, timed = [0.0], []
 
     def solve(halfspace, gap, *, load, **_):
-        timed.append(gap.size)
         lifted = load / gap.size * halfspace.self_influence
         assert lifted == pytest.approx(0.02 * gap.mean()), "a light contact"
-        clock[0] += 50 * 1e-9 * estimate.work(gap.size)
+        clock[0] += 50 * 1e-6 * estimate.work(gap.size) * (1 if gap.size in timed else 3)
+        timed.append(gap.size)
         return SimpleNamespace(convolutions=50)
+
+    def expected(shape):
+        return pytest.approx(1e-6 * estimate.work(shape[0] * shape[1]))
 
     monkeypatch.setattr(estimate, "solve_contact", solve)
     monkeypatch.setattr(estimate, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
-    monkeypatch.setattr(estimate, "_TIMED", 20**2)
+    monkeypatch.setattr(estimate, "_TIMED", 15**2)
+    monkeypatch.setattr(estimate, "_CALIBRATION", 100.0)
     watch = estimate.Stopwatch()
-    balls = {shape: rv.sphere(1e-3, 2e-4, shape) for shape in [(9, 12), (60, 41), (25, 16), (31, 33)]}
-    for shape in [(9, 12), (60, 41), (25, 16)]:
-        seconds = watch.seconds(balls[shape], "free", HALF_SPACE)
-        assert seconds == pytest.approx(1e-9 * estimate.work(balls[shape].size)), shape
-    assert set(timed) == {9 * 12, 20 * 20, 25 * 16}
+
+    def seconds(shape):
+        return watch.seconds(rv.sphere(1e-3, 2e-4, shape), "free", HALF_SPACE)
+
+    for shape in [(9, 12), (60, 41), (15, 14)]:
+        assert seconds(shape) == expected(shape)
+    assert set(timed) == {9 * 12, 15 * 15, 15 * 14}
+    # no time is left: by the grid that is nearest in size, and no other
     watch._left = 0.0
     timed.clear()
-    assert watch.seconds(balls[31, 33], "free", HALF_SPACE) == pytest.approx(1e-9 * estimate.work(31 * 33))
+    for grid in watch._found:
+        watch._found[grid] *= 1 if grid[0] == (60, 41) else 7
+    assert seconds((31, 33)) == expected((31, 33))
     assert not timed
+
+
+@pytest.mark.parametrize(("time_step", "steps"), [("auto", 12 * 1.2), (0.01, 12)])
+def test_cost__grows_from_grid_to_grid_as_between_the_coarse_ones(study, monkeypatch, time_step, steps):
+    """An octave beyond the second one; steps of a given length are as many on any grid."""
+    found = [March(10, 5, 100, 0.0, 0.1, True), March(12, 6, 150, 0.0, 0.1, True)]
+    monkeypatch.setattr(estimate, "_march", lambda case, height: found[height.sizes["x"] > 20])
+    case = vary(study(ROUGH)[0], {"solve.time_step": time_step})
+    grown = estimate.march_of(case, rv.sphere(1e-3, 2e-4, 66))
+    assert (grown.steps, grown.rows, grown.convolutions) == pytest.approx((steps, steps, 150 * 1.5))
 
 
 def test_march_of_equal_steps__is_foreseen_from_a_part_of_it(study, monkeypatch):

@@ -63,7 +63,7 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
 
 @pytest.mark.parametrize(
     ("at", "falls", "higher"),
-    [((5, 3), ((2, 1), (4, 3)), (2 + 4) / 2), ((0, 5), ((9, 6), (3, 2)), (6 + 3) / 2), ((6, 0), ((2, 9), (9, 1)), 1.5)],
+    [((5, 3), ((2, 1), (3, 4)), (2 + 4) / 2), ((0, 5), ((9, 6), (3, 2)), (6 + 3) / 2), ((6, 0), ((2, 9), (9, 1)), 1.5)],
 )
 def test_peak__is_half_of_the_way_to_the_lower_neighbour_along_each_axis(at, falls, higher):
     """Heights fall by so much from cell to cell, on both sides along each axis; at a border one side is not there."""
