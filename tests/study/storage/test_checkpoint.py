@@ -13,6 +13,7 @@ import threading
 import time
 from contextlib import nullcontext
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage import records
-from roughvisc.study.storage.checkpoint import Reached, load_checkpoint, save_checkpoint
+from roughvisc.study.storage.checkpoint import Keeper, Reached, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import open_result
@@ -190,11 +191,15 @@ def test_growing__grows_before_and_after_the_cut(whole, tmp_path, text):
 
 
 def test_direct__keeps_every_pressure(whole, tmp_path):
+    """Those of 32 instants are gathered into one block; the jump of the program has two instants and is one row."""
     case, _, steps = whole(DIRECT)
-    folder = stopped(case, tmp_path, steps // 2)
+    folder = stopped(case, tmp_path, steps - 5)
+    instants = steps - 5 + 1
     memory = load_checkpoint(folder / "checkpoint.0", case.key).state.memory
     assert isinstance(memory, HistoryState)
-    assert any(len(block.pressures) > 1 for block in memory.blocks) or steps < 64
+    assert [len(block.pressures) for block in memory.blocks] == [32] + [1] * (instants - 32)
+    assert len(memory.times) == instants
+    assert np.count_nonzero(np.diff(memory.times) == 0) == 1
 
 
 def test_checkpoint__holds_the_state_exactly(tmp_path):
@@ -227,6 +232,48 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
 
 # ----------------------------------------------------------------------------------------------------------------
 # what a crash leaves
+
+
+def after_steps(count):
+    """How far a run has come after so many steps of a second."""
+    nothing = np.zeros((3, 2))
+    return [Reached(State(Instant(float(n), nothing, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
+
+
+def test_rows__count_with_and_without_fields():
+    reached = Reached(rows=4, converged=False)
+    assert (reached.noted().rows, reached.noted().converged) == (5, False)
+    assert (reached.kept().rows, reached.kept().converged) == (5, True)
+
+
+def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
+    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=1e9, steps=3)
+    saved = []
+    for reached in after_steps(7):
+        keeper.passed(reached)
+        saved.append(keeper.saved.time)
+    keeper.close()
+    assert saved == [0, 0, 3, 3, 3, 6, 6]
+
+
+def test_keeper__takes_no_more_than_a_twentieth_of_the_time(tmp_path, monkeypatch):
+    """A step takes 10 s and a checkpoint 4 s. The first is written after 30 s, the next ones after 80 s each."""
+    clock, write = [0.0], checkpoint_module.save_checkpoint
+    monkeypatch.setattr(checkpoint_module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+
+    def slowly(*given):
+        clock[0] += 4.0
+        write(*given)
+
+    monkeypatch.setattr(checkpoint_module, "save_checkpoint", slowly)
+    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=30.0)
+    saved = []
+    for reached in after_steps(20):
+        clock[0] += 10.0
+        keeper.passed(reached)
+        saved.append(keeper.saved.time)
+    keeper.close()
+    assert sorted(set(saved)) == [0, 3, 11, 19]
 
 
 def test_damaged_checkpoint__is_found_out_wherever_it_is_damaged(whole, tmp_path):
