@@ -17,7 +17,7 @@ from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.study.statement.identity import case_key, surface_content
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
-from roughvisc.study.statement.variation import expand, place
+from roughvisc.study.statement.variation import expand, place, with_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -148,6 +148,7 @@ def read_cases(path: str | Path) -> list[Case]:
     """All the cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
 
     A table ``[[sweep]]`` holds lists of one length, taken together entry by entry; several tables follow each other.
+    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of the files that match it.
     Without a sweep there is one case.
 
     Parameters
@@ -167,8 +168,11 @@ def read_cases(path: str | Path) -> list[Case]:
     """
     path = Path(path)
     data = _toml(path)
-    sweep = data.pop("sweep", {})
-    changes = expand(sweep, lambda key, found: InputError(line(path, key, found)))
+
+    def refusal(key: str, found: str) -> InputError:
+        return InputError(line(path, key, found))
+
+    changes = expand(with_files(data.pop("sweep", {}), path.parent, refusal), refusal)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
     for number, change in enumerate(changes):
