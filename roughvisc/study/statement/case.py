@@ -44,11 +44,14 @@ class Case:
         The study file that it came from.
     varied : mapping
         What a sweep set for this case: dotted key -> value in SI.
+    written : mapping
+        Those of them that are quantities with a unit, as they were written: dotted key -> text.
     """
 
     settings: Study
     origin: Path | None = None
     varied: Mapping[str, Any] = field(default_factory=dict)
+    written: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -103,6 +106,8 @@ class Case:
         stated = _stated(self.settings)
         if self.varied:
             stated["varied"] = dict(self.varied)
+        if self.written:
+            stated["written"] = dict(self.written)
         if self.origin is not None:
             stated["origin"] = str(self.origin.absolute())
         return json.dumps(stated)
@@ -116,8 +121,8 @@ class Case:
                 raise InputError("found no JSON object")
         except ValueError as error:
             raise InputError(f"not a case written by to_json: {error}") from error
-        origin, varied = data.pop("origin", None), data.pop("varied", {})
-        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied)
+        origin, varied, written = (data.pop(name, None) for name in ("origin", "varied", "written"))
+        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied or {}, written or {})
 
 
 def read_study(path: str | Path) -> Case:
@@ -205,13 +210,14 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
         If a key does not exist or a value is refused.
     """
     data = json.loads(case.to_json())
-    data.pop("origin", None)
-    data.pop("varied", None)
+    for name in ("origin", "varied", "written"):
+        data.pop(name, None)
     try:
         changed = _varied(data, changes, case.origin, None)
     except Problems as error:
         raise InputError(report(case.origin, error.lines)) from error
-    return Case(changed.settings, changed.origin, {**case.varied, **changed.varied})
+    written = {key: text for key, text in case.written.items() if key not in changes}
+    return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
 
 
 def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, reading: Path | None) -> Case:
@@ -222,7 +228,9 @@ def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | 
             raise Problems([f"{key}: {error}"]) from error
     settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
     stated = _stated(settings)
-    return Case(settings, origin, {key: _at(stated, key, value) for key, value in changes.items()})
+    varied = {key: _at(stated, key, value) for key, value in changes.items()}
+    written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}
+    return Case(settings, origin, varied, written)
 
 
 def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> Study:
