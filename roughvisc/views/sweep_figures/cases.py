@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -16,6 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import Unit, unit_for
+from roughvisc.views.sweep_figures.case_names import names_of
 from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
 
 _NO_PARAMETERS = ("case", "case_key")
@@ -221,23 +222,9 @@ def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Param
         alike = any(p == len(one.levels) == len(o.levels) for p, o in zip(pairs, kept, strict=True))
         if len(one.levels) > 1 and not alike:
             kept.append(one)
-    names = _names([one.key for one in kept])
+    names = names_of([one.key for one in kept])
     for one in kept:
         yield Parameter(one.key, one.values, one.si, names[one.key])
-
-
-def _names(keys: Sequence[str]) -> Mapping[str, str]:
-    """What keys are called: their last word; what stands before it too where two would be called alike."""
-    last = {key: _last_word(key) for key in keys}
-    alike = [name for name in last.values() if list(last.values()).count(name) > 1]
-    names = {key: f"{name} ({key.rpartition('.')[0]})" if name in alike else name for key, name in last.items()}
-    return {key: (name[:1].upper() + name[1:]).replace("_", " ") for key, name in names.items()}
-
-
-def _last_word(key: str) -> str:
-    """Last part of a dotted key; a number with what it counts."""
-    parts = key.split(".")
-    return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
 
 
 def quantity_unit(cases: Cases, quantity: str, values) -> Unit:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import textwrap
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -10,11 +12,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import open_result, whole_file
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+from roughvisc.views.sweep_figures.case_names import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
 from roughvisc.views.sweep_figures.sweeps import sweep
 
@@ -33,6 +37,16 @@ def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
         return tree
     except InputError:
         return None
+
+
+def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
+    """Name for the files and words for the title of each result that states its case; other files are left out."""
+    cases = {}
+    for path in paths:
+        with suppress(InputError, ValueError), open_result(path) as dataset:
+            cases[str(path)] = json.loads(dataset.attrs["case"]) if "case" in dataset.attrs else {}
+    stems = file_stems({Path(path).stem: case for path, case in cases.items()})
+    return {Path(path): (stems[Path(path).stem], case_words(case)) for path, case in cases.items()}
 
 
 def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str, Figure]]:
@@ -97,8 +111,19 @@ def save_sweep_figures(
     return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]
 
 
-def write_figure(figure: Figure, path: Path, dpi: float = 200.0) -> Path:
+def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
     """Write a figure to a file of the kind that its suffix names, whole or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What to write.
+    path : Path
+        Where to.
+    dpi : float
+        Resolution of pictures made of pixels.
+    title : str
+        What stands above it, such as which case it shows; the picture is so much higher.
 
     Raises
     ------
@@ -108,6 +133,20 @@ def write_figure(figure: Figure, path: Path, dpi: float = 200.0) -> Path:
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
+    box = _with_title(figure, title) if title else None
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=dpi)
+        figure.savefig(temporary, format=kind, dpi=dpi, bbox_inches=box)
     return path
+
+
+def _with_title(figure: Figure, title: str) -> Bbox:
+    """Write a title above a figure, whose own contents stay where they are; the area of both. [inch]"""
+    figure.draw_without_rendering()  # lays it out
+    figure.set_layout_engine("none")
+    for legend in figure.legends:  # else it would stand at the top of what is saved
+        legend.set_bbox_to_anchor((0, 0, 1, 1), transform=figure.transFigure)
+    width, height = figure.get_size_inches()
+    whole = title.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")  # lines end at commas
+    lines = textwrap.wrap(whole, int(13 * width))
+    figure.text(0.5, 1 + 0.03 / height, "\n".join(lines), ha="center", va="bottom", fontsize=9)
+    return Bbox.from_extents(0, 0, width, height + 0.08 + 0.16 * len(lines))
