@@ -138,8 +138,17 @@ class Cases:
         raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
 
     @property
+    def alike_in_size(self) -> bool:
+        """Whether all surfaces are of one size, as far as the results tell."""
+        told = [(m["contact_area"], m["contact_fraction"]) for m in self.members if "contact_fraction" in m]
+        sizes = np.array([float(area.max() / part.max()) for area, part in told if float(part.max()) > 0])
+        return not sizes.size or bool(np.ptp(sizes) <= 1e-6 * sizes.max())
+
+    @property
     def area(self) -> str:
-        """Name of the contact area that every case has: the corrected one, or the counted one."""
+        """Name of the contact area that every case has: the fraction where sizes differ, else corrected or counted."""
+        if not self.alike_in_size and all("contact_fraction" in member for member in self.members):
+            return "contact_fraction"
         corrected = all("contact_area_corrected" in member for member in self.members)
         return "contact_area_corrected" if corrected else "contact_area"
 
@@ -225,6 +234,21 @@ def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Param
     names = names_of([one.key for one in kept])
     for one in kept:
         yield Parameter(one.key, one.values, one.si, names[one.key])
+
+
+def combined(others: list[Parameter]) -> Parameter:
+    """One parameter that stands for several: every combination a category."""
+    if len(others) == 1:
+        return others[0]
+    texts = [np.array(named_texts(one))[one.places] for one in others]
+    values = np.array([", ".join(parts) for parts in zip(*texts, strict=True)])
+    return Parameter("", values, "", ", ".join(one.name for one in others))
+
+
+def named_texts(parameter: Parameter) -> list[str]:
+    """Levels as texts that say what they are: numbers with the name of the parameter."""
+    word = parameter.values.dtype.kind in "OU"
+    return parameter.texts() if word else [f"{parameter.name} {text}" for text in parameter.texts()]
 
 
 def quantity_unit(cases: Cases, quantity: str, values) -> Unit:

@@ -20,10 +20,7 @@ from roughvisc.study.storage.store import open_result, whole_file
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.case_names import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
-from roughvisc.views.sweep_figures.sweeps import sweep
-
-#: Quantities drawn against what was varied, the first of each row that all cases hold.
-_QUANTITIES = (("contact_area_corrected", "contact_area"), ("approach",), ("force",))
+from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of
 
 
 def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
@@ -37,6 +34,10 @@ def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
         return tree
     except InputError:
         return None
+
+
+#: What files are called after other than the quantity.
+_FILES = {"contact_area_corrected": "area", "contact_area": "area", "contact_fraction": "area"}
 
 
 def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
@@ -55,13 +56,13 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
     What the program prescribes alike in all cases, or a parameter says already, is left out.
     """
     cases = cases_of(results)
-    held = [next((name for name in names if _holds(cases, name)), None) for names in _QUANTITIES]
-    for name in filter(None, held):
+    loading = "force" if cases.alike_in_size else "nominal_pressure"
+    held = [name for name in (cases.area, "approach", loading) if _holds(cases, name)]
+    for name in held:
         if cases.parameters and not _known_before(cases, name):
-            title = f"{_word(name)} against what was varied"
-            yield _word(name).split()[-1].lower(), title, sweep(results, name)
-    first = next(filter(None, held), None)
-    if first:
+            yield _FILES.get(name, name), f"{_word(name)} against what was varied", sweep(results, name)
+    if held:
+        first = held[0]
         yield "histories", f"{_word(first)} over time, a line a case", histories_of_cases(results, first)
 
 
@@ -74,8 +75,9 @@ def _holds(cases: Cases, name: str) -> bool:
 
 
 def _known_before(cases: Cases, name: str) -> bool:
-    """Whether the last values are alike, or those of a parameter."""
-    last = np.array([float(member[name][-1]) for member in cases.members])
+    """Whether the values that would be drawn are alike, or those of a parameter."""
+    frames = telling_frames_of(cases, name)
+    last = np.array([float(m[name][frame]) for m, frame in zip(cases.members, frames, strict=True)])
     scale = 1e-6 * np.nanmax(np.abs(last), initial=0.0)
     stated = [one.values for one in cases.parameters if one.numeric]
     return any(np.allclose(last, values, rtol=0, atol=scale) for values in (last[0], *stated))
@@ -85,6 +87,8 @@ def save_sweep_figures(
     results: xr.Dataset | xr.DataTree, folder: Any, *, suffix: str = ".png", dpi: float = 200.0
 ) -> list[Path]:
     """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``.
+
+    Where the surfaces differ in size, areas are fractions of theirs, and forces nominal pressures.
 
     Parameters
     ----------
