@@ -37,6 +37,7 @@ _PUBLIC = {
         "roughvisc.study.execution.run": "run",
         "roughvisc.study.execution.sweep": "sweep",
         "roughvisc.study.storage.results": "open_results",
+        "roughvisc.study.storage.table": "to_table",
         "roughvisc.study.cost.plan": "plan",
         "roughvisc.study.trade.trade": "trade",
         "roughvisc.study.validation.validate": "validate",

@@ -16,6 +16,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+def heading(name: str, unit: str) -> str:
+    """Heading of a column: the name and, in brackets, the unit if there is one.
+
+    Examples
+    --------
+    >>> heading("force", "N"), heading("contact_fraction", "1")
+    ('force [N]', 'contact_fraction')
+    """
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
 def annotate(dataset: xr.Dataset) -> xr.Dataset:
     """Dataset with the declared dtype and attributes on every variable.
 

@@ -75,6 +75,23 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     return result
 
 
+def number_and_unit(text: str) -> tuple[float, str]:
+    """Number and unit of a quantity as they are written.
+
+    Parameters
+    ----------
+    text : str
+        A quantity that :func:`quantity` takes.
+
+    Examples
+    --------
+    >>> number_and_unit("0.1 MPa s"), number_and_unit("1e-3")
+    ((0.1, 'MPa s'), (0.001, ''))
+    """
+    number, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]
+    return float(number), unit or ""
+
+
 def is_quantity(value: Any, unit: str) -> bool:
     """Whether a value is a number, or a string of a number and a unit that converts to this one."""
     try:

@@ -64,7 +64,7 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
         "2, 0 of them before",
     ):
         assert words in out
-    assert "Results: results/ball\nLog: results/ball/sweep.log\n" in out
+    assert "Results: results/ball\nTable of the cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
 
     status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
     assert (status, out) == (1, "")

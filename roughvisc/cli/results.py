@@ -15,7 +15,8 @@ from roughvisc.cli.group import Failure, say
 def plot(result: Path, out: Path | None) -> None:
     """Draw the figures of a result, of all results in a folder, or of a trade.
 
-    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases.
+    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases. What
+    was varied in a case stands above its figures and in the names of their files.
 
     \b
     Example:
@@ -27,19 +28,21 @@ def plot(result: Path, out: Path | None) -> None:
     from roughvisc.study.storage.store import no_results, open_result, result_files
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import results_of, write_figure
+    from roughvisc.views.sweep_figures.files import cases_in, results_of, write_figure
 
     paths = result_files(result) if result.is_dir() else [result]
     if not paths:
         raise no_results(result)
     console = Console()
+    names = cases_in(paths) if result.is_dir() else {}
     for path in paths:
         if path.is_file() and is_trade(path):
             picture = (out or path.parent) / f"{path.stem}.png"
             say(console, "Figure", write_figure(trade(open_trade(path)), picture))
             continue
+        stem, title = names.get(path, (path.stem, ""))
         with open_result(path) as dataset:
-            for figure in save_figures(dataset, out or path.parent, path.stem):
+            for figure in save_figures(dataset, out or path.parent, stem, title=title):
                 say(console, "Figure", figure)
     together = results_of(result) if len(paths) > 1 else None
     for figure in save_sweep_figures(together, out or result) if together is not None else ():

@@ -114,6 +114,7 @@ def _run_all(
     from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.sweep import LOG, run_cases
     from roughvisc.study.execution.watch import watcher
+    from roughvisc.study.storage.table import CASES
     from roughvisc.views.console.tables import sweep_table
 
     with ExitStack() as stack:
@@ -130,6 +131,7 @@ def _run_all(
         )
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     say(console, "Results", folder)
+    say(console, "Table of the cases", folder / CASES)
     say(console, "Log", folder / LOG)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}

@@ -61,7 +61,9 @@ FIGURES = {
 }
 
 
-def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
+def save_figures(
+    dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0, title: str = ""
+) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
     The section is drawn at the last time of the largest contact area.
@@ -78,6 +80,8 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
     dpi : float
         Resolution of pictures made of pixels.
+    title : str
+        What stands above each figure, such as the case that it shows.
 
     Returns
     -------
@@ -97,7 +101,7 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         if name == "hysteresis" and dataset.sizes["time"] < 3:
             continue  # two states are no loop
         options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
-        written.append(write_figure(draw(dataset, **options), Path(folder, f"{stem}-{name}{suffix}"), dpi))
+        written.append(write_figure(draw(dataset, **options), Path(folder, f"{stem}-{name}{suffix}"), dpi, title))
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
         raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")

@@ -24,6 +24,7 @@ from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, record_failure, recorded_failure
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.table import write_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -237,8 +238,9 @@ class _Book:
 
     def save(self) -> None:
         self.saved = time.monotonic()
-        entries = index_of(self.folder, self.entries).entries
-        save_index(self.folder, Index(entries, tuple(self.cases)))
+        index = Index(index_of(self.folder, self.entries).entries, tuple(self.cases))
+        save_index(self.folder, index)
+        write_table(self.folder, index, {key: json.loads(case.to_json()) for key, case in self.cases.items()})
 
 
 def _compute(todo: Mapping[str, Case], folder: Path, book: _Book, client: Client | None, workers: int | None) -> None:

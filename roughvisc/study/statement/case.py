@@ -17,7 +17,7 @@ from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.study.statement.identity import case_key, surface_content
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
-from roughvisc.study.statement.variation import expand, place
+from roughvisc.study.statement.variation import expand, place, with_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,11 +44,14 @@ class Case:
         The study file that it came from.
     varied : mapping
         What a sweep set for this case: dotted key -> value in SI.
+    written : mapping
+        Those of them that are quantities with a unit, as they were written: dotted key -> text.
     """
 
     settings: Study
     origin: Path | None = None
     varied: Mapping[str, Any] = field(default_factory=dict)
+    written: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -103,6 +106,8 @@ class Case:
         stated = _stated(self.settings)
         if self.varied:
             stated["varied"] = dict(self.varied)
+        if self.written:
+            stated["written"] = dict(self.written)
         if self.origin is not None:
             stated["origin"] = str(self.origin.absolute())
         return json.dumps(stated)
@@ -116,8 +121,8 @@ class Case:
                 raise InputError("found no JSON object")
         except ValueError as error:
             raise InputError(f"not a case written by to_json: {error}") from error
-        origin, varied = data.pop("origin", None), data.pop("varied", {})
-        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied)
+        origin, varied, written = (data.pop(name, None) for name in ("origin", "varied", "written"))
+        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied or {}, written or {})
 
 
 def read_study(path: str | Path) -> Case:
@@ -148,6 +153,7 @@ def read_cases(path: str | Path) -> list[Case]:
     """All the cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
 
     A table ``[[sweep]]`` holds lists of one length, taken together entry by entry; several tables follow each other.
+    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of the files that match it.
     Without a sweep there is one case.
 
     Parameters
@@ -167,8 +173,11 @@ def read_cases(path: str | Path) -> list[Case]:
     """
     path = Path(path)
     data = _toml(path)
-    sweep = data.pop("sweep", {})
-    changes = expand(sweep, lambda key, found: InputError(line(path, key, found)))
+
+    def refusal(key: str, found: str) -> InputError:
+        return InputError(line(path, key, found))
+
+    changes = expand(with_files(data.pop("sweep", {}), path.parent, refusal), refusal)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
     for number, change in enumerate(changes):
@@ -201,13 +210,14 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
         If a key does not exist or a value is refused.
     """
     data = json.loads(case.to_json())
-    data.pop("origin", None)
-    data.pop("varied", None)
+    for name in ("origin", "varied", "written"):
+        data.pop(name, None)
     try:
         changed = _varied(data, changes, case.origin, None)
     except Problems as error:
         raise InputError(report(case.origin, error.lines)) from error
-    return Case(changed.settings, changed.origin, {**case.varied, **changed.varied})
+    written = {key: text for key, text in case.written.items() if key not in changes}
+    return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
 
 
 def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, reading: Path | None) -> Case:
@@ -218,7 +228,9 @@ def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | 
             raise Problems([f"{key}: {error}"]) from error
     settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
     stated = _stated(settings)
-    return Case(settings, origin, {key: _at(stated, key, value) for key, value in changes.items()})
+    varied = {key: _at(stated, key, value) for key, value in changes.items()}
+    written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}
+    return Case(settings, origin, varied, written)
 
 
 def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> Study:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import copy
 import itertools
+import os
 from collections.abc import Callable, Iterator, Mapping
+from glob import glob
+from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
@@ -62,6 +65,46 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
             yield from _flat(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
+
+
+def with_files(sweep: Any, folder: Path, refusal: Refusal) -> Any:
+    """A sweep in which patterns of files stand for the files that match them, sorted by name.
+
+    Parameters
+    ----------
+    sweep : dict or list of dict
+        As :func:`expand` takes it. A key ``file``, such as ``surface.file``, may hold patterns such as
+        ``"scans/*.sur"``, alone or in its list.
+    folder : Path
+        That the patterns are relative to.
+    refusal : callable
+        Makes the error to raise from a dotted key and what is wrong with it.
+    """
+    if isinstance(sweep, list):
+        return [with_files(table, folder, refusal) for table in sweep]
+    if not isinstance(sweep, Mapping):
+        return sweep
+    return {
+        key: _matching(key, value, folder, refusal) if key.rpartition(".")[2] == "file" else value
+        for key, value in _flat(sweep)
+    }
+
+
+def _matching(key: str, value: Any, folder: Path, refusal: Refusal) -> Any:
+    """The value, with the files in place of each pattern; a file that is there by that very name is no pattern."""
+    stated = value if isinstance(value, list) else [value]
+    found: list[Any] = []
+    for one in stated:
+        if not isinstance(one, str) or not set("*?[") & set(one) or (folder / one).exists():
+            found.append(one)
+            continue
+        pattern = os.path.expanduser(one)
+        matches = sorted(name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file())
+        if not matches:
+            where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
+            raise refusal(f"sweep.{key}", f"found {one!r}, which matches no file{where}: expected one at least")
+        found += matches
+    return value if found == stated else found
 
 
 def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:

@@ -122,7 +122,7 @@ def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]
     return {key: _column(found) for key, found in values.items()}
 
 
-_NOT_A_PARAMETER = ("title", "origin", "varied")
+_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
 
 
 def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:

@@ -78,7 +78,8 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     ax = figure.add_subplot()
     for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
         colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
-        style = {"color": colour, "marker": marker_of(len(x)), "ms": 2.5}
+        nested = 2.2 - 1.2 * number / max(1, len(cases) - 1)  # a line shows on both sides of another on it
+        style = {"color": colour, "marker": marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
         ax.plot(x, y, label=label if len(cases) <= 12 else "_", **style)
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
     _draw_low_load_lines(ax, next(iter(cases.values())), moduli, across, up)

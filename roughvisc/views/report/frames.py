@@ -139,7 +139,7 @@ def _extent(dataset: xr.Dataset) -> str:
 
 
 def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
-    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, red of others."""
+    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, orange of others."""
     field = present(dataset, scale.name, frame)
     touching = contact(dataset.isel(time=frame)) if {"pressure", "gap"} & set(dataset) else field < -np.inf
     values = _in_blocks(field.transpose("y", "x").values, block)

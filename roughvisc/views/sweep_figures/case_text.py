@@ -29,7 +29,7 @@ def study_text(case: Mapping[str, Any]) -> str:
     shear_modulus = 1000000.0
     <BLANKLINE>
     """
-    tables = {key: value for key, value in case.items() if key not in ("origin", "varied")}
+    tables = {key: value for key, value in case.items() if key not in ("origin", "varied", "written")}
     text = "".join(f"{key} = {_value(value)}\n" for key, value in tables.items() if not _is_table(value))
     for name, value in tables.items():
         for entry in value if isinstance(value, list) else [value]:

@@ -30,6 +30,7 @@ from roughvisc.study.statement.case import Case, read_cases, vary
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.table import CASES
 
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
 #: Takes some seconds a case, in steps of milliseconds.
@@ -104,7 +105,9 @@ def assert_same(one, other):
 
 def leftovers(folder):
     """What is in a folder besides results, records, log and index."""
-    return [p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", INDEX, "inputs")]
+    return [
+        p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, "inputs")
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------------------

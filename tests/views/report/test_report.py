@@ -100,7 +100,9 @@ def test_page__says_what_was_run_and_how_accurate_it_is(page):
     ):
         assert words in text
     assert "contact reached the border" in text
-    assert "Too far, program.0.load = 9 N" in text
+    assert "Too far: Load 9 N" in text
+    assert '<th title="program.0.load">Load</th>' in text
+    assert [view["title"] for view in views(text)] == ["Load 1 mN", "Load 2 mN", "Load 10 mN"], "what tells them apart"
 
 
 def test_page__shows_the_surface_before_and_after_conditioning(page):
@@ -176,6 +178,21 @@ def test_fifty_cases__stay_below_ten_megabytes(tmp_path, monkeypatch, count):
     assert out.stat().st_size < 10e6 * count / 50
     assert len(rows(text)) == count
     assert min(len(view["frames"]) for view in views(text)) >= 3
+
+
+def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
+    loads = ["1 mN", "2 mN"]
+    for number, load in enumerate(loads):
+        varied = {"program.0.load": 1e-3 * (1 + number), **{f"material.terms.{i}.time": float(i) for i in range(4)}}
+        dataset = made.one_frame()
+        dataset.attrs |= {"case": json.dumps({"title": "A", "varied": varied, "written": {"program.0.load": load}})}
+        write_result(dataset, tmp_path / f"{number:016x}.nc")
+    text = report(tmp_path).read_text()
+    cells = re.findall(r'<td class="varied">(.*?)</td>', text)
+    assert [cell[:10] for cell in cells] == [f"Load {load}," for load in loads]
+    assert cells[0].endswith("time (material.terms.3) 3")
+    assert "<th>What was varied</th>" in text
+    assert 'title="program.0.load"' not in text
 
 
 def test_datasets__without_a_study_say_so(tmp_path):
