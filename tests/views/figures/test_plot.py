@@ -91,28 +91,6 @@ def test_figures__refuse_many_cases_and_other_things(draw):
 # ------------------------------------------------------------------------------------------------- units, times
 
 
-@pytest.mark.parametrize(
-    ("values", "si", "text"),
-    [
-        ([3e-9], "m", "3 nm"),
-        ([-2e-6, 1e-9], "m", "2 µm"),
-        ([0.9999999], "N", "1 N"),
-        ([999.0], "N", "999 N"),
-        ([4e5], "N/m", "400 kN/m"),
-        ([0.05e-6], "m2", "0.05 mm²"),
-        ([2e-12], "m2", "2 µm²"),
-        ([7200.0], "s", "2 h"),
-        ([3000.0], "s", "3000 s"),
-        ([3 * 86400.0], "s", "3 d"),
-        ([2e-5], "J", "20 µJ"),
-        ([0.0, np.nan], "Pa", "0 Pa"),
-        ([0.25], "1", "0.25"),
-    ],
-)
-def test_unit_for__reads_well(values, si, text):
-    assert axes.unit_for(values, si).text(np.nanmax(np.abs(values))) == text
-
-
 def test_time_axis__chosen_by_the_data():
     assert not axes.TimeAxis.of(np.linspace(0, 5, 500)).logarithmic
     assert axes.TimeAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
