@@ -16,7 +16,7 @@ from PIL import Image
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
-from roughvisc.views.figures.fields import colour_map, plane_ratio, plane_unit, present
+from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, present
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 from roughvisc.views.observables import contact, history
 
@@ -85,6 +85,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
     dict
         Of texts and numbers, ready for JSON.
     """
+    whole, dataset = dataset, measured_part(dataset)
     fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
     scales, maps, chosen, block = [], [], [], 1
     fullest = fullest_frame(dataset)
@@ -103,7 +104,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
         "kept": dataset.sizes["time"],
         "block": block,
         "ratio": plane_ratio(dataset),
-        "plane": _extent(dataset),
+        "plane": _extent(dataset) + ("" if dataset is whole else ", as measured, without its mirror images"),
         "fields": [_scale_text(scale) for scale in scales],
         "section": _sections(dataset, chosen),
         "charts": _charts(dataset, chosen),
