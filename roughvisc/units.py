@@ -1,6 +1,7 @@
-"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI.
+"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI, and a float a readable text.
 
-Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats.
+Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats. Figures,
+tables and reprs show them with a prefix that suits: a :class:`Unit` is chosen from the data, then used for all of it.
 """
 
 from __future__ import annotations
@@ -8,9 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from numbers import Real
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 
@@ -20,6 +25,11 @@ _FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
 # pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
 _ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradian"}
+
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 @cache
@@ -218,3 +228,93 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
     if difference and begins:
         raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit to show values in: ``shown = values / factor``.
+
+    Parameters
+    ----------
+    factor : float
+        Size of the unit in SI.
+    symbol : str
+        How it is written; empty for a pure number.
+    """
+
+    factor: float
+    symbol: str
+
+    def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Values [SI] in this unit."""
+        return np.asarray(values, dtype=float) / self.factor
+
+    def label(self, name: str) -> str:
+        """Axis label: the name and, in brackets, the unit."""
+        return f"{name} [{self.symbol}]" if self.symbol else name
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """One value [SI] with its unit, as read in running text."""
+        shown = float(value) / self.factor
+        if 1e3 <= abs(shown) < 1e6:  # not 5e+03
+            return f"{shown:.0f} {self.symbol}".rstrip()
+        return f"{shown:.{digits}g} {self.symbol}".rstrip()
+
+
+def unit_for(values: ArrayLike, si: str) -> Unit:
+    """Unit with the engineering prefix that suits the largest of some values.
+
+    Parameters
+    ----------
+    values : array_like
+        Values of one axis; missing and infinite ones are ignored. [SI]
+    si : str
+        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"Pa s"``, ``"m2"``, ``"N/m"``,
+        ``"s"``, ``"1"``, ``"1/Pa"``.
+
+    Returns
+    -------
+    Unit
+
+    Examples
+    --------
+    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m2").symbol, unit_for([0.04, 2e6], "Pa").symbol
+    ('µm', 'mm²', 'MPa')
+    >>> unit_for([9000.0], "s")
+    Unit(factor=3600.0, symbol='h')
+    >>> unit_for([2e-7], "1/Pa").text(2e-7)
+    '0.2 1/MPa'
+    """
+    size = np.abs(np.asarray(values, dtype=float))
+    largest = float(np.max(size, initial=0.0, where=np.isfinite(size)))
+    if si in ("1", ""):
+        return Unit(1.0, "")
+    if si.startswith("1/"):
+        bare = si[2:].strip("()")
+        inverse = unit_for([100 / largest if largest else 1.0], bare)  # shown from 0.1 to 100
+        return Unit(1 / inverse.factor, "1/" + (f"({inverse.symbol})" if " " in inverse.symbol else inverse.symbol))
+    if si == "s":
+        for least, factor, symbol in _CLOCK:
+            if largest >= least:
+                return Unit(factor, symbol)
+    head, _, tail = si.partition("/")
+    name = head.rstrip("0123456789")
+    power = int(head[len(name) :] or 1)
+    least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
+    exponent = 0
+    if largest > 0:
+        exponent = 3 * math.floor(math.log10(largest / least * 1.0005) / (3 * power))  # 0.99999 N is not 1000 mN
+    exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
+    symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
+    return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
+
+
+def said(value: float, unit: str, digits: int = 6) -> str:
+    """One value in SI as read in running text, to so many digits.
+
+    Examples
+    --------
+    >>> said(1e5, "Pa s"), said(0.05, "s"), said(2.0, "N")
+    ('100 kPa s', '50 ms', '2 N')
+    """
+    return unit_for([value], unit).text(value, digits)

@@ -44,6 +44,18 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
         assert words in out
 
 
+def test_run__of_what_is_finished_says_that_nothing_is_computed(invoke):
+    sweep = '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]'
+    for text, options, said in (
+        (BALL, ("--no-plots",), "Finished before: nothing has to be computed"),
+        (BALL + sweep, ("--workers", 0), "2, all before: nothing had to be computed"),
+    ):
+        study = write_study(text)
+        first, again = (invoke("run", study, *options)[1] for _ in range(2))
+        assert said not in first
+        assert said in again
+
+
 def test_run__quiet_says_nothing(invoke, tmp_path):
     assert invoke("run", write_study(), "--out", "there", "--no-plots", "-q") == (0, "", "")
     assert [p.suffix for p in (tmp_path / "there").iterdir()] == [".nc"]
@@ -94,6 +106,27 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
     status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
     assert status == 2
+
+
+def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
+    study = write_study(BALL, ("level = 0", "crop = { x = ['2 mm', '3 mm'] }"))
+    status, out, err = invoke("plan", study)
+    assert (status, out) == (2, "")
+    assert err.startswith("roughvisc: ball.toml: cannot run as it stands: surface: crop")
+    ramp = 'approach = "1 um"'
+    text = BALL.replace('load = "5 mN"', ramp).replace('"zener"\nshear', '"kelvin_voigt"\nshear')
+    text = text.replace('kelvin_modulus = "1 MPa"\nkelvin_', "")
+    sweep = '[sweep]\n"program.0.over" = [0, 0.1]'
+    status, out, err = invoke("plan", write_study(text + sweep))
+    assert status == 2
+    assert "cannot run as it stands: 1 of 2 cases: at 0 s the approach jumps" in err
+    assert [line.split()[-2:] for line in out.splitlines() if "cannot" in line] == [["cannot", "run"]]
+
+
+def test_help__summaries_of_commands_are_whole(invoke):
+    listed = invoke("--help")[1].split("Commands:")[1].strip().splitlines()
+    assert len(listed) == 8
+    assert all(line.endswith(".") and not line.endswith("..") for line in listed)
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):

@@ -24,7 +24,7 @@ ALLOWED = {
     "variables": set(),
     "labels": {"variables"},
     "units": {"errors"},
-    "mechanics.materials": {"errors"},
+    "mechanics.materials": {"errors", "units"},
     "mechanics.halfspace": {"errors"},
     "mechanics.contact": {"errors", "mechanics.halfspace"},
     "mechanics.hereditary": {"errors", "mechanics.materials"},

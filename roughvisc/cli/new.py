@@ -16,10 +16,11 @@ from roughvisc.errors import InputError
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="The study. [default: FILE's name-study.toml, here]")
 @reading_options
 def new(file: Path, out: Path | None, **given: str | None) -> None:
-    """Write a first study for a scan, with comments: ready to be run, and to be changed.
+    """Write a first study for a scan, to be run and to be changed.
 
-    The scan is looked at as `roughvisc scan` does, and the study conditions it accordingly. It is pressed on a rubber
-    with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a surface card.
+    The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
+    on a rubber with a pressure that brings some per cent of its area into contact. FILE is an
+    instrument file or a surface card.
 
     \b
     Example:

@@ -13,7 +13,7 @@ from roughvisc.cli.group import Failure, say
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
 def plot(result: Path, out: Path | None) -> None:
-    """Draw the figures of a result, of all results in a folder, or of a trade.
+    """Draw the figures of a result, of a folder, or of a trade.
 
     Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases. What
     was varied in a case stands above its figures and in the names of their files.
@@ -53,10 +53,11 @@ def plot(result: Path, out: Path | None) -> None:
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Page. [default: report.html in the folder]")
 def report(results: Path, output: Path | None) -> None:
-    """Write one self-contained page (HTML) about a result, or about all results in a folder.
+    """Write one page (HTML) about a result, or about a folder.
 
     What was run, the surface and its conditioning, figures, cases with accuracy and cost, and how to run them again;
-    case and time can be picked. Nothing is fetched from anywhere when the page is looked at.
+    case and time can be picked. The page is one file, with all results of the folder. Nothing is fetched
+    from anywhere when the page is looked at.
 
     \b
     Example:

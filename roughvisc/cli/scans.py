@@ -31,11 +31,11 @@ def scan(
     card: Path | None,
     **given: str | None,
 ) -> None:
-    """Say what is in a scan and what to do with it, and draw it; convert it, or write a surface card for it.
+    """Say what is in a scan and what to do with it, and draw it.
 
     Size, channels, missing points, areal parameters; spikes, tilt, form, borders and noise, each with what follows
     from it; and a [surface] table that is ready for a study. The picture is of the scan less its mean plane, as the
-    parameters are. FILE is an instrument file or a surface card.
+    parameters are. FILE is an instrument file or a surface card; it can be converted, and be given a surface card.
 
     \b
     Example:

@@ -80,11 +80,13 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from dask.system import CPU_COUNT
     from scipy import fft
 
-    from roughvisc.study.execution.run import run_case, unconverged
+    from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.progress import Bar
-    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.storage.store import open_result, result_path
     from roughvisc.views.console.tables import reached, result_table
 
+    if is_result_of(case, result_path(folder, case.key)):
+        console.print("Finished before: nothing has to be computed")
     with Bar(console, label, reached) as bar, fft.set_workers(CPU_COUNT):
         path = run_case(case, folder, progress=bar.reached)
     with open_result(path) as dataset:
@@ -150,10 +152,10 @@ def _run_all(
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
 @click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
-    """Say what a study will model and what it will cost, before anything is spent.
+    """Say what a study will model, and what it will cost.
 
-    Nothing is written. Steps and transforms are those of coarse marches, seconds those of a solve that is timed here;
-    a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+    Nothing is run or written. Steps and transforms are those of coarse marches, seconds those of a solve that is
+    timed here; a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
 
     \b
     Example:
@@ -165,9 +167,10 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     from roughvisc.views.console.tables import plan_tables
 
     costs = planned(study, out, workers=workers)
-    Console().print(plan_tables(costs))
-    if costs.attrs["refusal"]:
-        raise Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
+    if not costs["refusal"].all():
+        Console().print(plan_tables(costs))
+    if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
+        raise Failure(f"{study}: cannot run as it stands: {why}", 2)
 
 
 @click.command()
@@ -178,7 +181,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.option("--budget", metavar="TIME", default="5 min", help="Wall time of all runs together.", show_default=True)
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
-    """Measure what accuracy costs in a study, and say which setting to take.
+    """Measure what accuracy costs, and say which setting to take.
 
     The case is computed under a ladder of settings: tolerances, grids, fixed steps, memories, the seed paper's
     algorithm. Each is timed and held against a closed form where the case has one, else against its own finest run.

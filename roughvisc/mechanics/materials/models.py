@@ -178,6 +178,10 @@ class Pair:
     a: Material
     b: Material
 
+    def __repr__(self) -> str:
+        """As it was built."""
+        return f"pair({self.a!r}, {self.b!r})"
+
     @property
     def poisson(self) -> float:
         """A half, as for a series that stands for two bodies; each body has its own."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +42,7 @@ _COLUMNS = {
     "cells_x": ("1", "cells along x"),
     "cells_y": ("1", "cells along y"),
     "grows": ("", "whether the grid may grow"),
-    "left_out": ("", "what is not modelled, computed or kept, since nothing asks for it"),
+    "left_out": ("", "what costs nothing, and why: it is not modelled, computed or kept"),
     "steps": ("1", "accepted time steps expected"),
     "rows": ("1", "kept times expected"),
     "contact_fraction": (
@@ -275,7 +276,7 @@ def _scheme(settings: Settings, choice: Choice, found: March) -> str:
     steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
     if choice.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"
-    damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""
+    damped = f", the two-step rule (BDF2) in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     return f"piecewise-linear pressure{damped}, steps {steps}"
 
 
@@ -293,8 +294,9 @@ def _whole(dataset: xr.Dataset, folder: Path, processes: int) -> dict[str, Any]:
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
     together = float(np.sum(largest[:processes]))
     size = float(np.nansum(dataset["disk"].values))
-    refusals = [str(text) for text in dataset["refusal"].values if text]
-    reasons = [f"{len(refusals)} of {dataset.sizes['case']} cases cannot run: {refusals[0]}"] if refusals else []
+    total = dataset.sizes["case"]
+    refusals = Counter(str(text) for text in dataset["refusal"].values if text)
+    reasons = [f"{count} of {total} cases: {why}" if total > 1 else why for why, count in refusals.most_common(3)]
     if together > _PART * free_memory:
         fitting = int(np.searchsorted(np.cumsum(largest), _PART * free_memory, side="right"))
         advice = f"use --workers {fitting}" if fitting else "use a coarser grid, or keep fewer times or fields"

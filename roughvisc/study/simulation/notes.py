@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from roughvisc.mechanics.hereditary.choice import Choice
+from roughvisc.mechanics.hereditary.choice import Choice, terms
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.borders import JUMP, border_mismatch
@@ -26,24 +27,24 @@ _AT_ONCE = 0.1
 
 
 def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
-    """What nothing asks for, and is therefore not modelled, computed or kept."""
+    """What costs nothing, and why: what nothing asks for is not modelled, computed or kept."""
     out = []
     if choice.note.startswith("no memory"):
-        out.append("history (the material is elastic)")
-    elif choice.memory.acts_on != "pressure" and settings.method == "fast":
-        out.append("convolutions of the past")
+        out.append("past pressures: not needed, the material is elastic")
+    elif isinstance(choice.memory, Modes) and choice.memory.acts_on != "pressure" and settings.method == "fast":
+        out.append(f"past pressures: remembered by {terms(choice.memory.material)}, at no cost")
     if settings.boundary == "periodic":
-        out.append("padding")
+        out.append("padding of the transforms: not needed, the surface repeats")
     if window:
-        out.append("what lies too deep to be touched")
+        out.append("cells too deep to be touched: not computed")
     if mirrored:
-        out.append("three quarters of the surface (they are its mirror images)")
+        out.append("three quarters of the surface: not computed, they are mirror images of the fourth")
     absent = [name for name in FIELDS if name not in settings.fields]
     if absent:
-        out.append(f"{' and '.join(absent)} in the file")
-    if settings.times is not None:
-        out.append("fields between kept times in the file")
-    return ", ".join(out)
+        out.append(f"{' and '.join(absent)}: not kept")
+    if settings.times is not None and settings.fields:
+        out.append("fields between the kept times: not kept")
+    return "; ".join(out)
 
 
 def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:

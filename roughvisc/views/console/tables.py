@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import xarray as xr
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
+from scipy import special
 
 from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
@@ -86,7 +88,8 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
     alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing had to be computed"
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
     for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
     rows += _accuracy([entry.histories for entry in entries])
@@ -166,7 +169,7 @@ _MODELLED = {
     "boundary": "Boundary",
     "memory_model": "Memory of the material",
     "scheme": "Time",
-    "left_out": "Left out",
+    "left_out": "Savings",
     "program_note": "Program",
 }
 #: Cases that a plan lists one by one.
@@ -187,14 +190,17 @@ def profile_table(profile: Profile) -> Group:
 
 
 def _contact(costs: xr.Dataset) -> str:
-    """How much of the grid comes into contact, as far as coarse grids can tell."""
-    largest = 100 * costs["contact_fraction"]
-    low, high = (float(f(largest)) for f in (np.nanmin, np.nanmax)) if largest.notnull().any() else (np.nan, np.nan)
-    if np.isnan(low):
+    """How much comes into contact: by theory for a surface that repeats, else as a coarse grid has it."""
+    whole = costs["nominal_pressure"] / costs["full_contact_pressure"]
+    if (costs["boundary"] == "periodic").all() and np.isfinite(whole).any():
+        found, by = 100 * special.erf(math.sqrt(2) * whole.values), "of the area (Persson's theory, by the rms slope)"
+    else:
+        found, by = 100 * costs["contact_fraction"].values, "of the grid, judged on a coarse one"
+    found = found[np.isfinite(found)]
+    if not found.size:
         return ""
-    texts = dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (low, high))
-    span = " to ".join(texts)
-    return f"about {span} % of the grid, judged on a coarse one"
+    span = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
+    return f"about {span} % {by}"
 
 
 def _warnings(costs: xr.Dataset) -> list[str]:
@@ -237,7 +243,7 @@ def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
         row = costs.isel(case=i)
         cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
         if row["refusal"].item():
-            table.add_row(*cells, Text("refused"))
+            table.add_row(*cells, Text("cannot run"))
             continue
         counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
         sizes = [size(float(row[name])) for name in ("memory", "disk")]

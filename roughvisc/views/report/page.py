@@ -22,7 +22,7 @@ from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
-from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
+from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures.case_names import case_words, names_of, varied_texts
 from roughvisc.views.sweep_figures.case_text import material_words, program_words, study_text
@@ -201,15 +201,11 @@ def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:
 
 def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
     """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
-    found = []
-    for kind, (draw, needed, wanted) in FIGURES.items():
-        missing = not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted))
-        if kind == "surface" or missing or (kind == "hysteresis" and dataset.sizes["time"] < 3):
-            continue
-        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if kind == "section" else {}
-        title = kind.capitalize() + (f": {name}" if name else "")
-        found.append({"title": title, "src": figure_uri(draw(dataset, **options))})
-    return found
+    of = f": {name}" if name else ""
+    return [
+        {"title": kind.capitalize() + of, "src": figure_uri(figure)}
+        for kind, figure in figures_of(dataset, leave="surface")
+    ]
 
 
 # ------------------------------------------------------------------------------------------------------- table

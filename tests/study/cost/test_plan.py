@@ -1,6 +1,7 @@
 """What a plan says before anything runs, against what the run then takes."""
 
 import io
+import math
 import pathlib
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,6 +20,7 @@ from roughvisc.study.cost import plan as plan_module
 from roughvisc.study.cost.estimate import March, coarse, wall_time
 from roughvisc.study.simulation.simulate import simulate
 from roughvisc.study.statement.case import read_cases, vary
+from roughvisc.variables import STEPPED
 from roughvisc.views.console.tables import plan_tables
 
 ROUGH = """
@@ -122,10 +124,11 @@ def test_plan__names_what_is_modelled_and_what_is_left_out(study):
     assert list(planned.exponentials.values[:2]) == [1, 0]
     assert int(planned.exponentials[2]) > 3
     assert list(planned.cells_x.values) == [90] * 5
-    assert "gap and displacement in the file" in str(planned.left_out[0].item())
+    assert "gap and displacement: not kept" in str(planned.left_out[0].item())
     assert "padding" in str(planned.left_out[0].item())
-    assert "history (the material is elastic)" in str(planned.left_out[1].item())
-    assert "pressure and displacement in the file" in str(planned.left_out[3].item())
+    assert "past pressures: remembered by 1 exponential, at no cost" in str(planned.left_out[0].item())
+    assert "past pressures: not needed, the material is elastic" in str(planned.left_out[1].item())
+    assert "pressure and displacement: not kept" in str(planned.left_out[3].item())
     assert str(planned.scheme[4].item()).startswith("the seed paper's")
     assert (planned.refusal == "").all()
     assert planned.attrs["refusal"] == ""
@@ -154,7 +157,7 @@ def test_plan__refuses_with_a_reason(study, monkeypatch):
     beyond = vary(case, {"solve.boundary": "periodic", "program": [{"approach": "1 mm", "over": 1}]})
     planned = rv.plan([case, vary(beyond, {})])
     assert "with periodic boundaries contact is full" in str(planned.refusal[1].item())
-    assert planned.attrs["refusal"].startswith("1 of 2 cases cannot run: ")
+    assert planned.attrs["refusal"].startswith("1 of 2 cases: ")
     assert np.isnan(planned.wall_time[1])
 
     import psutil
@@ -234,7 +237,33 @@ def test_plan__says_how_much_comes_into_contact(study):
     assert 0 < light < heavy == 1
     console = Console(width=100, record=True, file=io.StringIO())
     console.print(plan_tables(planned))
-    assert "to 100 % of the grid" in console.export_text()
+    ratio = planned.nominal_pressure.values / planned.full_contact_pressure.values
+    low, high = (f"{float(f'{100 * math.erf(math.sqrt(2) * one):.2g}'):g}" for one in ratio)
+    assert f"about {low} to {high} % of the area (Persson's theory" in console.export_text()
+    free = rv.plan([vary(study(ROUGH)[0], {"solve.boundary": "free", "solve.edge": "accept"})])
+    console.print(plan_tables(free))
+    assert f"about {100 * float(free.contact_fraction[0]):.2g} % of the grid" in console.export_text()
+
+
+def test_disk__of_a_contact_that_is_small_at_most_kept_times(study, tmp_path):
+    """The pressure is written compressed; the largest contact, at the last of nine times, says little of the file."""
+    changes = {
+        'model = "zener"\nshear_modulus = "3 MPa"\nkelvin_modulus = "1 MPa"\nkelvin_': (
+            'model = "kelvin_voigt"\nshear_modulus = "1 MPa"\n'
+        ),
+        'hold = "0.2 s"': 'hold = "10 s"',
+        "shape = [24, 21]": "shape = [60, 51]",
+        'fields = ["pressure", "displacement"]': 'fields = ["pressure"]',
+        "[keep]": "[solve]\ntolerance = 1e-2\n[keep]",
+        '[0, "0.1 s", "200 ms"]': "[1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 10]",
+    }
+    text = BALL
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    cases = study(text)
+    path = rv.run(cases[0], tmp_path / "out", progress=False).encoding["source"]
+    assert float(rv.plan(cases).disk[0]) == pytest.approx(pathlib.Path(path).stat().st_size, rel=0.3)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -271,7 +300,7 @@ def test_bytes__are_fields_of_the_cells_and_what_the_process_takes(study):
 def test_disk__takes_the_fields_and_fifteen_histories_of_each_row(study):
     case = vary(study(ROUGH)[0], {"keep.fields": ["pressure", "gap"], "keep.precision": None})
     empty, ten = (estimate.disk(case, 1000, March(20, rows, 400, 0.0, 0.1, True)) for rows in (0, 10))
-    assert empty == 20e3 + 8 * 1000
+    assert empty == 20e3 + 8 * 1000 + 8 * 20 * len(STEPPED), "and the histories of twenty steps"
     assert ten - empty == 10 * (2 * 8 * 1000 + 15 * 8)
     rare = estimate.disk(case, 1000, March(20, 10, 400, 0.0, 0.01, True))
     assert rare - empty == pytest.approx(10 * (1.01 * 8 * 1000 + 15 * 8))

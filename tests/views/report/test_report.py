@@ -251,3 +251,15 @@ def test_browser__would_tell_of_an_error(page, tmp_path):
     ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert "nothing is not defined" in done.stderr
+
+
+def test_frames__of_a_mirrored_surface_show_what_was_measured():
+    whole = made.rough_creep((22, 16))
+    mirrored = whole.assign_attrs(history="read a.x3p\nmirrored along x and y")
+    sizes = []
+    for ds in (whole, mirrored):
+        view = frames_of(ds, 10**6)
+        with Image.open(io.BytesIO(base64.b64decode(view["frames"][0]["maps"][0].partition(",")[2]))) as picture:
+            sizes.append(picture.size)
+    assert sizes == [(22, 16), (11, 8)]
+    assert view["plane"].endswith("as measured, without its mirror images")
