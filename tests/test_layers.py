@@ -36,7 +36,7 @@ ALLOWED = {
         "mechanics.materials",
         "units",
     },
-    "mechanics.closed_forms": {"errors", "mechanics.materials", "mechanics.stepping"},
+    "mechanics.closed_forms": {"errors", "mechanics.halfspace", "mechanics.materials", "mechanics.stepping"},
     "topography": _LABELS,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,

@@ -36,6 +36,7 @@ from roughvisc.mechanics.closed_forms.growing_contact import (
 )
 from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
 from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
+from roughvisc.mechanics.closed_forms.sheet import OnSheet, PunchOnSheet
 from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
 
 __all__ = [
@@ -47,8 +48,10 @@ __all__ = [
     "GrowingContact",
     "Indenter",
     "KelvinVoigtStep",
+    "OnSheet",
     "Paraboloid",
     "PowerLawRamp",
+    "PunchOnSheet",
     "SingleMaximum",
     "StepLoad",
     "WavyContact",

@@ -171,6 +171,10 @@ def zener(
     return in_volume(shear, poisson, bulk_modulus)
 
 
+#: What a pair stands for.
+TWO_BODIES = "a pair of bodies"
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two deformable bodies pressed on each other; made by :func:`pair`."""
@@ -186,6 +190,11 @@ class Pair:
     def poisson(self) -> float:
         """A half, as for a series that stands for two bodies; each body has its own."""
         return 0.5
+
+    @property
+    def stands_for(self) -> str:
+        """No one body."""
+        return TWO_BODIES
 
     @property
     def note(self) -> str:
@@ -237,7 +246,9 @@ def pair(a: Material, b: Material) -> Prony | Pair:
         fluidity += share * body.fluidity
         for compliance, time in zip(body.compliances, body.times, strict=True):
             compliances[time] = compliances.get(time, 0.0) + share * compliance
-    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b))
+    return Prony(
+        glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b), stands_for=TWO_BODIES
+    )
 
 
 def _notes(a: Material, b: Material) -> str:

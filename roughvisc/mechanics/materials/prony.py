@@ -35,6 +35,8 @@ class Prony:
         Poisson ratio, constant in time.
     note : str
         How the series was found, if not stated: number of terms, misfit. No part of the comparison.
+    stands_for : str
+        What the series makes contact like, if that is not one body with this Poisson ratio; empty if it is.
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Prony:
     times: tuple[float, ...] = ()
     poisson: float = 0.5
     note: str = field(default="", compare=False)
+    stands_for: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))

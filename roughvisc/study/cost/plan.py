@@ -20,11 +20,12 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.simulation.notes import left_out
+from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.results import parameters_of
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
@@ -56,6 +57,7 @@ _COLUMNS = {
     "memory": ("byte", "memory of the process at its peak"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
+    "body_note": ("", "what the base of a sheet does, by the coarse march; empty of a half-space"),
     "program_note": ("", "how a measured history became segments"),
     "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
     "refusal": ("", "why it cannot run; empty if it can"),
@@ -244,7 +246,10 @@ def _row(
     cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
     reachable = surface.windows if window else surface.windows[-1:]
     part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
+    sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
+    final = float(choice.material.contact_compliance(case.program().duration))
     return row | {
+        "body_note": body_note(settings.kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.sheet import Sheet, complement
 from roughvisc.mechanics.hereditary.choice import Choice, terms
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
@@ -95,6 +97,53 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
     return note + " Use mirror = true or taper under [surface]."
+
+
+def body_note(
+    kernel: Kernel, settings: Settings, size: tuple[float, float], compliance: float, force: float, approach: float
+) -> str:
+    """What the base of a sheet does to this contact, and whether a half-space would have done; empty without a base.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Of the body.
+    settings : Settings
+        Boundary and tolerance.
+    size : tuple of float
+        Of the surface. [m]
+    compliance : float
+        Contact compliance at the end. [1/Pa]
+    force, approach : float
+        The largest. [N], [m]
+
+    Notes
+    -----
+    In free space the base raises the surface by no more than ``c(0) C F``, with the correction ``c(0)`` of the
+    kernel right under the load, :attr:`~roughvisc.mechanics.halfspace.sheet.Sheet.relief`.
+    """
+    if not isinstance(kernel, Sheet) or not (force > 0 and approach > 0):
+        return ""
+    if settings.boundary == "free":
+        more = kernel.relief * compliance * force / approach
+        if more < settings.tolerance:
+            return (
+                f"A half-space would have done: its approach is at most {100 * more:.2g} % larger, which is less than "
+                "the tolerance."
+            )
+        return f"The base matters: on a half-space the approach would be up to {100 * more:.2g} % larger."
+    longest = max(size)
+    lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
+    note = f"The base holds back {100 * lost:.2g} % of the longest wave, of {longest:.3g} m" + (
+        ": a half-space would have done." if lost < settings.tolerance else "."
+    )
+    if kernel.uniform_displacement > 0:
+        share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
+        note += (
+            " The approach holds the compression of the sheet itself, mean pressure times compliance times "
+            f"{kernel.uniform_displacement:.3g} m: up to {100 * min(share, 1.0):.2g} % of it."
+        )
+    return note
 
 
 def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:

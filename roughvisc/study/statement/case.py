@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.study.statement.identity import case_key, surface_content
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
@@ -86,8 +85,8 @@ class Case:
         return self.settings.material.build()
 
     def kernel(self) -> Kernel:
-        """What the surface of the body does under pressure: a half-space's."""
-        return HALF_SPACE
+        """What the surface of the body does under pressure: a half-space's, or a sheet's."""
+        return self.settings.material.kernel()
 
     def program(self) -> Program:
         """The loading program."""

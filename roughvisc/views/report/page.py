@@ -39,7 +39,7 @@ _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes in which a result speaks of its limits.
-_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note", "border_note")
+_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note", "border_note", "body_note")
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
