@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
+from roughvisc.labels import expect_declared_units
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
@@ -92,7 +93,7 @@ def unit_for(values, si: str) -> Unit:
     values : array_like
         Values of one axis; missing and infinite ones are ignored. [SI]
     si : str
-        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"m2"``, ``"N/m"``, ``"s"``, ``"1"``.
+        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"m^2"``, ``"N/m"``, ``"s"``, ``"1"``.
 
     Returns
     -------
@@ -100,7 +101,7 @@ def unit_for(values, si: str) -> Unit:
 
     Examples
     --------
-    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m2").symbol, unit_for([0.04, 2e6], "Pa").symbol
+    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m^2").symbol, unit_for([0.04, 2e6], "Pa").symbol
     ('µm', 'mm²', 'MPa')
     >>> unit_for([9000.0], "s")
     Unit(factor=3600.0, symbol='h')
@@ -114,8 +115,8 @@ def unit_for(values, si: str) -> Unit:
             if largest >= least:
                 return Unit(factor, symbol)
     head, _, tail = si.partition("/")
-    name = head.rstrip("0123456789")
-    power = int(head[len(name) :] or 1)
+    name = head.rstrip("^0123456789")  # results of old have m2
+    power = int(head[len(name) :].strip("^") or 1)
     least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
     exponent = 0
     if largest > 0:
@@ -290,3 +291,4 @@ def require(dataset: xr.Dataset, *names: str) -> None:
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
     if "time" in dataset.sizes and dataset.sizes["time"] == 0:
         raise InputError("the result holds no time at all: nothing to draw")
+    expect_declared_units(dataset)

@@ -151,7 +151,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     most = max(int(found["cluster_count"].max()), 1)
     count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-    unit = unit_for(found["cluster_area_largest"], "m2")
+    unit = unit_for(found["cluster_area_largest"], "m^2")
     area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
     area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
@@ -173,7 +173,7 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
     """How many clusters are at least that large: no bins to choose."""
     chosen = dataset.isel(time=frames)
     areas = cluster_areas(chosen)["cluster_area"].values
-    unit = unit_for(areas, "m2")
+    unit = unit_for(areas, "m^2")
     for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
         row = unit(row[np.isfinite(row)])
         if len(row):

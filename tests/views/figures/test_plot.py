@@ -99,7 +99,7 @@ def test_figures__refuse_many_cases_and_other_things(draw):
         ([0.9999999], "N", "1 N"),
         ([999.0], "N", "999 N"),
         ([4e5], "N/m", "400 kN/m"),
-        ([0.05e-6], "m2", "0.05 mm²"),
+        ([0.05e-6], "m^2", "0.05 mm²"),
         ([2e-12], "m2", "2 µm²"),
         ([7200.0], "s", "2 h"),
         ([3000.0], "s", "3000 s"),
@@ -446,9 +446,9 @@ def test_surface__takes_a_result_and_refuses_what_is_no_surface():
     assert [text.get_text() for ax in flat.axes for text in ax.texts] == ["flat: one height", "too small or too flat"]
     with pytest.raises(InputError, match="all missing"):
         plot.surface(np.nan * ds["height"])
-    with pytest.raises(InputError, match="dimensions x and y"):
+    with pytest.raises(InputError, match="expected heights over"):
         plot.surface(ds["force"])
-    with pytest.raises(InputError, match="holds no 'height'"):
+    with pytest.raises(InputError, match="expected one that holds"):
         plot.surface(ds[["force"]])
 
 
