@@ -185,19 +185,22 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
         if dimensionless:
             return number
         raise InputError(f"{label}, a text without a unit: expected {wanted} (such as {f'{matched[1]} {unit}'!r})")
+    from pint import PintError  # slow to import
+
+    expected = _registry().Unit("" if dimensionless else unit)
     try:
         given = _registry().Unit("percent" if found == "%" else found.replace("·", "*"))
-        expected = _registry().Unit("" if dimensionless else unit)
-    except Exception as error:  # pint raises half a dozen kinds, AssertionError and tokenizer errors among them
+        same_kind = given.dimensionality == expected.dimensionality
+        converted, begins = (
+            float(_registry().Quantity(value, given).to(expected).magnitude) if same_kind else math.nan
+            for value in (number, 0.0)
+        )
+    # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
+    except (PintError, ValueError, KeyError, AssertionError) as error:
         raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
     angle = expected.dimensionless and any(part in _ANGLES for part in given._units)
-    if given.dimensionality != expected.dimensionality or (angle and str(expected) not in _ANGLES):
+    if not same_kind or (angle and str(expected) not in _ANGLES):
         raise InputError(f"{label}, which is in {given}: expected {wanted}")
-    try:
-        converted = float(_registry().Quantity(number, given).to(expected).magnitude)
-        begins = float(_registry().Quantity(0.0, given).to(expected).magnitude)
-    except Exception as error:  # logarithmic units: decibels
-        raise InputError(f"{label}, which does not convert: expected {wanted}") from error
     if difference and begins:
         raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")
