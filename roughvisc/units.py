@@ -189,7 +189,8 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
 
     expected = _registry().Unit("" if dimensionless else unit)
     try:
-        given = _registry().Unit("percent" if found == "%" else found.replace("·", "*"))
+        names = _registry().parse_units_as_container("percent" if found == "%" else found.replace("·", "*"))
+        given = _registry().Unit(names)
         same_kind = given.dimensionality == expected.dimensionality
         converted, begins = (
             float(_registry().Quantity(value, given).to(expected).magnitude) if same_kind else math.nan
@@ -198,7 +199,7 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
     # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
     except (PintError, ValueError, KeyError, AssertionError) as error:
         raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
-    angle = expected.dimensionless and any(part in _ANGLES for part in given._units)
+    angle = expected.dimensionless and any(name in _ANGLES for name in names)
     if not same_kind or (angle and str(expected) not in _ANGLES):
         raise InputError(f"{label}, which is in {given}: expected {wanted}")
     if difference and begins:
