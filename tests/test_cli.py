@@ -225,7 +225,7 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     (tmp_path / "ground_steel.x3p").write_bytes(b"mine")
     for arguments, words in (
         (["-o", "third.toml"], "ground_steel.x3p: exists already, and is not written over"),
-        (["-o", "third.toml", "--unit", "um"], "expected FILE with them"),
+        (["-o", "third.toml", "--unit", "um"], "--unit: says how a file is read, and none is named: expected FILE"),
     ):
         status, _, err = invoke("new", *arguments)
         assert status == 2

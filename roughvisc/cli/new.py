@@ -51,8 +51,8 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
     if out.exists():
         raise InputError(f"{out}: exists already, and is not written over: expected another name (--out)")
     if file is None:
-        if any(given.values()):
-            raise InputError("options say how a file is read: expected FILE with them")
+        for option in (name for name, value in given.items() if value):
+            raise InputError(f"--{option}: says how a file is read, and none is named: expected FILE")
         _write_example(wanted)
     found = inspect_scan(open_scan(wanted, **options))
     text = starter_study(wanted, out, options, found)

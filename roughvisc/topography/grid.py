@@ -84,7 +84,7 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     if set(h.dims) != {"x", "y"}:
         raise InputError(f"{step}: found dimensions {tuple(map(str, h.dims))}: expected heights over ('x', 'y')")
     h = h.transpose("x", "y").compute()
-    h = h.copy(deep=False, data=in_metres(h, f"{step}: the heights")).assign_attrs(units="m")
+    h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
     positions = {
         axis: (axis, in_metres(h[axis], f"{step}: coordinate {axis!r}"), h[axis].attrs)
         for axis in ("x", "y")

@@ -70,7 +70,7 @@ def test_heights__of_integers_and_masked():
 
 
 REFUSED = {
-    "kelvin": (lambda: H.assign_attrs(units="K"), "the heights has the unit 'K': expected a length"),
+    "kelvin": (lambda: H.assign_attrs(units="K"), "the height has the unit 'K': expected a length"),
     "nonsense": (lambda: H.assign_attrs(units="bananas"), "'bananas': expected a length, such as 'm' or 'um'"),
     "empty": (lambda: H.assign_attrs(units=""), "has the unit '': expected a length"),
     "coordinate in s": (lambda: H.assign_coords(y=H.y.assign_attrs(units="s")), "coordinate 'y' has the unit 's'"),

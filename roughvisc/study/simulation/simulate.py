@@ -151,7 +151,7 @@ def press(
 
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
-    height = checked(height, "height", least=1)
+    height = checked(height, "simulate", least=1)
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
     dataset = _press(height, material, program, with_needed, progress, keeper)
