@@ -5,11 +5,14 @@ A variable that is not declared, or whose dimensions differ, is refused.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from roughvisc.errors import InputError
+from roughvisc.units import quantity
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES, Variable, of_step
 
 if TYPE_CHECKING:
@@ -83,6 +86,30 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
         variable.attrs = _declared(str(name), variable.dims).attributes()
     described.attrs = {}
     return described
+
+
+def expect_declared_units(dataset: xr.Dataset) -> None:
+    """Refuse a result that was converted to other units: what is derived from it and drawn is counted in SI.
+
+    Raises
+    ------
+    InputError
+        If a declared variable states a unit that is not the declared one in other words.
+    """
+    for name, variable in dataset.variables.items():
+        declared = VARIABLES[str(name)].units if name in VARIABLES else ""
+        found = str(variable.attrs.get("units", declared))
+        if declared and found != declared and not _same_unit(found, declared):
+            raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
+
+
+def _same_unit(found: str, declared: str) -> bool:
+    """Whether two texts are one unit: ``m2``, as UDUNITS and earlier results write it, is ``m^2``."""
+    try:
+        factor = quantity("1 " + re.sub(r"(?<=[a-zA-Z])(-?\d)", r"^\1", found), declared)
+    except InputError:
+        return False
+    return factor == 1.0
 
 
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:

@@ -212,19 +212,23 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
         if dimensionless:
             return number
         raise InputError(f"{label}, a text without a unit: expected {wanted} (such as {f'{matched[1]} {unit}'!r})")
+    from pint import PintError  # slow to import
+
+    expected = _registry().Unit("" if dimensionless else unit)
     try:
-        given = _registry().Unit("percent" if found == "%" else found.replace("·", "*"))
-        expected = _registry().Unit("" if dimensionless else unit)
-    except Exception as error:  # pint raises half a dozen kinds, AssertionError and tokenizer errors among them
+        names = _registry().parse_units_as_container("percent" if found == "%" else found.replace("·", "*"))
+        given = _registry().Unit(names)
+        same_kind = given.dimensionality == expected.dimensionality
+        converted, begins = (
+            float(_registry().Quantity(value, given).to(expected).magnitude) if same_kind else math.nan
+            for value in (number, 0.0)
+        )
+    # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
+    except (PintError, ValueError, KeyError, AssertionError) as error:
         raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
-    angle = expected.dimensionless and any(part in _ANGLES for part in given._units)
-    if given.dimensionality != expected.dimensionality or (angle and str(expected) not in _ANGLES):
+    angle = expected.dimensionless and any(name in _ANGLES for name in names)
+    if not same_kind or (angle and str(expected) not in _ANGLES):
         raise InputError(f"{label}, which is in {given}: expected {wanted}")
-    try:
-        converted = float(_registry().Quantity(number, given).to(expected).magnitude)
-        begins = float(_registry().Quantity(0.0, given).to(expected).magnitude)
-    except Exception as error:  # logarithmic units: decibels
-        raise InputError(f"{label}, which does not convert: expected {wanted}") from error
     if difference and begins:
         raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")
@@ -269,7 +273,7 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
     values : array_like
         Values of one axis; missing and infinite ones are ignored. [SI]
     si : str
-        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"Pa s"``, ``"m2"``, ``"N/m"``,
+        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"Pa s"``, ``"m^2"``, ``"N/m"``,
         ``"s"``, ``"1"``, ``"1/Pa"``.
 
     Returns
@@ -278,7 +282,7 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
 
     Examples
     --------
-    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m2").symbol, unit_for([0.04, 2e6], "Pa").symbol
+    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m^2").symbol, unit_for([0.04, 2e6], "Pa").symbol
     ('µm', 'mm²', 'MPa')
     >>> unit_for([9000.0], "s")
     Unit(factor=3600.0, symbol='h')
@@ -298,8 +302,8 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
             if largest >= least:
                 return Unit(factor, symbol)
     head, _, tail = si.partition("/")
-    name = head.rstrip("0123456789")
-    power = int(head[len(name) :] or 1)
+    name = head.rstrip("^0123456789")  # results of old have m2
+    power = int(head[len(name) :].strip("^") or 1)
     least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
     exponent = 0
     if largest > 0:

@@ -136,7 +136,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "contact_area": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "real contact area, counted",
         "cells that carry pressure",
         ancillary=("contact_area_lower", "contact_area_upper"),
@@ -144,7 +144,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "contact_area_corrected": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "real contact area, corrected for the grid",
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
@@ -196,11 +196,11 @@ VARIABLES: dict[str, Variable] = {
     "work_error": Variable(_SERIES, "J", "stated error of the work"),
     "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy"),
     "contact_area_lower": Variable(
-        _SERIES, "m2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
+        _SERIES, "m^2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
     ),
     "contact_area_upper": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "area that is not certainly out of contact",
         "counted, at the stated error; without the grid's part",
     ),
@@ -222,22 +222,22 @@ VARIABLES: dict[str, Variable] = {
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time"),
     # derived from a result: see roughvisc.views.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
-    "cluster_area_mean": Variable(_SERIES, "m2", "mean area of a contact cluster"),
-    "cluster_area_largest": Variable(_SERIES, "m2", "area of the largest contact cluster"),
+    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster"),
+    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster"),
     "cluster_area": Variable(
-        ("time", "cluster"), "m2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
+        ("time", "cluster"), "m^2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
     ),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
     "pressure_density": Variable(
         ("time", "pressure_bin"),
-        "Pa-1",
+        "1/Pa",
         "probability density of the contact pressure",
         "over the cells in contact: its integral is 1",
     ),
     "gap_density": Variable(
         ("time", "gap_bin"),
-        "m-1",
+        "1/m",
         "probability density of the gap",
         "over the present cells out of contact: its integral is 1",
     ),

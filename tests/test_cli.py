@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and how it ends."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -12,8 +13,10 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.study.storage.store import write_result
+from roughvisc.study.trade.files import trade_folder
 
 
 def write_study(text=BALL, *replacements):
@@ -241,6 +244,41 @@ def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan
         assert words in err
     assert (tmp_path / "mine.toml").read_text() == "# mine\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.toml", "tilted.nc"]
+
+
+def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
+    status, out, err = invoke("new")
+    assert (status, err) == (0, "")
+    assert "Scan: ground_steel.x3p\nStudy: ground_steel-study.toml\nNext: " in out
+    (case,) = read_cases("ground_steel-study.toml")
+    assert case.height().shape == (256, 224)
+    ds = rv.run(vary(case, {"surface.resample": [24, 21], "keep.times": 2}), progress=False)
+    assert 0 < float(ds.contact_fraction[-1]) < 1
+    assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"
+    (tmp_path / "ground_steel.x3p").write_bytes(b"mine")
+    for arguments, words in (
+        (["-o", "third.toml"], "ground_steel.x3p: exists already, and is not written over"),
+        (["-o", "third.toml", "--unit", "um"], "--unit: says how a file is read, and none is named: expected FILE"),
+    ):
+        status, _, err = invoke("new", *arguments)
+        assert status == 2
+        assert words in err
+    assert not (tmp_path / "third.toml").exists()
+
+
+def test_help__names_what_the_example_has_written(invoke):
+    assert invoke("new")[0] == 0
+    (case,) = read_cases("ground_steel-study.toml")
+    results, traded = result_folder(case), trade_folder(case, None)
+    there = {"ground_steel.x3p", "ground_steel-study.toml", str(results), str(traded / "trade.nc")}
+    named = set()
+    for command in (main, *main.commands.values()):
+        lines = re.findall(r"^ *roughvisc (\w+) ?(.*)$", command.help, re.M)
+        assert lines, f"{command.name} has no example"
+        for verb, arguments in lines:
+            assert verb in main.commands
+            named |= {word for word in arguments.split()[:1] if not word.startswith("-")}
+    assert named == there
 
 
 def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):

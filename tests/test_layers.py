@@ -22,7 +22,7 @@ _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "variables": set(),
-    "labels": {"variables"},
+    "labels": {"errors", "units", "variables"},
     "units": {"errors"},
     "mechanics.materials": {"errors", "units"},
     "mechanics.halfspace": {"errors"},

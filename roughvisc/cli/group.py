@@ -64,7 +64,8 @@ def main() -> None:
 
     \b
     Example:
-      roughvisc scan ground.sur
-      roughvisc run study.toml
-      roughvisc plot results/study
+      roughvisc new
+      roughvisc scan ground_steel.x3p
+      roughvisc run ground_steel-study.toml
+      roughvisc report results/ground_steel-study
     """

@@ -20,8 +20,8 @@ def plot(result: Path, out: Path | None) -> None:
 
     \b
     Example:
-      roughvisc plot results/quickstart --out figures
-      roughvisc plot results/study-trade/trade.nc
+      roughvisc plot results/ground_steel-study --out figures
+      roughvisc plot results/ground_steel-study-trade/trade.nc
     """
     from rich.console import Console
 
@@ -61,7 +61,7 @@ def report(results: Path, output: Path | None) -> None:
 
     \b
     Example:
-      roughvisc report results/quickstart -o quickstart.html
+      roughvisc report results/ground_steel-study -o steel.html
     """
     from rich.console import Console
 

@@ -39,8 +39,8 @@ def scan(
 
     \b
     Example:
-      roughvisc scan ground.sur --plot ground.png
-      roughvisc scan ground.sur --to ground.x3p --card
+      roughvisc scan ground_steel.x3p --plot steel.png
+      roughvisc scan ground_steel.x3p --to steel.nc --card
     """
     from rich.console import Console
 

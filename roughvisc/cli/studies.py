@@ -40,8 +40,8 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
 
     \b
     Example:
-      roughvisc run workflows/quickstart.toml --out /tmp/quickstart
-      roughvisc run workflows/load_sweep.toml --scheduler-file scheduler.json
+      roughvisc run ground_steel-study.toml --out steel
+      roughvisc run ground_steel-study.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
 
@@ -159,7 +159,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 
     \b
     Example:
-      roughvisc plan workflows/load_sweep.toml
+      roughvisc plan ground_steel-study.toml
     """
     from rich.console import Console
 
@@ -189,8 +189,8 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     \b
     Example:
-      roughvisc trade workflows/ball_on_rubber.toml
-      roughvisc trade study.toml --apply 1%
+      roughvisc trade ground_steel-study.toml
+      roughvisc trade ground_steel-study.toml --apply 1%
     """
     from dask.system import CPU_COUNT
     from rich.console import Console

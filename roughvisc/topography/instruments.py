@@ -111,13 +111,10 @@ def open_instrument(path: Path, format: str | None) -> Opened:
         return _npy(path)
     failures: dict[str, Exception] = {}
     for candidate in candidates:
-        try:
-            return _surface_topography(path, candidate)
-        except InputError:
-            raise
-        except Exception as error:  # each reader has its own kinds, struct.error and KeyError among them
-            forget(error)
-            failures[candidate] = error
+        opened = _tried(path, candidate)
+        if isinstance(opened, Opened):
+            return opened
+        failures[candidate] = opened
     raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
 
 
@@ -243,12 +240,9 @@ _BUILT_IN = frozenset(OWN_SUFFIXES)
 
 def _csv(path: Path) -> Opened:
     """Points x, y, z one a line, as SurfaceTopography takes them, or else a matrix."""
-    try:
-        return _surface_topography(path, "xyz")
-    except InputError:
-        raise
-    except Exception as error:  # no such points
-        forget(error)
+    opened = _tried(path, "xyz")
+    if isinstance(opened, Opened):
+        return opened
     return replace(_surface_topography(path, "asc", source=separated_by_blanks(path)), format="csv")
 
 
@@ -266,6 +260,17 @@ def _detected(path: Path) -> str:
     from SurfaceTopography.IO import detect_format
 
     return detect_format(str(path))
+
+
+def _tried(path: Path, format: str) -> Opened | Exception:
+    """The header by one reader of SurfaceTopography, or why that cannot read it."""
+    try:
+        return _surface_topography(path, format)
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001  (each reader has its own kinds, struct.error and KeyError among them)
+        forget(error)
+        return error
 
 
 def _surface_topography(path: Path, format: str, source: TextIO | None = None) -> Opened:

@@ -21,7 +21,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography import gridfiles, instruments
-from roughvisc.topography.grid import checked, labelled, noted, pair
+from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.instruments import Channel, Opened, brief, forget
 from roughvisc.topography.orientation import orientation
@@ -75,7 +75,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Heights over (x, y), peaks up, NaN where missing. [m]
+        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m]
     spacing : float or pair of float
         Cell sides (dx, dy). [m]
 
@@ -89,10 +89,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     InputError
         If the array is not two-dimensional with at least two points each way, or holds no or infinite heights.
     """
-    try:
-        values = np.array(np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"heights is {type(heights).__name__}: expected numbers of shape (nx, ny)") from error
+    values = np.array(in_metres(heights, "heights"))
     if values.ndim != 2 or min(values.shape) < 2:
         raise InputError(f"heights has shape {values.shape}: expected (nx, ny) of at least 2 x 2")
     h = labelled(values, pair("spacing", spacing))

@@ -98,7 +98,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         np.bincount(ring + 1, weight)[1:] for weight in (count, count * q.ravel(), count * density.ravel())
     )
     ring = np.flatnonzero(counted)
-    density_attrs = {"units": "m4", "long_name": "power spectral density of height, radial average"}
+    density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
     return xr.Dataset(
         {

@@ -96,7 +96,7 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""
         outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", type(error).__name__)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001  (whatever it is, it stops no other case; its traceback is kept)
         text = f"{type(error).__name__}: {error}"
         outcome = Outcome(case.key, "failed", text, type(error).__name__, traceback.format_exc())
     return replace(outcome, seconds=time.perf_counter() - began)

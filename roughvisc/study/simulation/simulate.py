@@ -29,6 +29,7 @@ from roughvisc.study.statement.body import body
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
+from roughvisc.topography.grid import checked
 
 log = logging.getLogger("roughvisc")
 
@@ -60,8 +61,9 @@ def simulate(
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y)
-        Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``; an indenter's
-        counts from its apex, wherever that lies between the cells. [m]
+        Profile, peaks up, with cell-centre coordinates; or a Dataset that holds it as ``height``. A unit of length
+        that heights or coordinates state is converted; without one they are metres. The undeformed gap is
+        ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
         Of the half-space: one of roughvisc's, or any object with the two functions that
         :class:`roughvisc.mechanics.materials.models.Material` asks for.
@@ -157,6 +159,7 @@ def press(
 
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
+    height = checked(height, "simulate", least=1)
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
     dataset = _press(height, material, program, with_needed, progress, keeper)

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import logging
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,9 @@ log = logging.getLogger("roughvisc")
 INDEX = ".index.npz"
 #: Raised by whoever changes what an index holds.
 _LAYOUT = 2
+#: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
+_UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
+_UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
 #: Histories over the kept times, and over the accepted steps, with the times themselves.
 _HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)))
 
@@ -200,7 +205,7 @@ def _load(path: Path) -> Index:
             return Index({})
         entries = _entries(stored["entries"], arrays)
         return Index({entry.key: entry for entry in entries}, tuple(stored["sweep"]))
-    except Exception as error:  # absent, cut short, of another version: whatever it is, the results are all there
+    except _UNREADABLE as error:
         if not isinstance(error, FileNotFoundError):
             log.info("%s is made anew: %s", path, error)
         return Index({})

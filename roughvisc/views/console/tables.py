@@ -53,8 +53,8 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Approach at the end", readable(float(last["approach"]), "m")),
         (
             "Contact area at the end",
-            f"{readable(float(last['contact_area_corrected']), 'm2')} corrected for the grid, "
-            f"{readable(float(last['contact_area']), 'm2')} counted"
+            f"{readable(float(last['contact_area_corrected']), 'm^2')} corrected for the grid, "
+            f"{readable(float(last['contact_area']), 'm^2')} counted"
             f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
         ),
         *_accuracy([dataset], dataset.attrs.get("tolerance")),

@@ -78,7 +78,7 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
         require(dataset, "time", "force", _AREA)
     steps = {label: history(dataset) for label, dataset in cases.items()}
     loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
-    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m2")
+    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m^2")
     figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12))
     ax = figure.add_subplot()
     for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):

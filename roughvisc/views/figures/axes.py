@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
+from roughvisc.labels import expect_declared_units
 from roughvisc.units import Unit, unit_for
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
@@ -215,3 +216,4 @@ def require(dataset: xr.Dataset, *names: str) -> None:
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
     if "time" in dataset.sizes and dataset.sizes["time"] == 0:
         raise InputError("the result holds no time at all: nothing to draw")
+    expect_declared_units(dataset)

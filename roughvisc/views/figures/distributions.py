@@ -161,7 +161,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     most = max(int(found["cluster_count"].max()), 1)
     count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-    unit = unit_for(found["cluster_area_largest"], "m2")
+    unit = unit_for(found["cluster_area_largest"], "m^2")
     area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
     area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
@@ -183,7 +183,7 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
     """How many clusters are at least that large: no bins to choose."""
     chosen = dataset.isel(time=frames)
     areas = cluster_areas(chosen)["cluster_area"].values
-    most, unit = int(np.isfinite(areas).sum(axis=1).max()), unit_for(areas, "m2")
+    most, unit = int(np.isfinite(areas).sum(axis=1).max()), unit_for(areas, "m^2")
     if most < _FEWEST_CLUSTERS:
         _no_contact(ax, ("no contact", "one cluster at most", "two clusters at most")[most])
         ax.set_xticks([])

@@ -197,6 +197,15 @@ def test_apply__adds_what_is_not_there(tmp_path):
     assert text.count("#") == COMMENTED.count("#") - 1
 
 
+def test_apply__without_what_tomlkit_keeps_to_itself(tmp_path, monkeypatch):
+    monkeypatch.delattr("tomlkit.container.Container._insert_at")
+    path = write(tmp_path, COMMENTED.replace('time_step = "5 ms"     # by hand\n', ""))
+    applied(path, 6)
+    solve = read_study(path).settings.solve
+    assert (solve.method, solve.time_step) == ("seed", 0.02)
+    assert path.read_text().count("#") == COMMENTED.count("#") - 1
+
+
 def test_apply__makes_the_tables_that_are_missing(tmp_path):
     path = write(tmp_path, "")
     applied(path, 4)

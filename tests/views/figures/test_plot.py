@@ -424,9 +424,9 @@ def test_surface__takes_a_result_and_refuses_what_is_no_surface():
     assert [text.get_text() for ax in flat.axes for text in ax.texts] == ["flat: one height", "too small or too flat"]
     with pytest.raises(InputError, match="all missing"):
         plot.surface(np.nan * ds["height"])
-    with pytest.raises(InputError, match="dimensions x and y"):
+    with pytest.raises(InputError, match="expected heights over"):
         plot.surface(ds["force"])
-    with pytest.raises(InputError, match="holds no 'height'"):
+    with pytest.raises(InputError, match="expected one that holds"):
         plot.surface(ds[["force"]])
 
 

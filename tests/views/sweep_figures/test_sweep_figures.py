@@ -46,7 +46,7 @@ def stacked(parameters, area=lambda values: 1e-6):
     }
     on_case = {key: ("case", np.array(values)) for key, values in parameters.items()}
     ds = xr.Dataset(data, {"time": times, "case_key": ("case", [f"{i:016x}" for i in range(len(rows))]), **on_case})
-    return ds.assign(contact_area=ds.contact_area.assign_attrs(units="m2", long_name="real contact area"))
+    return ds.assign(contact_area=ds.contact_area.assign_attrs(units="m^2", long_name="real contact area"))
 
 
 def by_load(values):
