@@ -24,9 +24,9 @@ _HELD_IN = (_PACKAGE / "example", _PACKAGE.parent / "surfaces")
 def new(file: Path | None, out: Path | None, **given: str | None) -> None:
     """Write a first study for a scan, to be run and to be changed.
 
-    The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed on a rubber
-    with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a surface card;
-    without one a scan is written here to try things with, ground_steel.x3p.
+    The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
+    on a rubber with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a
+    surface card; without one a scan is written here to try things with, ground_steel.x3p.
 
     \b
     Example:

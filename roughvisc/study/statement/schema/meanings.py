@@ -53,7 +53,7 @@ def with_meanings(schema: dict[str, Any]) -> dict[str, Any]:
     """A JSON schema whose descriptions say what a key means, before what is expected of it."""
     _describe(schema["properties"], ("study",))
     for name, section in schema["$defs"].items():
-        of_material = (f"material: {name}", "material: any", "material: temperature")
+        of_material = (f"material: {name}", "material: any", "material: temperature", "material: thickness")
         _describe(section["properties"], _TABLES.get(name, of_material))
     return schema
 
