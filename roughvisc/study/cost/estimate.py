@@ -261,7 +261,7 @@ def disk(case: Case, cells: int, found: March) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
     rows = found.rows
-    if dense == 1:  # chunks of a few frames, all of one length, are written whole
+    if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
         rows = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
     kept = np.array(found.kept or (found.contact,))
     few = kept[len(kept) // 2] < _COMPRESSED  # the frame that the writer asks

@@ -190,10 +190,15 @@ def profile_table(profile: Profile) -> Group:
 
 
 def _contact(costs: xr.Dataset) -> str:
-    """How much comes into contact: by theory for a surface that repeats, else as a coarse grid has it."""
+    """How much comes into contact: by theories for a surface that repeats, else as a coarse grid has it.
+
+    Under light loads the contact fraction is ``sqrt(8/pi)`` (Persson) to ``sqrt(2 pi)`` times the pressure over that of
+    full contact (A. W. Bush, R. D. Gibson, T. R. Thomas, Wear 35 (1975) 87); beyond, both saturate as his theory does.
+    """
     whole = costs["nominal_pressure"] / costs["full_contact_pressure"]
     if (costs["boundary"] == "periodic").all() and np.isfinite(whole).any():
-        found, by = 100 * special.erf(math.sqrt(2) * whole.values), "of the area (Persson's theory, by the rms slope)"
+        found = 100 * special.erf(np.multiply.outer((math.sqrt(2), math.pi / math.sqrt(2)), whole.values))
+        by = "of the area (by the rms slope: theories of Persson, and of Bush, Gibson and Thomas)"
     else:
         found, by = 100 * costs["contact_fraction"].values, "of the grid, judged on a coarse one"
     found = found[np.isfinite(found)]

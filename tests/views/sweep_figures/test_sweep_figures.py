@@ -268,7 +268,8 @@ def test_sweep__is_drawn_where_the_cases_differ():
 def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
     ds = stacked(product(surface__file=["a.sur", "b.sur"], material__poisson=[0.3, 0.4]), lambda row: 1e-6)
     size = xr.DataArray([1e-5, 1e-5, 4e-6, 4e-6], dims="case")
-    ds = ds.assign(contact_fraction=ds.contact_area / size, nominal_pressure=ds.force / size)
+    part, pressure = (ds.contact_area / size).assign_attrs(units="1"), (ds.force / size).assign_attrs(units="Pa")
+    ds = ds.assign(contact_fraction=part, nominal_pressure=pressure)
     figures = {name: figure for name, _, figure in sweep_figures(ds)}
     assert list(figures) == ["area", "nominal_pressure", "histories"]
     for name in ("area", "histories"):
