@@ -31,6 +31,7 @@ _PUBLIC = {
         "roughvisc.mechanics.materials.temperature": "shifted wlf_shift arrhenius_shift",
         "roughvisc.mechanics.stepping.program": "Program",
         "roughvisc.study.simulation.simulate": "simulate",
+        "roughvisc.study.simulation.friction": "friction",
         "roughvisc.study.statement.histories": "read_program",
         "roughvisc.study.statement.case": "read_study read_cases vary study_schema",
         "roughvisc.study.storage.store": "open_result",
