@@ -354,8 +354,8 @@ def _over_steps(name: str) -> Variable:
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
-_OF_SLIDING = ("pressure", "gap", "force", "approach", "nominal_pressure", "contact_area", "contact_area_corrected")
-_OF_SLIDING += ("contact_fraction", "mean_gap", "iterations", "status", "wall_time")
+_OF_SLIDING = {"pressure", "gap", "force", "approach", "nominal_pressure", "contact_area", "contact_area_corrected"}
+_OF_SLIDING |= {"contact_fraction", "mean_gap", "iterations", "status", "wall_time"}
 
 
 def _over_speed(name: str) -> Variable:
@@ -367,8 +367,8 @@ def _over_speed(name: str) -> Variable:
 #: The vocabulary of steady sliding: what a Dataset over ``speed`` may hold.
 SLIDING: dict[str, Variable] = {
     **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
-    **{name: _over_speed(name) for name in _OF_SLIDING},
-    "speed": Variable(("speed",), "m s-1", "sliding speed", short="speed"),
+    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
+    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
     "friction_coefficient": Variable(
         ("speed",),
         "1",

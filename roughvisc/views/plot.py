@@ -16,6 +16,7 @@ from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require
 from roughvisc.views.figures.distributions import contact_clusters, distributions
 from roughvisc.views.figures.fields import maps
+from roughvisc.views.figures.friction import friction
 from roughvisc.views.figures.histories import history
 from roughvisc.views.figures.loops import hysteresis
 from roughvisc.views.figures.sections import section
@@ -31,6 +32,7 @@ __all__ = [
     "area_against_load",
     "contact_clusters",
     "distributions",
+    "friction",
     "histories_of_cases",
     "history",
     "hysteresis",

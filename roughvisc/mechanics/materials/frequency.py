@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,6 +93,6 @@ def _of_power_law(material: PowerLaw, w: NDArray[np.float64]) -> Complex:
     return _endless(0.5 * (1 - material.poisson) * (material.glassy + creep), w == 0)
 
 
-def _endless(compliance: Complex, where: NDArray[np.bool_]) -> Complex:
+def _endless(compliance: NDArray[Any], where: NDArray[np.bool_]) -> Complex:
     """The compliance, infinite where creep goes on without end."""
     return np.asarray(np.where(where, complex(math.inf, 0.0), compliance))
