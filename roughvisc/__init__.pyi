@@ -24,6 +24,7 @@ from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.run import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
+from roughvisc.study.simulation.friction import friction as friction
 from roughvisc.study.simulation.simulate import simulate as simulate
 from roughvisc.study.statement.case import read_cases as read_cases
 from roughvisc.study.statement.case import read_study as read_study

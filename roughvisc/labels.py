@@ -13,7 +13,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
-from roughvisc.variables import STATUS_MEANINGS, VARIABLES, Variable, of_step
+from roughvisc.variables import SLIDING, STATUS_MEANINGS, VARIABLES, Variable, of_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
             other[name] = variable.astype(declared.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
     for name, variable in annotated.variables.items():
-        declared = VARIABLES[str(name)]
+        declared = _vocabulary(variable.dims)[str(name)]
         variable.attrs.update(declared.attributes())
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
@@ -112,10 +112,15 @@ def _same_unit(found: str, declared: str) -> bool:
     return factor == 1.0
 
 
+def _vocabulary(dims: tuple[Hashable, ...]) -> dict[str, Variable]:
+    return SLIDING if "speed" in dims else VARIABLES
+
+
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
-    if name not in VARIABLES:
+    known = _vocabulary(dims)
+    if name not in known:
         raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-    declared = VARIABLES[name]
+    declared = known[name]
     if dims[-len(declared.dims) :] != declared.dims:
         raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
     return declared

@@ -354,3 +354,46 @@ def _over_steps(name: str) -> Variable:
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
+_OF_SLIDING = {"pressure", "gap", "force", "approach", "nominal_pressure", "contact_area", "contact_area_corrected"}
+_OF_SLIDING |= {"contact_fraction", "mean_gap", "iterations", "status", "wall_time"}
+
+
+def _over_speed(name: str) -> Variable:
+    """The same variable over the speeds of steady sliding."""
+    one = VARIABLES[name]
+    return replace(one, dims=tuple("speed" if dim == "time" else dim for dim in one.dims), ancillary=())
+
+
+#: The vocabulary of steady sliding: what a Dataset over ``speed`` may hold.
+SLIDING: dict[str, Variable] = {
+    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
+    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
+    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
+    "friction_coefficient": Variable(
+        ("speed",),
+        "1",
+        "friction coefficient of steady sliding",
+        "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
+        ancillary=("friction_residual",),
+        short="friction coefficient",
+    ),
+    "friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force against the motion",
+        "the power that the material dissipates, over the speed",
+        ancillary=("friction_residual",),
+        short="friction force",
+    ),
+    "slope_friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force by pressure times slope of the profile",
+        "equal to friction_force but for what the grid leaves open at the edges of contact",
+    ),
+    "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
+    "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
+    "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
+    "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
+    "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
+}

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "roughvisc"
 _LABELS = {"errors", "labels", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
-_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact"}
+_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact", "mechanics.sliding"}
 _EXECUTION = {*_SIMULATION, "study.simulation"}
 _COST = {*_EXECUTION, "study.execution"}
 _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
@@ -36,6 +36,7 @@ ALLOWED = {
         "mechanics.materials",
         "units",
     },
+    "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.halfspace"},
     "mechanics.closed_forms": {"errors", "mechanics.halfspace", "mechanics.materials", "mechanics.stepping"},
     "topography": _LABELS,
     "study.statement": _STATEMENT,

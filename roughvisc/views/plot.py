@@ -18,6 +18,7 @@ from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require
 from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
 from roughvisc.views.figures.fields import maps
+from roughvisc.views.figures.friction import friction
 from roughvisc.views.figures.histories import history
 from roughvisc.views.figures.loops import has_loop, hysteresis
 from roughvisc.views.figures.sections import section
@@ -33,6 +34,7 @@ __all__ = [
     "area_against_load",
     "contact_clusters",
     "distributions",
+    "friction",
     "histories_of_cases",
     "history",
     "hysteresis",
