@@ -16,6 +16,7 @@ from roughvisc.study.statement.schema import (
     surface,
 )
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
 from roughvisc.study.statement.schema.units import unit_of
 
 FILE = Path(__file__).with_name("study_keys.toml")
@@ -59,8 +60,12 @@ TABLES = {
         )
         for name, one in _GENERATED.items()
     },
-    **{name: ("material", _own(one, {"model", *TEMPERATURE})) for name, one in _MODELS.items()},
+    **{
+        name: ("material", _own(one, {"model", *TEMPERATURE, *THICKNESS}))
+        for name, one in _MODELS.items()
+    },
     "material: temperature": ("material", _only(material.SECTIONS["elastic"], TEMPERATURE)),
+    "material: thickness": ("material", _only(material.SECTIONS["elastic"], THICKNESS)),
     **{
         f"program: {name}": ("program.0", kind["load"].model_fields)
         for name, kind in program.KINDS.items()

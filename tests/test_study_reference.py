@@ -21,6 +21,8 @@ BESIDE = {
     **dict.fromkeys(TEMPERATURE, WLF),
     "activation_energy": ARRHENIUS,
     "shift_factor": {},
+    "thickness": {},
+    "base": {"thickness": 1e-3},
 }
 #: a CSV file whose headings have no units, for the keys that say them
 PLAIN = "0.01, 1\n0.1, 2\n1, 3\n"
@@ -57,7 +59,7 @@ def test_meanings__are_of_keys_that_exist(study_keys):
             known.add("model")
         else:
             known = {key for key, *_ in study_keys.rows(name)}
-        assert set(keys) - {"base"} <= known, name
+        assert set(keys) - {"beside"} <= known, name
 
 
 def test_rows__say_what_the_schema_says(study_keys):
@@ -82,7 +84,7 @@ def surfaces(study_keys, name, key, example):
         return {"file": "surfaces/ground_steel.x3p"} | ({key: example} if key not in ("file", "channel") else {})
     if name.startswith("generate: "):
         recipe = name.removeprefix("generate: ").replace("any", "sphere")
-        base = tomllib.loads(study_keys.MEANINGS[name].get("base", ""))
+        base = tomllib.loads(study_keys.MEANINGS[name].get("beside", ""))
         needed = {k: value(e) for k, _, _, default, _, e in study_keys.rows(name) if default == "required"}
         shared = (
             {"size": "1 mm", "shape": 32, "radius": "10 mm"} if recipe == "sphere" else {"size": "1 mm", "shape": 32}
@@ -102,10 +104,10 @@ def surfaces(study_keys, name, key, example):
 def materials(study_keys, name, key, example, folder):
     """``[material]`` with an example of one of its keys."""
     model = name.removeprefix("material: ")
-    if model == "temperature":
+    if model in ("temperature", "thickness"):
         return {**BASE["material"], **BESIDE[key], key: example}
     needed = {k: value(e) for k, _, _, default, _, e in study_keys.rows(name) if default == "required"}
-    base = {} if name not in study_keys.MEANINGS else tomllib.loads(study_keys.MEANINGS[name].get("base", ""))
+    base = {} if name not in study_keys.MEANINGS else tomllib.loads(study_keys.MEANINGS[name].get("beside", ""))
     columns = {} if key == "file" else {k: value(study_keys.meaning(name, k)[1]) for k in COLUMNS.get(model, {})}
     if key.endswith("_unit") and key not in needed:
         heads = [column.name for column in COLUMNS[model].values() if not column.optional]
