@@ -130,7 +130,8 @@ def body_note(
                 f"A half-space would have done: its approach is at most {_percent(more)} larger, which is less than "
                 "the tolerance."
             )
-        return f"The base matters: on a half-space the approach would be up to {_percent(more)} larger."
+        larger = "much" if more > 1 else f"up to {_percent(more)}"  # the bound says little where it is wide
+        return f"The base matters: on a half-space the approach would be {larger} larger."
     longest = max(size)
     lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
     note = f"The base holds back {_percent(lost)} of the longest wave, of {longest:.3g} m" + (
@@ -146,11 +147,7 @@ def body_note(
 
 
 def _percent(share: float) -> str:
-    """A share to two digits.
-
-    >>> _percent(4.1234), _percent(0.01234)
-    ('410 %', '1.2 %')
-    """
+    """A share to two digits, as 100 and not 1e+02."""
     return f"{float(f'{100 * share:.2g}'):g} %"
 
 
