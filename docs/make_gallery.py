@@ -36,6 +36,10 @@ FIGURES = {
             results, "approach", times=[0.01, 0.05], kind="lines"
         ),
     },
+    "thickness_sweep": {
+        "approach": lambda results: rv.plot.sweep(results, "approach"),
+        "area": rv.plot.sweep,
+    },
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}
@@ -44,7 +48,8 @@ FIGURES = {
     "stability_map": {},  # drawn by its script
 }
 SCRIPTS = {
-    name: f"figures/{name}.png" for name in ("maxwell_step", "zener_step", "stability_map")
+    name: f"figures/{name}.png"
+    for name in ("maxwell_step", "zener_step", "thin_sheet", "stability_map")
 }
 
 

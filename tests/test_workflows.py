@@ -39,6 +39,20 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    figure = importlib.import_module("thin_sheet").main(cells=21, figure=tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    ratio, deviation = ({line.get_label(): line.get_data() for line in axes.lines} for axes in figure.axes)
+    at, computed = ratio["computed"]
+    exact = np.interp(at, *ratio["integral equation"])
+    np.testing.assert_allclose(computed, exact, rtol=5e-3)
+    np.testing.assert_allclose(deviation["computed"][1], 100 * (computed / exact - 1), atol=1e-9)
+    off = np.interp([0.5, 1.0], *deviation["Dimitriadis et al. (2002)"])
+    np.testing.assert_allclose(off, [-8, -16], atol=0.5)
+    assert len(capsys.readouterr().out.splitlines()) == len(at), "the table"
+
+
 def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)

@@ -38,6 +38,7 @@ from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloi
 from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
 from roughvisc.mechanics.closed_forms.sheet import OnSheet, PunchOnSheet
 from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
+from roughvisc.mechanics.halfspace.sheet import Sheet
 
 __all__ = [
     "AxisymmetricContact",
@@ -52,6 +53,7 @@ __all__ = [
     "Paraboloid",
     "PowerLawRamp",
     "PunchOnSheet",
+    "Sheet",
     "SingleMaximum",
     "StepLoad",
     "WavyContact",

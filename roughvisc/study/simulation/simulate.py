@@ -56,7 +56,7 @@ def simulate(
     kernel: Kernel = Settings.kernel,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
-    """Press a rigid profile on a linear viscoelastic half-space.
+    """Press a rigid profile on a linear viscoelastic half-space, or on a sheet on a rigid base.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def simulate(
         that heights or coordinates state is converted; without one they are metres. The undeformed gap is
         ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Of the half-space: one of roughvisc's, or any object with the two functions that
+        Of the body: one of roughvisc's, or any object with the two functions that
         :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the

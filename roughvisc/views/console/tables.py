@@ -63,7 +63,7 @@ def result_table(dataset: xr.Dataset) -> Group:
             for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
             if name in dataset
         ),
-        *([("Program", dataset.attrs["program_note"])] if "program_note" in dataset.attrs else []),
+        *((label, dataset.attrs[note]) for note, label in _NOTES.items() if note in dataset.attrs),
         ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
         ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
         ("Cost: wall time", readable(float(last["wall_time"]), "s")),
@@ -164,13 +164,15 @@ def print_validation(console: Console, found: Sequence[Comparison]) -> None:
             console.print(Text(line.rstrip()), soft_wrap=True)
 
 
+#: What a result and a plan say in words.
+_NOTES = {"body_note": "Body", "program_note": "Program"}
 #: What is modelled, shown once if it is the same in all cases.
 _MODELLED = {
     "boundary": "Boundary",
     "memory_model": "Memory of the material",
     "scheme": "Time",
     "left_out": "Savings",
-    "program_note": "Program",
+    **_NOTES,
 }
 #: Cases that a plan lists one by one.
 _LISTED = 20
@@ -219,7 +221,7 @@ def _warnings(costs: xr.Dataset) -> list[str]:
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:
-    found = list(dict.fromkeys(str(value) for value in costs[name].values if value))
+    found = list(dict.fromkeys(str(value).rstrip(".") for value in costs[name].values if value))
     text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     if name == "boundary":
         text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"

@@ -17,7 +17,7 @@ from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import Unit, unit_for
 from roughvisc.views.sweep_figures.case_names import names_of
-from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
+from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, setting_unit
 
 _NO_PARAMETERS = ("case", "case_key")
 
@@ -45,10 +45,16 @@ class Parameter:
 
     @property
     def numeric(self) -> bool:
-        """Whether it lies on an axis of numbers: every value is one, and no seed."""
-        return (
-            not self.key.endswith("seed") and self.values.dtype.kind in "iuf" and bool(np.isfinite(self.values).all())
-        )
+        """Whether it lies on an axis of numbers: every value is one, and no seed; the largest may be infinite."""
+        if self.key.endswith("seed") or self.values.dtype.kind not in "iuf":
+            return False
+        known = self.values > -np.inf  # a missing one is not
+        return bool(known.all() and np.isfinite(self.values).any())
+
+    @property
+    def endless(self) -> bool:
+        """Whether its largest value is infinite, as the thickness of a half-space among sheets."""
+        return self.numeric and bool(np.isinf(self.values).any())
 
     @property
     def levels(self) -> np.ndarray:
@@ -76,7 +82,7 @@ class Parameter:
     def texts(self) -> list[str]:
         """Every level as a reader wants it: numbers with their unit, files without their folders."""
         if self.numeric:
-            return [self.unit.text(value, 4) for value in self.levels]
+            return [ENDLESS if np.isinf(value) else self.unit.text(value, 4) for value in self.levels]
         return [textwrap.shorten(text, 60, placeholder="…") for text in _category_texts(self.levels.tolist(), self.key)]
 
 

@@ -224,12 +224,16 @@ _CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged
 def _draw_line(
     ax: Axes, across: Parameter, members: np.ndarray, shown: np.ndarray, failed: np.ndarray, **style
 ) -> None:
-    """A line over the parameter; points of categories are not joined."""
+    """A line over the parameter; points of categories are not joined, nor that of an infinite value."""
     place = positions(across)[across.places[members]]
     order = np.argsort(place, kind="stable")
     few = len(members) <= 40
     style |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
-    ax.plot(place[order], shown[order], **{"ms": 3.5 if across.numeric else 5} | style)
+    x, y = place[order], shown[order]
+    if across.endless:
+        last = int(np.isfinite(across.values[members]).sum())
+        x, y = np.insert(x, last, np.nan), np.insert(y, last, np.nan)
+    ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | style)
     if failed.any():
         ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
 

@@ -242,6 +242,15 @@ def test_plan_and_result__say_whether_a_half_space_would_have_done(case, thickne
     assert words in ds.attrs["body_note"]
 
 
+def test_screens_of_plan_and_run__show_what_the_base_does(case, tmp_path):
+    study = tmp_path / "gel.toml"  # written by the fixture
+    for verb in (["plan"], ["run", "--out", str(tmp_path / "out"), "--no-plots"]):
+        done = CliRunner().invoke(main, [*verb, str(study)])
+        assert done.exit_code == 0, done.output
+        assert "Body" in done.output
+        assert "The base matters" in done.output
+
+
 def test_note__bounds_what_a_half_space_has_more(case):
     """To first order, and from above."""
     for thickness in (2e-4, 1e-3, 4e-3):

@@ -60,6 +60,8 @@ SWEEPS = {
     "two": product(program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES),
     "grid": product(program__0__load=DECADES, material__kelvin_viscosity=VISCOSITIES),
     "materials": product(program__0__load=LOADS, material=MATERIALS),
+    "sheets": product(material__thickness=[1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, np.inf]),
+    "many sheets": product(material__thickness=[*np.geomspace(1e-5, 1e-2, 13), np.inf], program__0__load=LOADS[:2]),
     "files": product(surface__file=[f"scans/steel_{i}.x3p" for i in range(12)]),
     "three": product(surface__seed=[1, 2, 3], program__0__load=LOADS, surface__hurst=[0.6, 0.8]),
 }
@@ -104,6 +106,38 @@ def test_sweep__has_logarithmic_axes_where_values_span_decades():
     assert ax.get_xscale() == ax.get_yscale() == "log"
     (ax,) = plot.sweep(stacked(product(program__0__load=[-1.0, 1.0, 1000.0]))).axes
     assert ax.get_xscale() == "linear"
+
+
+@pytest.mark.parametrize(
+    ("finite", "scale", "places"),
+    [
+        ([0.2, 0.4, 0.8, 1.6], "log", [0.2, 0.4, 0.8, 1.6, 3.2]),
+        ([1.0, 2.0, 3.0], "linear", [1, 2, 3, 4]),
+        ([3.0], "linear", [3, 4.5]),
+    ],
+)
+def test_sweep__has_the_half_space_a_step_beyond_the_sheets(finite, scale, places):
+    thickness = [1e-3 * value for value in finite]
+    ds = stacked(product(material__thickness=[np.inf, *thickness]), lambda v: min(v["material.thickness"], 5e-3) * 1e-3)
+    figure = plot.sweep(ds)
+    (ax,) = figure.axes
+    figure.draw_without_rendering()
+    assert ax.get_xlabel() == "Thickness [mm]"
+    assert ax.get_xscale() == scale
+    assert [label.get_text() for label in ax.get_xticklabels()] == [*(f"{value:g}" for value in finite), "half-space"]
+    x, y = lines(ax)["t = 10 s"].get_data()
+    np.testing.assert_allclose(x, [*places[:-1], np.nan, places[-1]])
+    np.testing.assert_allclose(y, [*finite, np.nan, 5.0])  # mm2; not joined to the last
+
+
+def test_map_and_colours__name_the_half_space():
+    ds = stacked(SWEEPS["many sheets"], by_load)
+    figure = plot.histories_of_cases(ds, by="material.thickness")
+    assert figure.axes[-1].get_yticklabels()[-1].get_text() == "half-space"
+    ax = plot.sweep(ds, kind="map", along=["material.thickness", "program.0.load"]).axes[0]
+    assert ax.get_xscale() == "log"
+    assert ax.get_xlim()[1] == pytest.approx(1e-2 * 10 ** (3 / 12 * 1.5) * 1e6)  # half a step beyond the half-space; um
+    assert readable_setting("material.thickness", np.inf) == "half-space"
 
 
 @pytest.mark.parametrize(
