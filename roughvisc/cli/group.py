@@ -30,6 +30,11 @@ class Failure(click.ClickException):
         click.echo(f"roughvisc: {self.message}", err=True)
 
 
+def counted(count: int, what: str) -> str:
+    """A count of things, in words."""
+    return f"{count} {what}" + ("" if count == 1 else "s")
+
+
 def say(console: Console, what: str, path: Path) -> None:
     """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)

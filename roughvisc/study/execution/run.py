@@ -24,7 +24,7 @@ from roughvisc.study.simulation.simulate import press
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, result_path, torn_files, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
 from roughvisc.variables import NOT_CONVERGED
 
 if TYPE_CHECKING:
@@ -206,6 +206,8 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path):
+                    if path.exists():
+                        set_aside(path)
                     keeper.resume()
                     _finish(case, folder, progress, keeper)
                 keeper.remove()

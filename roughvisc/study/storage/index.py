@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.store import NETCDF, result_files, whole_file
+from roughvisc.study.storage.store import NETCDF, require_whole, result_files, whole_file
 from roughvisc.variables import VARIABLES
 
 log = logging.getLogger("roughvisc")
@@ -94,6 +94,7 @@ def read_entry(path: Path) -> Entry:
 
     try:
         stamp = _stamp(path)
+        require_whole(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -102,7 +103,7 @@ def read_entry(path: Path) -> Entry:
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
         raise InputError(
-            f"{path}: is damaged, or no result of roughvisc ({error}): remove it, and run again"
+            f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
     absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
     if absent or "case" not in attributes:

@@ -227,11 +227,16 @@ def _read(path: NDArray[Any], variable: str, frames: int, block_id: tuple[int, .
     """One block, from its file."""
     import netCDF4
 
-    with NETCDF, netCDF4.Dataset(path.item()) as file:
-        file.set_auto_mask(False)
-        start = block_id[1] * frames if frames else 0
-        found = file[variable][start : start + frames] if frames else file[variable][:]
-        return np.asarray(found)[np.newaxis]
+    start = block_id[1] * frames if frames else 0
+    try:
+        with NETCDF, netCDF4.Dataset(path.item()) as file:
+            file.set_auto_mask(False)
+            found = file[variable][start : start + frames] if frames else file[variable][:]
+    except (OSError, RuntimeError, LookupError) as error:
+        raise InputError(
+            f"{path.item()}: its {variable} cannot be read ({error}): the file is damaged; run its study again"
+        ) from error
+    return np.asarray(found)[np.newaxis]
 
 
 def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.DataTree:

@@ -1,0 +1,34 @@
+"""Commands on a folder of results: ``verify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from roughvisc.cli.group import Failure, counted
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+def verify(results: Path) -> None:
+    """Read results again, and say which are no longer what was written.
+
+    Every byte is held against the checksum that the file ends with. Nothing is changed; a run of their study sets
+    damaged results aside and computes them anew. The exit status is 1 if any is damaged.
+
+    \b
+    Example:
+      roughvisc verify results/study
+    """
+    from roughvisc.study.storage.verify import verify as verified
+
+    found = verified(results)
+    bad = [one for one in found if one.flaw]
+    bare = sum(not one.sealed for one in found if not one.flaw)
+    for one in bad:
+        click.echo(f"roughvisc: {one.path}: is damaged: {one.flaw}", err=True)
+    whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} whole"
+    click.echo(whole + (f", {bare} of them without a checksum" if bare else ""))
+    if bad:
+        raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to have the results computed anew", 1)
