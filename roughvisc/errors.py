@@ -21,5 +21,13 @@ class ConvergenceError(RoughviscError, RuntimeError):
     """A step did not reach its tolerance: the message names the time, the residual and what to try."""
 
 
-class InUseError(RoughviscError, RuntimeError):
+class HinderedError(RoughviscError, RuntimeError):
+    """Something outside the case was in its way: nothing is recorded against the case, and the same command goes on."""
+
+
+class InUseError(HinderedError):
     """Another run is at work on the same thing: the message names it."""
+
+
+class ChangedError(HinderedError):
+    """A file was changed after the case that names it was read."""

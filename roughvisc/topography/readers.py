@@ -53,9 +53,13 @@ def read_file(
     metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     sides = None if spacing is None else pair("spacing", spacing)
     read = _from_grid if _is_grid(path, format) else _from_instrument
+    before = path.stat()
     h, opened, chosen = read(path, format, channel, metres, sides, heights)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
+    now = path.stat()
+    if (before.st_ino, before.st_size, before.st_mtime_ns) != (now.st_ino, now.st_size, now.st_mtime_ns):
+        raise InputError(f"{path}: was changed while it was read: expected a file that stays as it is")
     others = [other.name for other in opened.channels if other.index != chosen.index]
     attrs["orientation"] = orientation(opened.format)
     attrs |= {"instrument": opened.instrument} if opened.instrument else {}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
+from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.simulate import press
@@ -114,7 +114,7 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     height = case.height()
     try:
         dataset = press(height, case.material(), case.program(), case.solving(), progress=progress, keeper=keeper)
-    except InUseError:
+    except HinderedError:
         raise
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
@@ -233,7 +233,7 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper)
         dataset = compute(case, progress=progress, keeper=keeper)
         keeper.check()
         keep(dataset, case, folder)
-    except InUseError:
+    except HinderedError:
         raise
     except RoughviscError:  # it would fail again in the same way
         keeper.remove()

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy import fft
 
-from roughvisc.errors import InUseError, RoughviscError
+from roughvisc.errors import HinderedError, RoughviscError
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
@@ -91,7 +91,7 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
             path = run_case(case, folder, progress=progress, stop=stop)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
-        kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
+        kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""

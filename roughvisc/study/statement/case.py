@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from roughvisc.errors import InputError
+from roughvisc.errors import ChangedError, InputError
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.study.statement.identity import case_key, surface_content
+from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
 from roughvisc.study.statement.variation import expand, place
@@ -55,15 +55,19 @@ class Case:
         """Title of the study."""
         return self.settings.title
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Sixteen hexadecimal digits that stand for all that determines the numbers, and for nothing else."""
-        return case_key(self.settings)
+        return self._identity[0]
 
-    @cached_property
+    @property
     def surface_sha256(self) -> str:
         """SHA-256 of the scan's file; of a generated surface: of its recipe."""
-        return surface_content(self.settings.surface)[0]
+        return self._identity[1]
+
+    @cached_property
+    def _identity(self) -> tuple[str, str]:
+        return identity(self.settings)
 
     def height(self) -> xr.DataArray:
         """Heights of the surface as conditioned, peaks up. [m]
@@ -72,11 +76,31 @@ class Case:
         ------
         InputError
             If the scan cannot be read, or its conditioning or its recipe is impossible.
+        ChangedError
+            If its files are no longer those that the key stands for.
         """
+        _ = self._identity  # of the files as they are before they are read
         try:
-            return self.settings.surface.height()
+            height = self.settings.surface.height()
         except InputError as error:
+            if self._changed():
+                raise self._change() from error
             raise InputError(line(self.origin, "surface", str(error))) from error
+        if self._changed():
+            raise self._change()
+        return height
+
+    def _changed(self) -> bool:
+        """Whether the files are no longer those that the key stands for."""
+        try:
+            return identity(self.settings) != self._identity
+        except InputError:  # gone, or another file by now
+            return True
+
+    def _change(self) -> ChangedError:
+        named = getattr(self.settings.surface, "file", None) or "the second face"
+        problem = f"{named}: was changed after the study was read: expected the heights that the case's key stands for"
+        return ChangedError(line(self.origin, "surface", f"{problem}; run the study again for the new ones"))
 
     def material(self) -> Material:
         """The material."""

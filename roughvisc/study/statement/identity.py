@@ -34,11 +34,11 @@ _PROSE = {
 }
 
 
-def case_key(settings: Study) -> str:
-    """Digest of all that determines the numbers: sixteen hexadecimal digits.
+def identity(settings: Study) -> tuple[str, str]:
+    """Digest of all that determines the numbers, sixteen hexadecimal digits, and that of the surface's file or recipe.
 
-    The surface counts by the content of its file and not by its path, as do tables of a material; the program by
-    its segments and not by how they were written, and no title counts.
+    Both come from one reading of the file. The surface counts by the content of its file and not by its path, as do
+    tables of a material; the program by its segments and not by how they were written, and no title counts.
     """
     stated = settings.model_dump(
         mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
@@ -52,9 +52,10 @@ def case_key(settings: Study) -> str:
         for segment in settings.loading().segments
     ]
     stated["material"] = settings.material.content()
-    stated["surface"] = surface_content(settings.surface)
+    surface = surface_content(settings.surface)
+    stated["surface"] = surface
     stated["numerics"] = [NUMERICS_REVISION, transform_library().split()[0]]
-    return _digest(stated)[:16]
+    return _digest(stated)[:16], surface[0]
 
 
 def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
