@@ -28,7 +28,7 @@ from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence, Watch
 from roughvisc.study.statement.case import Case, read_cases, vary
 from roughvisc.study.storage.failures import record_path
-from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
 
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
@@ -104,7 +104,9 @@ def assert_same(one, other):
 
 def leftovers(folder):
     """What is in a folder besides results, records, log and index."""
-    return [p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", INDEX, "inputs")]
+    return [
+        p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", INDEX, LATEST, "inputs")
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -533,13 +535,11 @@ def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
 
 def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     synthetic(tmp_path, loads=1, seeds=1, times=3)
-    (tmp_path / f"{0:08x}{0:08x}.nc").rename(tmp_path / "a.nc")
-    synthetic(tmp_path, loads=1, seeds=1, times=5)
-    (tmp_path / "a.nc").rename(tmp_path / "other.nc")
-    with open_result(tmp_path / "other.nc") as ds:
+    with open_result(tmp_path / f"{0:08x}{0:08x}.nc") as ds:
         ds = ds.load()
     ds.attrs["case_key"] = "f" * 16
-    write_result(ds, tmp_path / "other.nc")
+    write_result(ds, tmp_path / f"{'f' * 16}.nc")
+    synthetic(tmp_path, loads=1, seeds=1, times=5)
     with pytest.raises(InputError, match=r"no common times \(5 and 3\): open them with ragged=True"):
         rv.open_results(tmp_path)
     tree = rv.open_results(tmp_path, ragged=True)
@@ -547,6 +547,42 @@ def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     assert tree["f" * 16].sizes["time"] == 3
     assert tree[f"{0:08x}{0:08x}"].ds.pressure.values.shape == (5, 8, 6)
     assert float(tree["f" * 16]["program.0.load"]) == 0.5
+
+
+def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    key = f"{3:08x}{2:08x}"
+    with open_result(folder / f"{key}.nc") as ds:
+        derived = ds.load()
+    derived["force"][:] = 77.0
+    for name in ("000-mean.nc", f"{'f' * 16}.nc", "zz.nc"):
+        write_result(derived, folder / name)
+    (folder / INDEX).unlink()
+    ds = rv.open_results(folder)
+    assert ds.sizes["case"] == 60
+    assert float(ds.force.max()) == 5.0
+    assert f"{'f' * 16}.nc: holds the result of case {key}" in caplog.text
+
+
+def test_open_results__no_bit_of_the_index_changes_what_a_sweep_returns(study, tmp_path):
+    out, cases = tmp_path / "out", study()
+    sweep(cases, out, workers=0, progress=False)
+    assert sweep(cases[:2], out, workers=0, progress=False).sizes["case"] == 2
+    rng = np.random.default_rng(5)
+    for name in (INDEX, LATEST):
+        whole = np.fromfile(out / name, np.uint8)
+        for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
+            damaged = whole.copy()
+            damaged[at] ^= 1 << rng.integers(8)
+            damaged.tofile(out / name)
+            with contextlib.suppress(InputError) if name == LATEST else contextlib.nullcontext():
+                assert list(rv.open_results(out).case_key) == [case.key for case in cases[:2]], at
+        whole.tofile(out / name)
+    (out / LATEST).write_text("[]")
+    with pytest.raises(InputError, match=rf"{LATEST}: is damaged: expected the cases of the sweep that ran last"):
+        rv.open_results(out)
+    assert rv.open_results(out, cases="all").sizes["case"] == 4
 
 
 def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):
