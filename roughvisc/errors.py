@@ -29,5 +29,13 @@ class InUseError(HinderedError):
     """Another run is at work on the same thing: the message names it."""
 
 
+class FolderError(InputError, HinderedError):
+    """A folder cannot be made or written to."""
+
+
+class DiskFullError(HinderedError):
+    """No space is left for what a case has to write."""
+
+
 class ChangedError(HinderedError):
     """A file was changed after the case that names it was read."""

@@ -182,6 +182,8 @@ def run_case(
         result is kept and none of these.
     InUseError
         If another run is at work on this case in this folder.
+    ChangedError
+        If the surface's file was changed after the study was read.
     OSError
         If the disk is full; the last checkpoint stays.
     """

@@ -21,7 +21,7 @@ import netCDF4
 import numpy as np
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
-from roughvisc.errors import InputError
+from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
 from roughvisc.study.storage.seal import flaw, seal
 from roughvisc.variables import of_step
@@ -102,16 +102,16 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     Raises
     ------
-    InputError
+    FolderError
         If the folder cannot be made or written to.
     """
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
+        raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path.parent}: may not be written to: expected a folder with write permission")
+        raise FolderError(f"{path.parent}: may not be written to: expected a folder with write permission")
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     try:
         yield temporary

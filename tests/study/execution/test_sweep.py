@@ -20,7 +20,8 @@ from rich.console import Console
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.errors import InputError, InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
+from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
@@ -85,6 +86,20 @@ def by_hand(tmp_path_factory):
     for process in started:
         process.wait(30)
     log.close()
+
+
+@contextlib.contextmanager
+def in_this_process(processes):
+    """A cluster whose workers are threads, so that they see what a test has changed."""
+    from distributed import Client, LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=processes, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
 
 
 def numbers(folder):
@@ -190,7 +205,7 @@ def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
     xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
 
 
-def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand):
+def test_sweep__blames_no_case_whose_worker_dies_twice(study, tmp_path, by_hand):
     (case,) = study(LONG)
     with connect(file=by_hand) as client:
         killed = kill_working(client, times=2)
@@ -198,6 +213,7 @@ def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand)
             sweep([case], tmp_path / "out", client, progress=False)
         killed.join()
         client.wait_for_workers(2, timeout=60)
+    assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
 def kill_working(client, times):
@@ -288,7 +304,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     assert leftovers(tmp_path / "out") == [], "the records go when the cases are done"
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "x.nc"), InUseError("in use")])
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error", "x.nc"), InUseError("in use"), MemoryError()])
 def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
     cases = study()
 
@@ -298,8 +314,49 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     monkeypatch.setattr(task_module, "run_case", hindered)
     outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
     assert {o.kind for o in outcomes.values()} == {"hindered"}
+    assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatch, capfd, workers):
+    """The second case finds no space: those after it are not begun, and the same command goes on."""
+    cases, bring = study(), run_module.run_case
+
+    def full(case, folder, **settings):
+        (tmp_path / f"begun-{len(list(tmp_path.glob('begun*')))}").touch()
+        if len(list(tmp_path.glob("begun*"))) == 2:
+            raise OSError(28, "No space left on device; make room", "x.nc")
+        return bring(case, folder, **settings)
+
+    if workers:  # the processes of a local cluster are forked from one that has not seen this
+        monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
+    monkeypatch.setattr(task_module, "run_case", full)
+    with pytest.raises(DiskFullError, match=r"^x\.nc: No space left .*make room \(1 of 4 cases are finished\)$"):
+        run_cases(cases, tmp_path / "out", watch=Silence(), workers=workers)
+    begun = len(list(tmp_path.glob("begun*")))
+    assert begun == 2 if workers == 0 else begun < 4
+    assert not list((tmp_path / "out").glob("*.failed.json"))
+    assert "No space left" in (tmp_path / "out" / "sweep.log").read_text()
+    monkeypatch.undo()
+    assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "sweep.log").symlink_to("/dev/full")
+    assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
+    assert capfd.readouterr().err == ""
+
+
+def test_run__a_folder_that_may_no_longer_be_written_to_keeps_the_checkpoint(study, tmp_path, monkeypatch):
+    (case,) = study(BALL)
+    write = run_module.write_result
+    monkeypatch.setattr(run_module, "write_result", lambda ds, path, **how: write(ds, "/proc/none/x.nc", **how))
+    outcomes = run_cases([case], tmp_path / "out", watch=Silence(), workers=0)
+    assert outcomes[case.key].kind == "hindered"
+    assert "/proc/none: cannot be made" in outcomes[case.key].message
 
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
