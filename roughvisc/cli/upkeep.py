@@ -1,4 +1,4 @@
-"""Commands on a folder of results: ``verify``."""
+"""Commands on a folder of results: ``verify`` and ``clean``."""
 
 from __future__ import annotations
 
@@ -32,3 +32,24 @@ def verify(results: Path) -> None:
     click.echo(whole + (f", {bare} of them without a checksum" if bare else ""))
     if bad:
         raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to have the results computed anew", 1)
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
+def clean(results: Path, everything: bool) -> None:
+    """Remove what runs that were killed have left in a folder of results.
+
+    Those are torn files, locks of dead runs, and checkpoints of cases that are finished. Results stay, and so does
+    what an unfinished case would go on from, unless --all is given. A case that a run is at work on is left alone.
+
+    \b
+    Example:
+      roughvisc clean results/study
+    """
+    from roughvisc.study.storage.tidy import tidy
+
+    removed = tidy(results, everything=everything)
+    for path in removed:
+        click.echo(f"removed {path.name}")
+    click.echo(f"{counted(len(removed), 'leftover')} removed")

@@ -24,6 +24,7 @@ from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, record_failure, recorded_failure
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.tidy import tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -161,6 +162,7 @@ def run_cases(
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     with _log_file(folder):
+        tidy(folder)
         index = index_of(folder)
         outcomes = _known(distinct, folder, index, retry_failed)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
