@@ -8,7 +8,7 @@ import click
 
 from roughvisc.cli.group import say
 from roughvisc.cli.reading import read_options, reading_options
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
 
 
 @click.command()
@@ -50,4 +50,4 @@ def new(file: Path, out: Path | None, **given: str | None) -> None:
     console.print()
     say(console, "Study", out)
     following = f"Next: roughvisc plan {out}\n      roughvisc run {out}"
-    console.print(following, soft_wrap=True, highlight=False, markup=False)
+    console.print(printable(following), soft_wrap=True, highlight=False, markup=False)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from roughvisc.cli.group import Failure, counted
+from roughvisc.cli.group import Failure, complain, counted
+from roughvisc.errors import printable
 
 
 @click.command()
@@ -27,7 +28,7 @@ def verify(results: Path) -> None:
     bad = [one for one in found if one.flaw]
     bare = sum(not one.sealed for one in found if not one.flaw)
     for one in bad:
-        click.echo(f"roughvisc: {one.path}: is damaged: {one.flaw}", err=True)
+        complain(f"{one.path}: is damaged: {one.flaw}")
     whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} whole"
     click.echo(whole + (f", {bare} of them without a checksum" if bare else ""))
     if bad:
@@ -51,5 +52,5 @@ def clean(results: Path, everything: bool) -> None:
 
     removed = tidy(results, everything=everything)
     for path in removed:
-        click.echo(f"removed {path.name}")
+        click.echo(printable(f"removed {path.name}"))
     click.echo(f"{counted(len(removed), 'leftover')} removed")

@@ -148,6 +148,7 @@ def supported_formats() -> dict[str, tuple[str, ...]]:
 
 def sha256(path: Path) -> str:
     """Checksum of a file's content; of a folder's files in order of their names."""
+    regular(path)
     if path.is_dir():
         parts = (f"{p.relative_to(path)} {sha256(p)}" for p in sorted(path.rglob("*")) if p.is_file())
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
@@ -233,9 +234,16 @@ def existing(path: Any) -> Path:
         raise InputError(f"path is {type(path).__name__}: expected the name of a file") from error
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
+    regular(path)
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
     return path
+
+
+def regular(path: Path) -> None:
+    """Refuse what is there and is neither a file nor a folder: reading a device or a pipe need not end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a device or a pipe: expected a file")
 
 
 def _is_grid(path: Path, format: str | None) -> bool:

@@ -6,13 +6,13 @@ import hashlib
 import json
 import os
 import shutil
-import tomllib
 from pathlib import Path
 from typing import Any
 
-from roughvisc.errors import ChangedError
+from roughvisc.errors import ChangedError, InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import whole_file
+from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 
@@ -68,7 +68,7 @@ def _named_by(path: Path) -> str | None:
     if path.suffix.lower() != ".toml":
         return None
     try:
-        named = tomllib.loads(path.read_text(encoding="utf-8")).get("file")
-    except (OSError, ValueError):
+        named = read_toml(path, "surface card in TOML").get("file")
+    except InputError:
         return None  # it is refused where it is opened
     return named if isinstance(named, str) and not Path(named).is_absolute() else None

@@ -88,7 +88,7 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
         If it is no folder, or may not be made or written to.
     """
     if out is not None:
-        folder = Path(out)
+        folder = Path(out).expanduser()
     elif case.origin is not None:
         folder = case.origin.parent / "results" / case.origin.stem
     else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,6 +17,7 @@ from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
 from roughvisc.study.statement.variation import expand, place
+from roughvisc.topography.cards import read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,7 +138,7 @@ class Case:
             data = json.loads(text)
             if not isinstance(data, dict):
                 raise InputError("found no JSON object")
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
         origin, varied = data.pop("origin", None), data.pop("varied", {})
         return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied)
@@ -190,7 +190,9 @@ def read_cases(path: str | Path) -> list[Case]:
         As :func:`read_study` does, for any of the cases.
     """
     path = Path(path)
-    data = _toml(path)
+    if not path.exists():
+        raise InputError(f"{path}: does not exist: expected a study file (TOML)")
+    data = read_toml(path, "valid TOML")
     sweep = data.pop("sweep", {})
     changes = expand(sweep, lambda key, found: InputError(line(path, key, found)))
     cases: list[Case] = []
@@ -251,17 +253,6 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
         raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: does not exist: expected a study file (TOML)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no valid TOML: {error}") from error
 
 
 def _stated(settings: Study) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
+from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
@@ -79,10 +79,7 @@ def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
     path = Path(stated.pop("file"))
     if path.suffix.lower() != ".toml":
         return _checksum(path), stated
-    try:
-        card = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no surface card in TOML: {error}") from error
+    card = read_toml(path, "surface card in TOML")
     stated["card"] = {key: value for key, value in card.items() if key not in _PROSE and key != "file"}
     if isinstance(card.get("file"), str):
         return _checksum(path.parent / card["file"]), stated

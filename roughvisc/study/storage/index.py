@@ -113,11 +113,19 @@ def read_entry(path: Path) -> Entry:
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
     absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
-    if absent or "case" not in attributes:
+    if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
     kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
     return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float))
+
+
+def _is_table(text: Any) -> bool:
+    """Whether a text is a table in JSON."""
+    try:
+        return isinstance(json.loads(text), dict)
+    except (TypeError, ValueError, RecursionError):
+        return False
 
 
 def _stamp(path: Path) -> tuple[int, int]:

@@ -6,6 +6,7 @@ CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them as t
 from __future__ import annotations
 
 import errno
+import json
 import logging
 import math
 import os
@@ -24,7 +25,8 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 d
 from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
 from roughvisc.study.storage.seal import flaw, seal
-from roughvisc.variables import of_step
+from roughvisc.units import shown
+from roughvisc.variables import VARIABLES, of_step
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -335,8 +337,26 @@ def open_result(path: str | Path) -> xr.Dataset:
         raise InputError(
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
-    absent = [name for name in ("time", "force", "approach") if name not in dataset.variables]
-    if absent:
+    found = _foreign(dataset)
+    if found:
         dataset.close()
-        raise InputError(f"{path}: holds no {', '.join(absent)}: expected a result of roughvisc")
+        raise InputError(f"{path}: {found}: expected a result of roughvisc")
     return dataset
+
+
+def _foreign(dataset: xr.Dataset) -> str:
+    """What shows that a file is no result, whoever wrote it; empty if nothing."""
+    if absent := [name for name in ("time", "force", "approach") if name not in dataset.variables]:
+        return f"holds no {', '.join(absent)}"
+    for name, variable in dataset.variables.items():
+        if name in VARIABLES and variable.dtype.kind not in "fiub":
+            return f"holds {name} as {variable.dtype}"
+    if odd := [name for name in ("force", "approach") if dataset[name].dims != ("time",)]:
+        return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
+    if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
+        return f"has the tolerance {shown(dataset.attrs['tolerance'])}"
+    try:
+        stated = json.loads(dataset.attrs.get("case", "{}"))
+    except (TypeError, ValueError, RecursionError):
+        stated = None
+    return "" if isinstance(stated, dict) else "has an attribute case that is no case in JSON"

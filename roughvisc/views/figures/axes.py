@@ -18,7 +18,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
@@ -275,6 +275,11 @@ def frame_at(times, time: float) -> int:
 
 
 # --------------------------------------------------------------------------------------------------------- data
+
+
+def verbatim(text: str) -> str:
+    """A text of the user as a figure shows it, letter by letter: dollars begin no formula."""
+    return printable(text).replace("$", r"\$")
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:
