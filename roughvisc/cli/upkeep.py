@@ -13,9 +13,9 @@ from roughvisc.errors import printable
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
 def verify(results: Path) -> None:
-    """Read results again, and say which are no longer what was written.
+    """Read results again, and say which are damaged.
 
-    Every byte is held against the checksum that the file ends with. Nothing is changed; a run of their study sets
+    Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of their study sets
     damaged results aside and computes them anew. The exit status is 1 if any is damaged.
 
     \b
@@ -39,7 +39,7 @@ def verify(results: Path) -> None:
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
 def clean(results: Path, everything: bool) -> None:
-    """Remove what runs that were killed have left in a folder of results.
+    """Remove what killed runs have left in a folder.
 
     Those are torn files, locks of dead runs, and checkpoints of cases that are finished. Results stay, and so does
     what an unfinished case would go on from, unless --all is given. A case that a run is at work on is left alone.
