@@ -15,8 +15,8 @@ from roughvisc.errors import printable
 def verify(results: Path) -> None:
     """Read results again, and say which are damaged.
 
-    Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of their study sets
-    damaged results aside and computes them anew. The exit status is 1 if any is damaged.
+    Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of
+    their study sets damaged results aside and computes them anew. The exit status is 1 if any is damaged.
 
     \b
     Example:
