@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -72,12 +73,15 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     >>> quantity("25 degC", "K"), quantity("25 °C", "K")
     (298.15, 298.15)
     """
-    label = f"{name} is {value!r}" if name else f"found {value!r}"
+    label = f"{name} is {shown(value)}" if name else f"found {shown(value)}"
     wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
     if isinstance(value, str):
         result = _parsed(value, unit, label, wanted, difference)
     elif isinstance(value, Real) and not isinstance(value, bool):
-        result = float(value)
+        try:
+            result = float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            result = math.inf
     else:
         raise InputError(f"{label}: expected {wanted}")
     if not math.isfinite(result):
@@ -192,6 +196,7 @@ def bounded_quantity(
         raise
     outside = (
         (above is not None and not number > above)
+        or (above == 0 and number < sys.float_info.min)  # whose reciprocal no double can hold
         or (least is not None and not number >= least)
         or (most is not None and not number <= most)
         or (below is not None and not number < below)

@@ -475,3 +475,15 @@ def test_left_out__is_what_plan_says(tmp_path):
         "three quarters of the surface: not computed, they are mirror images of the fourth; "
         "pressure and displacement: not kept; fields between the kept times: not kept"
     )
+
+
+@pytest.mark.parametrize("material", [rv.elastic(1e6), rv.zener(3e6, 1e6, 1e5), rv.maxwell(1e6, 1e6)])
+def test_a_flat_periodic_surface_in_full_contact_has_no_residual(material):
+    """Its pressure is uniform whatever rounding leaves of its heights."""
+    program = rv.Program().load(1e-3, over=0.1).hold(0.2)
+    for amplitude in (0.0, 1e-18):
+        for step in ("auto", 0.01):
+            surface = rv.wavy(1.0, 1e-3, 1e-3, (12, 9)) * amplitude
+            ds = simulate(surface, material, program, boundary="periodic", time_step=step)
+            np.testing.assert_allclose(ds.pressure[-1], 1e-3 / 1e-6, rtol=1e-9)
+            assert ds.residual.max() < 1e-9

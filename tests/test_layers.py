@@ -41,7 +41,7 @@ ALLOWED = {
     "topography": _LABELS,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,
-    "study.progress": set(),
+    "study.progress": {"errors"},
     "study.simulation": _SIMULATION,
     "study.execution": _EXECUTION,
     "study.cost": _COST,

@@ -66,7 +66,7 @@ def test_meanings__are_of_keys_that_exist(study_keys):
 
 def test_rows__say_what_the_schema_says(study_keys):
     found = {row[0]: row[1:4] for row in study_keys.rows("solve")}
-    assert found["tolerance"] == ("a number above 0 and below 1", "", "`0.001`")
+    assert found["tolerance"] == ("a number at least 1e-12 and below 1", "", "`0.001`")
     assert found["time_step"] == ("'auto', or a time above 0", "s", "`auto`")
     zener = {row[0]: row[1:4] for row in study_keys.rows("material: zener")}
     assert zener["kelvin_viscosity"] == ("a quantity above 0", "Pa s", "required")

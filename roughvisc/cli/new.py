@@ -9,7 +9,7 @@ import click
 
 from roughvisc.cli.group import say
 from roughvisc.cli.reading import read_options, reading_options
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
 
 #: Scan that is written where none is named, and folders that hold it: of an installation, and of a checkout.
 EXAMPLE = "ground_steel.x3p"
@@ -65,7 +65,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
         say(console, "Scan", wanted)
     say(console, "Study", out)
     following = f"Next: roughvisc plan {out}\n      roughvisc run {out}"
-    console.print(following, soft_wrap=True, highlight=False, markup=False)
+    console.print(printable(following), soft_wrap=True, highlight=False, markup=False)
 
 
 def _write_example(path: Path) -> None:

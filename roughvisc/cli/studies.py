@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure, say
-from roughvisc.errors import InputError
+from roughvisc.cli.group import Failure, complain, say
+from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -58,7 +58,7 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
         if len(cases) == 1 and not elsewhere:
             complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
             if complaint:
-                click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
+                complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
         else:
             _run_all(cases, folder, console, **(where | {"workers": 0} if profile else where))
@@ -140,7 +140,7 @@ def _run_all(
     for outcome in bad:
         again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
         where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
-        click.echo(f"roughvisc: {where}: {outcome.message}", err=True)
+        complain(f"{where}: {outcome.message}")
     if all(outcome.error in ("InputError", "EdgeContactError") for outcome in outcomes.values()):
         raise Failure("no case could be computed: the input is wrong", 2)
     if bad:
@@ -223,4 +223,5 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
             shortfall = recommend.shortfall(dataset, quantity, part)
             raise Failure(f"{study}: --apply {target}: {shortfall}; the study is as it was", 1)
         changes = apply(study, recommend.keys_of(dataset, index))
-        console.print(f"{study}: {changes or 'as it should be already'}", soft_wrap=True, highlight=False)
+        said = printable(f"{study}: {changes or 'as it should be already'}")
+        console.print(said, soft_wrap=True, highlight=False, markup=False)

@@ -15,11 +15,14 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity
+from roughvisc.units import quantity, shown
 from roughvisc.variables import VARIABLES
 
 #: Attributes of numbers as a file packs them, before xarray decodes them.
 _PACKED = {"scale_factor", "add_offset", "_FillValue", "missing_value"}
+
+#: 16384 squared: a field of doubles takes 2 GB.
+MOST_CELLS = 1 << 28
 
 
 def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] | None = None) -> xr.DataArray:
@@ -272,5 +275,9 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole:
-        raise InputError(f"{name} is {value!r}: expected a whole number of cells of at least {low}, or a pair of them")
+        raise InputError(
+            f"{name} is {shown(value)}: expected a whole number of cells of at least {low}, or a pair of them"
+        )
+    if both[0] * both[1] > MOST_CELLS:
+        raise InputError(f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}")
     return int(both[0]), int(both[1])

@@ -9,7 +9,9 @@ row j of the file is ``y[j]``, as it stands there.
 from __future__ import annotations
 
 import traceback
+import zipfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
@@ -37,6 +39,8 @@ _PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metrop
 _PLAIN |= {"plu", "tmd", "wsxm", "xyz"}
 #: No deflated stream expands further than this.
 EXPANSION = 1040
+#: Measured heights are not compressed so far: a file that expands so, and beyond this size, is none. [1, byte]
+_PLAUSIBLE, _SMALL = 100, 256 << 20
 
 
 @dataclass(frozen=True)
@@ -190,11 +194,22 @@ def affordable(path: Path, points: int, expansion: float) -> None:
     held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
+    _modest(8 * points, held)
+
+
+def _modest(size: int, held: int) -> None:
+    if size > max(_PLAUSIBLE * held, _SMALL):
+        raise InputError(
+            f"it would take {size:.3g} bytes in memory, {size / held:.0f} times as many as the file has: expected "
+            f"measured heights, at most {_PLAUSIBLE} times"
+        )
 
 
 def _x3p(path: Path) -> Opened:
     import x3pio
 
+    with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as parts:  # the reader says what is wrong with it
+        _modest(sum(part.file_size for part in parts.infolist()), path.stat().st_size)
     info = x3pio.info(path, verify=False)
     surface = info.feature_type == x3pio.FeatureType.SURFACE and len(info.shape) == 2
     affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)), EXPANSION)

@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
+from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.simulate import press
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, result_path, torn_files, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
 from roughvisc.variables import NOT_CONVERGED
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
         If it is no folder, or may not be made or written to.
     """
     if out is not None:
-        folder = Path(out)
+        folder = Path(out).expanduser()
     elif case.origin is not None:
         folder = case.origin.parent / "results" / case.origin.stem
     else:
@@ -114,7 +114,7 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     height = case.height()
     try:
         dataset = press(height, case.material(), case.program(), case.solving(), progress=progress, keeper=keeper)
-    except InUseError:
+    except HinderedError:
         raise
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
@@ -182,6 +182,8 @@ def run_case(
         result is kept and none of these.
     InUseError
         If another run is at work on this case in this folder.
+    ChangedError
+        If the surface's file was changed after the study was read.
     OSError
         If the disk is full; the last checkpoint stays.
     """
@@ -206,6 +208,8 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path):
+                    if path.exists():
+                        set_aside(path)
                     keeper.resume()
                     _finish(case, folder, progress, keeper)
                 keeper.remove()
@@ -231,7 +235,7 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper)
         dataset = compute(case, progress=progress, keeper=keeper)
         keeper.check()
         keep(dataset, case, folder)
-    except InUseError:
+    except HinderedError:
         raise
     except RoughviscError:  # it would fail again in the same way
         keeper.remove()

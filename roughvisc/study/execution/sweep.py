@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import local_client
 from roughvisc.study.execution.run import result_folder
@@ -25,6 +25,7 @@ from roughvisc.study.storage.failures import forget_failure, record_failure, rec
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.table import write_table
+from roughvisc.study.storage.tidy import tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -146,6 +147,8 @@ def run_cases(
     ------
     InputError
         If a setting is wrong.
+    DiskFullError
+        If the disk is full; the cases that are left are not begun.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt
@@ -160,6 +163,7 @@ def run_cases(
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     with _log_file(folder):
+        tidy(folder)
         index = index_of(folder)
         outcomes = _known(distinct, folder, index, retry_failed)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
@@ -176,6 +180,9 @@ def run_cases(
             _compute(todo, folder, book, client, workers)
         except KeyboardInterrupt:
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
+            raise
+        except DiskFullError as error:
+            log.warning("%s", error)
             raise
         finally:
             book.save()
@@ -235,6 +242,9 @@ class _Book:
         self.watch.ended(outcome)
         if time.monotonic() - self.saved > _SAVE_EVERY:
             self.save()
+        if outcome.error == DiskFullError.__name__:  # the others would fill the log with the same
+            finished = sum(one.entry is not None for one in self.outcomes.values())
+            raise DiskFullError(f"{outcome.message} ({finished} of {len(self.cases)} cases are finished)")
 
     def save(self) -> None:
         self.saved = time.monotonic()
@@ -295,10 +305,11 @@ def _distributed(
         finished = as_completed(futures, loop=client.loop, with_results=True, raise_errors=False)
         try:
             _drain(finished, futures, book)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, DiskFullError):
             book.watch.stopping()
             client.run(stop_sweep, name, on_error="ignore")
-            _drain(finished, futures, book, _PATIENCE)
+            with suppress(DiskFullError):  # of the others
+                _drain(finished, futures, book, _PATIENCE)
             client.cancel(list(futures))
             raise
     finally:
@@ -332,9 +343,9 @@ def _outcome(key: str, result: Any) -> Outcome:
         times = result.allowed_failures + 1
         return Outcome(
             key,
-            "failed",
+            "hindered",
             f"the process that computed it died {times} times, the last on {result.last_worker.address}: killed, or "
-            "out of memory (roughvisc plan says how much a case needs)",
+            "out of memory (roughvisc plan says how much a case needs); the same command goes on from its checkpoint",
             "KilledWorker",
         )
     if isinstance(result, CancelledError | Cancelled):
@@ -345,7 +356,7 @@ def _outcome(key: str, result: Any) -> Outcome:
 @contextmanager
 def _log_file(folder: Path) -> Iterator[None]:
     """Everything that roughvisc logs, appended to a file beside the results."""
-    handler = logging.FileHandler(folder / LOG, delay=True, encoding="utf-8")
+    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
     handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
     level = log.level
     log.addHandler(handler)
@@ -355,4 +366,12 @@ def _log_file(folder: Path) -> Iterator[None]:
     finally:
         log.setLevel(level)
         log.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that stops nothing where it cannot be written."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass

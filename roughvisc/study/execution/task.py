@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import threading
 import time
@@ -14,7 +15,7 @@ from typing import Literal
 import numpy as np
 from scipy import fft
 
-from roughvisc.errors import InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, HinderedError, RoughviscError
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
@@ -23,8 +24,9 @@ log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
 
-#: How a case ended. ``hindered``: something outside the case was in the way (a full disk, another run that computes
-#: it), so the same command tries again; ``failed`` is what would fail again.
+#: How a case ended. ``hindered``: something outside the case was in the way (a full disk, too little memory, a process
+#: that was killed, another run that computes it), so the same command goes on from its checkpoint; ``failed`` is what
+#: would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
 #: Seconds between two reports of one case.
 _REPORT_EVERY = 0.5
@@ -91,11 +93,17 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
             path = run_case(case, folder, progress=progress, stop=stop)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
-        kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
+        kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)
+    except MemoryError:
+        text = "not enough memory; what was computed up to the last checkpoint is kept: roughvisc plan says how much a "
+        outcome = Outcome(
+            case.key, "hindered", f"{text}case needs, and fewer --workers leave more to each", "MemoryError"
+        )
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""
-        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", type(error).__name__)
+        kind_of = DiskFullError if error.errno in (errno.ENOSPC, errno.EDQUOT) else type(error)
+        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", kind_of.__name__)
     except Exception as error:  # noqa: BLE001  (whatever it is, it stops no other case; its traceback is kept)
         text = f"{type(error).__name__}: {error}"
         outcome = Outcome(case.key, "failed", text, type(error).__name__, traceback.format_exc())

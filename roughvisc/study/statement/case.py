@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from roughvisc.errors import InputError
-from roughvisc.study.statement.identity import case_key, surface_content
+from roughvisc.errors import ChangedError, InputError
+from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
 from roughvisc.study.statement.variation import expand, place, with_files
+from roughvisc.topography.cards import read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,15 +57,19 @@ class Case:
         """Title of the study."""
         return self.settings.title
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Sixteen hexadecimal digits that stand for all that determines the numbers, and for nothing else."""
-        return case_key(self.settings)
+        return self._identity[0]
 
-    @cached_property
+    @property
     def surface_sha256(self) -> str:
         """SHA-256 of the scan's file; of a generated surface: of its recipe."""
-        return surface_content(self.settings.surface)[0]
+        return self._identity[1]
+
+    @cached_property
+    def _identity(self) -> tuple[str, str]:
+        return identity(self.settings)
 
     def height(self) -> xr.DataArray:
         """Heights of the surface as conditioned, peaks up. [m]
@@ -74,11 +78,31 @@ class Case:
         ------
         InputError
             If the scan cannot be read, or its conditioning or its recipe is impossible.
+        ChangedError
+            If its files are no longer those that the key stands for.
         """
+        _ = self._identity  # of the files as they are before they are read
         try:
-            return self.settings.surface.height()
+            height = self.settings.surface.height()
         except InputError as error:
+            if self._changed():
+                raise self._change() from error
             raise InputError(line(self.origin, "surface", str(error))) from error
+        if self._changed():
+            raise self._change()
+        return height
+
+    def _changed(self) -> bool:
+        """Whether the files are no longer those that the key stands for."""
+        try:
+            return identity(self.settings) != self._identity
+        except InputError:  # gone, or another file by now
+            return True
+
+    def _change(self) -> ChangedError:
+        named = getattr(self.settings.surface, "file", None) or "the second face"
+        problem = f"{named}: was changed after the study was read: expected the heights that the case's key stands for"
+        return ChangedError(line(self.origin, "surface", f"{problem}; run the study again for the new ones"))
 
     def material(self) -> Material:
         """The material."""
@@ -118,7 +142,7 @@ class Case:
             data = json.loads(text)
             if not isinstance(data, dict):
                 raise InputError("found no JSON object")
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
         origin, varied, written = (data.pop(name, None) for name in ("origin", "varied", "written"))
         return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied or {}, written or {})
@@ -171,7 +195,9 @@ def read_cases(path: str | Path) -> list[Case]:
         As :func:`read_study` does, for any of the cases.
     """
     path = Path(path)
-    data = _toml(path)
+    if not path.exists():
+        raise InputError(f"{path}: does not exist: expected a study file (TOML)")
+    data = read_toml(path, "valid TOML")
 
     def refusal(key: str, found: str) -> InputError:
         return InputError(line(path, key, found))
@@ -238,17 +264,6 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
         raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: does not exist: expected a study file (TOML)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no valid TOML: {error}") from error
 
 
 def _stated(settings: Study) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from glob import glob
@@ -11,8 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.units import shown
 
 Refusal = Callable[[str, str], InputError]
+
+#: More cases are taken for a slip: a sweep of them would not end.
+MOST_CASES = 100_000
 
 
 def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
@@ -42,10 +47,14 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
         keys = dict(_flat(sweep))
         for key, values in keys.items():
             if not isinstance(values, list) or not values:
-                raise refusal(f"sweep.{key}", f"found {values!r}: expected a list of values")
+                raise refusal(f"sweep.{key}", f"found {shown(values)}: expected a list of values")
+        count = math.prod(len(values) for values in keys.values())
+        if count > MOST_CASES:
+            lengths = " x ".join(str(len(values)) for values in keys.values())
+            raise refusal("sweep", f"found {lengths} = {count} cases: expected at most {MOST_CASES}")
         return [dict(zip(keys, chosen, strict=True)) for chosen in itertools.product(*keys.values())]
     if not isinstance(sweep, list) or not all(isinstance(table, Mapping) and table for table in sweep):
-        raise refusal("sweep", f"found {sweep!r}: expected a table of lists, or [[sweep]] tables")
+        raise refusal("sweep", f"found {shown(sweep)}: expected a table of lists, or [[sweep]] tables")
     return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)), refusal)]
 
 
@@ -55,6 +64,8 @@ def _zipped(number: int, table: Mapping[str, Any], refusal: Refusal) -> list[dic
         found = ", ".join(f"{length} for {key}" for key, length in lengths.items())
         raise refusal(f"sweep.{number}", f"found {found}: expected lists of one length, at least 1")
     runs = next(iter(lengths.values()), 1)
+    if runs > MOST_CASES:
+        raise refusal(f"sweep.{number}", f"found {runs} cases: expected at most {MOST_CASES}")
     return [{key: v[run] if isinstance(v, list) else v for key, v in table.items()} for run in range(runs)]
 
 

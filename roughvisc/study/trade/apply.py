@@ -44,7 +44,7 @@ def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:
     """
     path = Path(path).resolve()  # a link stays one
     try:
-        document = tomlkit.parse(path.read_text(encoding="utf-8"))
+        document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (TOMLKitError, UnicodeDecodeError) as error:

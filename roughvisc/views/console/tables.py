@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 from scipy import special
 
+from roughvisc.errors import printable
 from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
 
@@ -350,5 +351,5 @@ def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for label, value in rows:
-        table.add_row(label, Text(str(value)))  # names in files may look like markup
-    return Group(Text(title or "untitled", style="bold"), table)
+        table.add_row(Text(label), Text(printable(str(value))))  # names in files may look like markup
+    return Group(Text(printable(title or "untitled"), style="bold"), table)

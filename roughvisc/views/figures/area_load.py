@@ -14,7 +14,16 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
+from roughvisc.views.figures.axes import (
+    CYCLE,
+    new_figure,
+    require,
+    spans_decades,
+    spread_axis,
+    styled,
+    unit_for,
+    verbatim,
+)
 from roughvisc.views.figures.histories import leave_room, marker_of
 from roughvisc.views.observables import history
 
@@ -85,7 +94,7 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
         colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
         nested = 2.2 - 1.2 * number / max(1, len(cases) - 1)  # a line shows on both sides of another on it
         style = {"color": colour, "marker": marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
-        ax.plot(x, y, label=label if len(cases) <= 12 else "_", **style)
+        ax.plot(x, y, label=verbatim(label) if len(cases) <= 12 else "_", **style)
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
     top = float(np.max(np.concatenate(loads)))
     drawn = _draw_low_load_lines(ax, next(iter(cases.values())), moduli, top, across, up)

@@ -18,7 +18,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
 from roughvisc.labels import expect_declared_units
 from roughvisc.units import Unit, unit_for
 
@@ -201,6 +201,11 @@ def frame_at(times, time: float) -> int:
 
 
 # --------------------------------------------------------------------------------------------------------- data
+
+
+def verbatim(text: str) -> str:
+    """A text of the user as a figure shows it, letter by letter: dollars begin no formula."""
+    return printable(text).replace("$", r"\$")
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:

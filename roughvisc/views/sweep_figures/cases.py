@@ -15,7 +15,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import Unit, unit_for
+from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_names import names_of
 from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, setting_unit
 
@@ -83,7 +83,8 @@ class Parameter:
         """Every level as a reader wants it: numbers with their unit, files without their folders."""
         if self.numeric:
             return [ENDLESS if np.isinf(value) else self.unit.text(value, 4) for value in self.levels]
-        return [textwrap.shorten(text, 60, placeholder="…") for text in _category_texts(self.levels.tolist(), self.key)]
+        texts = _category_texts(self.levels.tolist(), self.key)
+        return [verbatim(textwrap.shorten(text, 60, placeholder="…")) for text in texts]
 
 
 def _index(levels: list, value: Any) -> int:

@@ -20,7 +20,8 @@ from rich.console import Console
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.errors import InputError, InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
+from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
@@ -28,7 +29,7 @@ from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence, Watch
 from roughvisc.study.statement.case import Case, read_cases, vary
 from roughvisc.study.storage.failures import record_path
-from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.table import CASES
 
@@ -88,6 +89,20 @@ def by_hand(tmp_path_factory):
     log.close()
 
 
+@contextlib.contextmanager
+def in_this_process(processes):
+    """A cluster whose workers are threads, so that they see what a test has changed."""
+    from distributed import Client, LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=processes, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
 def numbers(folder):
     """Every variable but the wall time of every result in a folder."""
     found = {}
@@ -106,7 +121,9 @@ def assert_same(one, other):
 def leftovers(folder):
     """What is in a folder besides results, records, log and index."""
     return [
-        p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, "inputs")
+        p.name
+        for p in folder.iterdir()
+        if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, LATEST, "inputs")
     ]
 
 
@@ -191,7 +208,7 @@ def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
     xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
 
 
-def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand):
+def test_sweep__blames_no_case_whose_worker_dies_twice(study, tmp_path, by_hand):
     (case,) = study(LONG)
     with connect(file=by_hand) as client:
         killed = kill_working(client, times=2)
@@ -199,6 +216,7 @@ def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand)
             sweep([case], tmp_path / "out", client, progress=False)
         killed.join()
         client.wait_for_workers(2, timeout=60)
+    assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
 def kill_working(client, times):
@@ -289,7 +307,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     assert leftovers(tmp_path / "out") == [], "the records go when the cases are done"
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "x.nc"), InUseError("in use")])
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error", "x.nc"), InUseError("in use"), MemoryError()])
 def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
     cases = study()
 
@@ -299,8 +317,49 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     monkeypatch.setattr(task_module, "run_case", hindered)
     outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
     assert {o.kind for o in outcomes.values()} == {"hindered"}
+    assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatch, capfd, workers):
+    """The second case finds no space: those after it are not begun, and the same command goes on."""
+    cases, bring = study(), run_module.run_case
+
+    def full(case, folder, **settings):
+        (tmp_path / f"begun-{len(list(tmp_path.glob('begun*')))}").touch()
+        if len(list(tmp_path.glob("begun*"))) == 2:
+            raise OSError(28, "No space left on device; make room", "x.nc")
+        return bring(case, folder, **settings)
+
+    if workers:  # the processes of a local cluster are forked from one that has not seen this
+        monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
+    monkeypatch.setattr(task_module, "run_case", full)
+    with pytest.raises(DiskFullError, match=r"^x\.nc: No space left .*make room \(1 of 4 cases are finished\)$"):
+        run_cases(cases, tmp_path / "out", watch=Silence(), workers=workers)
+    begun = len(list(tmp_path.glob("begun*")))
+    assert begun == 2 if workers == 0 else begun < 4
+    assert not list((tmp_path / "out").glob("*.failed.json"))
+    assert "No space left" in (tmp_path / "out" / "sweep.log").read_text()
+    monkeypatch.undo()
+    assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "sweep.log").symlink_to("/dev/full")
+    assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
+    assert capfd.readouterr().err == ""
+
+
+def test_run__a_folder_that_may_no_longer_be_written_to_keeps_the_checkpoint(study, tmp_path, monkeypatch):
+    (case,) = study(BALL)
+    write = run_module.write_result
+    monkeypatch.setattr(run_module, "write_result", lambda ds, path, **how: write(ds, "/proc/none/x.nc", **how))
+    outcomes = run_cases([case], tmp_path / "out", watch=Silence(), workers=0)
+    assert outcomes[case.key].kind == "hindered"
+    assert "/proc/none: cannot be made" in outcomes[case.key].message
 
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
@@ -536,13 +595,11 @@ def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
 
 def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     synthetic(tmp_path, loads=1, seeds=1, times=3)
-    (tmp_path / f"{0:08x}{0:08x}.nc").rename(tmp_path / "a.nc")
-    synthetic(tmp_path, loads=1, seeds=1, times=5)
-    (tmp_path / "a.nc").rename(tmp_path / "other.nc")
-    with open_result(tmp_path / "other.nc") as ds:
+    with open_result(tmp_path / f"{0:08x}{0:08x}.nc") as ds:
         ds = ds.load()
     ds.attrs["case_key"] = "f" * 16
-    write_result(ds, tmp_path / "other.nc")
+    write_result(ds, tmp_path / f"{'f' * 16}.nc")
+    synthetic(tmp_path, loads=1, seeds=1, times=5)
     with pytest.raises(InputError, match=r"no common times \(5 and 3\): open them with ragged=True"):
         rv.open_results(tmp_path)
     tree = rv.open_results(tmp_path, ragged=True)
@@ -550,6 +607,42 @@ def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     assert tree["f" * 16].sizes["time"] == 3
     assert tree[f"{0:08x}{0:08x}"].ds.pressure.values.shape == (5, 8, 6)
     assert float(tree["f" * 16]["program.0.load"]) == 0.5
+
+
+def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    key = f"{3:08x}{2:08x}"
+    with open_result(folder / f"{key}.nc") as ds:
+        derived = ds.load()
+    derived["force"][:] = 77.0
+    for name in ("000-mean.nc", f"{'f' * 16}.nc", "zz.nc"):
+        write_result(derived, folder / name)
+    (folder / INDEX).unlink()
+    ds = rv.open_results(folder)
+    assert ds.sizes["case"] == 60
+    assert float(ds.force.max()) == 5.0
+    assert f"{'f' * 16}.nc: holds the result of case {key}" in caplog.text
+
+
+def test_open_results__no_bit_of_the_index_changes_what_a_sweep_returns(study, tmp_path):
+    out, cases = tmp_path / "out", study()
+    sweep(cases, out, workers=0, progress=False)
+    assert sweep(cases[:2], out, workers=0, progress=False).sizes["case"] == 2
+    rng = np.random.default_rng(5)
+    for name in (INDEX, LATEST):
+        whole = np.fromfile(out / name, np.uint8)
+        for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
+            damaged = whole.copy()
+            damaged[at] ^= 1 << rng.integers(8)
+            damaged.tofile(out / name)
+            with contextlib.suppress(InputError) if name == LATEST else contextlib.nullcontext():
+                assert list(rv.open_results(out).case_key) == [case.key for case in cases[:2]], at
+        whole.tofile(out / name)
+    (out / LATEST).write_text("[]")
+    with pytest.raises(InputError, match=rf"{LATEST}: is damaged: expected the cases of the sweep that ran last"):
+        rv.open_results(out)
+    assert rv.open_results(out, cases="all").sizes["case"] == 4
 
 
 def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):

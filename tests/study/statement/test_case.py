@@ -456,10 +456,10 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | keep.times: found 6 s: expected times up to the end of the program, 5.05 s
 
 [surface]  =>  [keep]\ntimes = 0\n[surface]
-| keep.times: found 0: expected a whole number at least 1
+| keep.times: found 0: expected a whole number at least 1 and up to 1e+06
 
 [surface]  =>  [solve]\ntolerance = 0\n[surface]
-| solve.tolerance: found 0: expected a number above 0 and below 1
+| solve.tolerance: found 0: expected a number at least 1e-12 and below 1
 
 [surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
 | solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
