@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import logging
 import os
-import secrets
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.book import Book, Watcher
 from roughvisc.study.execution.cluster import local_client
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.execution.script import refuse_unguarded_script
-from roughvisc.study.execution.task import Outcome, bring, on_worker, outcome_of, stop_sweep
+from roughvisc.study.execution.task import Outcome, bring, outcome_of
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.storage.failures import forget_failure, record_failure, recorded_failure
-from roughvisc.study.storage.index import Entry, Index, index_of, save_index
+from roughvisc.study.storage.failures import forget_failure, recorded_failure
+from roughvisc.study.storage.index import Index, index_of
 from roughvisc.study.storage.results import open_results
 
 if TYPE_CHECKING:
@@ -32,32 +29,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 LOG = "sweep.log"
-#: Seconds between two savings of the index while a sweep runs.
-_SAVE_EVERY = 60.0
-#: Seconds that running cases get to reach the end of their step when a sweep is interrupted.
-_PATIENCE = 120.0
-
-
-class Watcher(Protocol):
-    """Who is told how a sweep goes on; times in seconds."""
-
-    def begin(self, cases: Sequence[Case], link: str) -> None:
-        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
-
-    def reached(self, key: str, now: float, end: float) -> None:
-        """A running case is at this time of so much; from any thread."""
-
-    def ended(self, outcome: Outcome) -> None:
-        """A case ended."""
-
-    def tick(self) -> None:
-        """Called several times a second."""
-
-    def stopping(self) -> None:
-        """The sweep is interrupted and waits for the running cases to stop."""
-
-    def close(self) -> None:
-        """Nothing more follows."""
 
 
 def sweep(
@@ -170,7 +141,7 @@ def run_cases(
                     folder.rmdir()
                 raise
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        book = _Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
+        book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
             _compute(todo, folder, book, client, workers)
         except KeyboardInterrupt:
@@ -199,64 +170,26 @@ def _known(distinct: Mapping[str, Case], folder: Path, index: Index, retry_faile
     return outcomes
 
 
-@dataclass
-class _Book:
-    """Keeps account of a sweep: who is told, what is recorded, what the index holds."""
-
-    folder: Path
-    cases: Mapping[str, Case]
-    outcomes: dict[str, Outcome]
-    watch: Watcher
-    entries: list[Entry]
-    saved: float = 0.0
-
-    def begin(self, link: str = "") -> None:
-        self.saved = time.monotonic()
-        self.watch.begin(list(self.cases.values()), link)
-        for outcome in self.outcomes.values():
-            self.watch.ended(outcome)
-        if link:
-            log.info("dashboard: %s", link)
-
-    def ended(self, outcome: Outcome) -> None:
-        self.outcomes[outcome.key] = outcome
-        case = self.cases[outcome.key]
-        varied = json.dumps(dict(case.varied))
-        level = logging.INFO if outcome.kind == "done" else logging.WARNING
-        log.log(level, "%s %s %.3g s %s %s", outcome.key, outcome.kind, outcome.seconds, varied, outcome.message)
-        if outcome.trace:
-            log.error("%s", outcome.trace)
-        if outcome.kind == "failed" and len(self.cases) > 1:
-            record_failure(self.folder, case, outcome.message, outcome.error, outcome.trace)
-        elif outcome.entry is not None:
-            self.entries.append(outcome.entry)
-            forget_failure(self.folder, outcome.key)
-        self.watch.ended(outcome)
-        if time.monotonic() - self.saved > _SAVE_EVERY:
-            self.save()
-
-    def save(self) -> None:
-        self.saved = time.monotonic()
-        entries = index_of(self.folder, self.entries).entries
-        save_index(self.folder, Index(entries, tuple(self.cases)))
-
-
-def _compute(todo: Mapping[str, Case], folder: Path, book: _Book, client: Client | None, workers: int | None) -> None:
+def _compute(todo: Mapping[str, Case], folder: Path, book: Book, client: Client | None, workers: int | None) -> None:
     from dask.system import CPU_COUNT
 
-    if client is not None and todo:
-        luggage = folder / "inputs"
-        texts = {key: pack(case, luggage) for key, case in todo.items()}
-        _distributed(texts, folder, book, client, None, client.dashboard_link)
-    elif not (processes := _processes(workers, len(todo))):
+    processes = _processes(workers, len(todo)) if client is None else 0
+    if not todo or (client is None and not processes):
         book.begin()
         for case in todo.values():
             book.ended(_here(case, folder, book, CPU_COUNT))
-    else:
-        texts = {key: case.to_json() for key, case in todo.items()}
-        with local_client(processes) as own:
-            link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-            _distributed(texts, folder, book, own, max(1, CPU_COUNT // processes), link)
+        return
+    from roughvisc.study.execution.dispatch import distribute
+
+    if client is not None:
+        luggage = folder / "inputs"
+        texts = {key: pack(case, luggage) for key, case in todo.items()}
+        distribute(texts, folder, book, client, None, client.dashboard_link)
+        return
+    texts = {key: case.to_json() for key, case in todo.items()}
+    with local_client(processes) as own:
+        link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
+        distribute(texts, folder, book, own, max(1, CPU_COUNT // processes), link)
 
 
 def _processes(workers: int | None, cases: int) -> int:
@@ -268,76 +201,12 @@ def _processes(workers: int | None, cases: int) -> int:
     return min(workers or CPU_COUNT, cases)
 
 
-def _here(case: Case, folder: Path, book: _Book, threads: int) -> Outcome:
+def _here(case: Case, folder: Path, book: Book, threads: int) -> Outcome:
     def report(now: float, end: float) -> None:
         book.watch.reached(case.key, now, end)
         book.watch.tick()
 
     return bring(case, folder, progress=report, stop=None, threads=threads)
-
-
-def _distributed(
-    texts: Mapping[str, str], folder: Path, book: _Book, client: Client, threads: int | None, link: str
-) -> None:
-    """One future a case; small arguments and a small outcome each."""
-    from distributed import as_completed
-
-    name = f"roughvisc-{secrets.token_hex(4)}"
-    client.subscribe_topic(name, lambda event: book.watch.reached(event[1]["key"], event[1]["now"], event[1]["end"]))
-    try:
-        book.begin(link)
-        futures = {
-            client.submit(on_worker, text, key, str(folder), name, threads, key=f"{name}-{key}", pure=False): key
-            for key, text in texts.items()
-        }
-        finished = as_completed(futures, loop=client.loop, with_results=True, raise_errors=False)
-        try:
-            _drain(finished, futures, book)
-        except KeyboardInterrupt:
-            book.watch.stopping()
-            client.run(stop_sweep, name, on_error="ignore")
-            _drain(finished, futures, book, _PATIENCE)
-            client.cancel(list(futures))
-            raise
-    finally:
-        with suppress(Exception):  # the scheduler may be gone
-            client.unsubscribe_topic(name)
-
-
-def _drain(finished: Any, futures: dict[Any, str], book: _Book, patience: float = float("inf")) -> None:
-    """Take up what ends, until nothing is left."""
-    until = time.monotonic() + patience
-    while futures and time.monotonic() < until:
-        for future, result in finished.next_batch(block=False):
-            outcome = _outcome(futures.pop(future), result)
-            if outcome.kind != "interrupted":
-                book.ended(outcome)
-        book.watch.tick()
-        time.sleep(0.1)
-
-
-def _outcome(key: str, result: Any) -> Outcome:
-    """What a future came to."""
-    from concurrent.futures import CancelledError as Cancelled
-
-    from distributed import CancelledError, KilledWorker
-
-    if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
-        result = result[1]
-    if isinstance(result, Outcome):
-        return result
-    if isinstance(result, KilledWorker):
-        times = result.allowed_failures + 1
-        return Outcome(
-            key,
-            "failed",
-            f"the process that computed it died {times} times, the last on {result.last_worker.address}: killed, or "
-            "out of memory (roughvisc plan says how much a case needs)",
-            "KilledWorker",
-        )
-    if isinstance(result, CancelledError | Cancelled):
-        raise RoughviscError("the scheduler was lost: what was finished is kept, and the same command goes on")
-    return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 from scipy import fft
@@ -33,6 +33,15 @@ _REPORT_EVERY = 0.5
 _stopped: set[str] = set()
 #: netCDF-4 does not stand two threads, so a process brings one case at a time whatever its number of threads.
 _one_at_a_time = threading.Lock()
+
+
+class Report(TypedDict):
+    """What a worker reports of a case: the time reached and the time at the end, both 0 when it begins. [s]"""
+
+    key: str
+    worker: str
+    now: float
+    end: float
 
 
 @dataclass(frozen=True)
@@ -111,6 +120,8 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
 def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:
     """The task of a worker: :func:`bring`, with progress sent to the scheduler.
 
+    It ends as interrupted, with a checkpoint, if the sweep is stopped or the worker told to leave.
+
     Parameters
     ----------
     text : str
@@ -126,17 +137,24 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
     """
     from distributed import get_worker
 
+    from roughvisc.study.execution.worker import is_leaving, leave_in_order
+
     worker = get_worker()
+    leave_in_order(worker)
     last = -np.inf
 
     def report(now: float, end: float) -> None:
         nonlocal last
         if time.monotonic() - last >= _REPORT_EVERY:
             last = time.monotonic()
-            worker.log_event(sweep, {"key": key, "now": float(now), "end": float(end)})
+            event: Report = {"key": key, "worker": worker.address, "now": float(now), "end": float(end)}
+            worker.log_event(sweep, event)
+
+    def stop() -> bool:
+        return sweep in _stopped or is_leaving(worker)
 
     with _one_at_a_time:
-        if sweep in _stopped:
+        if stop():
             return Outcome(key, "interrupted")
         report(0.0, 0.0)
         try:
@@ -145,7 +163,7 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
                 there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
                 return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
             threads = threads or worker.state.nthreads
-            return bring(case, Path(folder), progress=report, stop=lambda: sweep in _stopped, threads=threads)
+            return bring(case, Path(folder), progress=report, stop=stop, threads=threads)
         except RoughviscError as error:  # a file that this machine does not have
             return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it
