@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
+from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.variables import of_step
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def open_result(path: str | Path) -> xr.Dataset:
-    """Open a result; its data are read when they are asked for.
+    """Open a result; its fields are read when they are asked for, in whatever thread or process.
 
     Parameters
     ----------
@@ -303,13 +303,12 @@ def open_result(path: str | Path) -> xr.Dataset:
     if path.is_dir():
         raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
     try:
-        dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
+        dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
     absent = [name for name in ("time", "force", "approach") if name not in dataset.variables]
     if absent:
-        dataset.close()
         raise InputError(f"{path}: holds no {', '.join(absent)}: expected a result of roughvisc")
     return dataset

@@ -169,8 +169,11 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
 
     class CtrlC(Ear):
         def tick(self):
-            if self.messages:
+            if self.messages and not self.pressed:
+                self.pressed = True
                 raise KeyboardInterrupt
+
+        pressed = False
 
     ear = CtrlC()
     with bare_cluster() as client, pytest.raises(KeyboardInterrupt):
