@@ -137,7 +137,7 @@ def distribute(
     ------
     RoughviscError
         If the scheduler was lost.
-    KeyboardInterrupt
+    KeyboardInterrupt, SystemExit
         If interrupted; the running cases have written a checkpoint by then, if their workers are there.
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
@@ -151,7 +151,7 @@ def distribute(
             cases.submit(key)
         try:
             _go_on(cases)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit):  # dask-jobqueue makes a Ctrl-C the latter
             book.watch.stopping()
             _stop(cases)
             raise

@@ -144,7 +144,7 @@ def run_cases(
         book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
             _compute(todo, folder, book, client, workers)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise
         finally:

@@ -163,7 +163,8 @@ def test_lost_workers__may_still_hold_the_lock_of_their_case():
 
 
 @pytest.mark.timeout(60)  # Ctrl-C waits for nobody where there is nobody
-def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch):
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit])
+def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch, interruption):
     monkeypatch.setattr(dispatch, "_ALONE_AFTER", 0.3)
     monkeypatch.setattr(dispatch, "_LOOK_EVERY", 0.1)
 
@@ -171,16 +172,17 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
         def tick(self):
             if self.messages and not self.pressed:
                 self.pressed = True
-                raise KeyboardInterrupt
+                raise interruption
 
         pressed = False
 
     ear = CtrlC()
-    with bare_cluster() as client, pytest.raises(KeyboardInterrupt):
+    with bare_cluster() as client, pytest.raises(interruption):
         run_cases(study(), tmp_path / "out", watch=ear, client=client)
     (message,) = ear.messages
     assert message.startswith("the cluster has had no worker for 0 s (4 cases to go): start workers")
-    assert "the cluster has had no worker" in (tmp_path / "out" / "sweep.log").read_text()
+    assert "the cluster has had no worker" in (logged := (tmp_path / "out" / "sweep.log").read_text())
+    assert "interrupted after 0 of 4 cases" in logged
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
