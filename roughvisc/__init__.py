@@ -34,7 +34,7 @@ _PUBLIC = {
         "roughvisc.study.statement.histories": "read_program",
         "roughvisc.study.statement.case": "read_study read_cases vary study_schema",
         "roughvisc.study.storage.store": "open_result",
-        "roughvisc.study.execution.run": "run",
+        "roughvisc.study.execution.single": "run",
         "roughvisc.study.execution.sweep": "sweep",
         "roughvisc.study.storage.results": "open_results",
         "roughvisc.study.cost.plan": "plan",

@@ -13,6 +13,9 @@ from typing import Any
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import whole_file
 
+#: Folder of the copies, in that of the results.
+INPUTS = "inputs"
+
 
 def pack(case: Case, folder: Path) -> str:
     """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.

@@ -95,7 +95,7 @@ class Book:
             self.entries.append(outcome.entry)
             forget_failure(self.folder, outcome.key)
         self.watch.ended(outcome)
-        if time.monotonic() - self.saved > _SAVE_EVERY:
+        if len(self.cases) > 1 and time.monotonic() - self.saved > _SAVE_EVERY:
             self.save()
 
     def tell(self, message: str) -> None:

@@ -6,7 +6,7 @@ import logging
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,6 +54,19 @@ def local_client(processes: int) -> Iterator[Client]:
     ):
         client.run(_leave_interrupts_to_the_sweep)
         yield client
+
+
+def default_client() -> Client | None:
+    """The client that the user has made the default; none within a Dask task, which is there to compute itself."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:  # nobody has made one
+        return None
+    with suppress(ValueError):
+        distributed.get_worker()
+        return None
+    with suppress(ValueError):
+        return distributed.default_client()
+    return None
 
 
 def _quick_start() -> dict[str, str]:

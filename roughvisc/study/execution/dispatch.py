@@ -15,9 +15,13 @@ from typing import Any
 
 from distributed import CancelledError, Client, KilledWorker, as_completed
 
+from roughvisc import errors
 from roughvisc.errors import RoughviscError
+from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book
-from roughvisc.study.execution.task import Outcome, Report, on_worker, stop_sweep
+from roughvisc.study.execution.task import Outcome, Progress, Report, on_worker, stop_sweep
+from roughvisc.study.execution.watch import Silence, watcher
+from roughvisc.study.statement.case import Case
 
 log = logging.getLogger("roughvisc")
 
@@ -158,6 +162,38 @@ def distribute(
     finally:
         with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be gone
             client.unsubscribe_topic(name)
+
+
+def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress) -> Path:
+    """Bring one case to its file on a worker, and give the file's path.
+
+    Raises
+    ------
+    RoughviscError
+        As :func:`roughvisc.study.execution.run.run_case`; what else went wrong there is one, too.
+    """
+    watch = _Heard(progress) if callable(progress) else watcher(progress)
+    book = Book(folder, {case.key: case}, {}, watch, [])
+    try:
+        distribute({case.key: pack(case, folder / INPUTS)}, folder, book, client, None, client.dashboard_link)
+    finally:
+        watch.close()
+    outcome = book.outcomes[case.key]
+    if outcome.entry is None:
+        kind = getattr(errors, outcome.error, RoughviscError)
+        raise kind(outcome.message)
+    return folder / outcome.entry.file
+
+
+class _Heard(Silence):
+    """Passes the times reached on to a function."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+
+    def reached(self, key: str, now: float, end: float) -> None:
+        if end:
+            self._progress(now, end)
 
 
 def _go_on(cases: _Dispatch) -> None:

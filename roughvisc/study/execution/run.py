@@ -21,7 +21,7 @@ from roughvisc.errors import ConvergenceError, InputError, InUseError, Roughvisc
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.simulate import press
-from roughvisc.study.statement.case import Case, read_study
+from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.store import open_result, result_path, torn_files, write_result
@@ -41,42 +41,6 @@ Progress = Callable[[float, float], None]
 
 #: Attributes of a surface that stay with the result: whence it came, and what was made up where it was missing.
 SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
-
-
-def run(case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True) -> xr.Dataset:
-    """Compute one case and keep it in one file.
-
-    Parameters
-    ----------
-    case : Case or path
-        A case, or the study file that states one.
-    out : path, optional
-        Folder of the result. Default: ``results/`` and the study's name, beside the study.
-    progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length. [s]
-
-    Returns
-    -------
-    xarray.Dataset
-        The result, ``(time, x, y)``, whose fields are read from its file when they are asked for; the file is
-        ``ds.encoding["source"]``, named by the case's key. A case that was finished before is not computed again, one
-        that was interrupted goes on; see :func:`run_case`.
-
-    Raises
-    ------
-    InputError
-        If the input is wrong; nothing is written.
-    ConvergenceError
-        If a step did not converge. The result is written all the same, and the message says where.
-    """
-    if not isinstance(case, Case):
-        case = read_study(case)
-    path = run_case(case, result_folder(case, out), progress=progress)
-    dataset = open_result(path)
-    complaint = unconverged(dataset)
-    if complaint:
-        raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
-    return dataset
 
 
 def result_folder(case: Case, out: str | Path | None = None) -> Path:
@@ -167,7 +131,7 @@ def run_case(
     folder : path
         Where the file goes; it is named by the case's key. What an unfinished run keeps is in hidden files beside it.
     progress : bool or callable
-        As in :func:`run`.
+        A progress bar, or a function called with the time reached and the program's length. [s]
     stop : callable, optional
         Asked at every accepted step; if it says so, a checkpoint is written and :class:`KeyboardInterrupt` raised.
     checkpoint_seconds : float
@@ -178,8 +142,7 @@ def run_case(
     Raises
     ------
     InputError, ConvergenceError
-        As :func:`run`; also if a checkpoint was written by other versions, whose last digits differ. An unconverged
-        result is kept and none of these.
+        As :func:`roughvisc.run`. An unconverged result is kept and none of these.
     InUseError
         If another run is at work on this case in this folder.
     OSError

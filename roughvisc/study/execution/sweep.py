@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book, Watcher
-from roughvisc.study.execution.cluster import local_client
+from roughvisc.study.execution.cluster import default_client, local_client
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.task import Outcome, bring, outcome_of
@@ -54,8 +54,9 @@ def sweep(
         Folder of the results, on a file system that all workers see under the same path. Default: ``results/`` and
         the study's name, beside the study.
     client : distributed.Client, optional
-        Where to compute. Default: a cluster on this machine, one process a core; a single case is computed in
-        this process.
+        Where to compute. Default: the client that you have made the default by making one (``Client()``); if there
+        is none, or `workers` is given, a cluster on this machine, one process a core, and for a single case this
+        process.
     retry_failed : bool
         Compute cases again that failed before.
     progress : bool
@@ -82,6 +83,8 @@ def sweep(
     if not cases:
         raise InputError("cases is empty: expected at least one case")
     folder = result_folder(cases[0], out).absolute()
+    if client is None and workers is None:
+        client = default_client()
     from roughvisc.study.execution.watch import watcher
 
     outcomes = run_cases(
@@ -182,8 +185,7 @@ def _compute(todo: Mapping[str, Case], folder: Path, book: Book, client: Client 
     from roughvisc.study.execution.dispatch import distribute
 
     if client is not None:
-        luggage = folder / "inputs"
-        texts = {key: pack(case, luggage) for key, case in todo.items()}
+        texts = {key: pack(case, folder / INPUTS) for key, case in todo.items()}
         distribute(texts, folder, book, client, None, client.dashboard_link)
         return
     texts = {key: case.to_json() for key, case in todo.items()}

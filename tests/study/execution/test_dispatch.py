@@ -14,12 +14,14 @@ import xarray as xr
 from distributed import Client, KilledWorker, LocalCluster
 from support import LOADS, LONG, assert_same, numbers
 
-from roughvisc.errors import InUseError, RoughviscError
+import roughvisc as rv
+from roughvisc.errors import EdgeContactError, InUseError, RoughviscError
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.task import Outcome
 from roughvisc.study.execution.watch import Silence, Watch
+from roughvisc.study.statement.case import vary
 from roughvisc.study.storage.failures import record_path
 
 pytestmark = pytest.mark.filterwarnings(
@@ -71,6 +73,39 @@ class Ear(Silence):
         while not condition(self.heard):
             assert time.monotonic() < until, "never heard of"
             time.sleep(0.02)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the client that the user has made the default
+
+
+def test_default_client__computes_cases_and_sweeps(study, tmp_path, monkeypatch):
+    cases, reached, submitted = study(), [], []
+    submit = dispatch._Dispatch.submit
+
+    def noted(self, key):
+        submitted.append(key)
+        submit(self, key)
+
+    monkeypatch.setattr(dispatch._Dispatch, "submit", noted)
+    first, second, third, fourth = (case.key for case in cases)
+    rv.run(cases[0], tmp_path / "here", progress=False)
+    with (
+        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster) as client,
+    ):
+        ds = rv.run(cases[0], tmp_path / "one", progress=lambda now, end: reached.append(end))
+        rv.sweep(cases[:2], tmp_path / "several", progress=False)
+        within = client.submit(rv.run, cases[2], tmp_path / "task", progress=False, pure=False).result()
+        rv.sweep(cases[3:], tmp_path / "several", workers=0, progress=False)
+        with pytest.raises(EdgeContactError, match="boundary"):
+            rv.run(vary(cases[0], {"program.0.load": 50.0}), tmp_path / "one", progress=False)
+    assert submitted[:-1] == [first, first, second], "but neither within a task nor with workers of its own"
+    assert within.attrs["case_key"] == third
+    assert (tmp_path / "several" / f"{fourth}.nc").exists()
+    assert ds.encoding["source"] == str(tmp_path / "one" / f"{first}.nc")
+    assert_same(numbers(tmp_path / "one"), numbers(tmp_path / "here"))
+    assert all(end == pytest.approx(0.2) for end in reached)
 
 
 # ----------------------------------------------------------------------------------------------------------------
