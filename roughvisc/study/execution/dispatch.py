@@ -17,6 +17,7 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 
 from roughvisc import errors
 from roughvisc.errors import RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book
 from roughvisc.study.execution.task import Outcome, Progress, Report, on_worker, stop_sweep
@@ -118,7 +119,7 @@ class _Dispatch:
 
 
 def distribute(
-    texts: Mapping[str, str], folder: Path, book: Book, client: Client, threads: int | None, link: str
+    texts: Mapping[str, str], book: Book, client: Client, threads: int | None, link: str, same_bits: bool
 ) -> None:
     """Bring cases to their ends on the workers of a client.
 
@@ -126,16 +127,16 @@ def distribute(
     ----------
     texts : dict
         Key -> case as JSON.
-    folder : Path
-        Of the results.
     book : Book
-        Keeps account.
+        Keeps account; its folder is that of the results.
     client : distributed.Client
         Of the workers.
     threads : int or None
         Of the transforms; None: as many as a worker has.
     link : str
         Address of Dask's dashboard, if there is one.
+    same_bits : bool
+        As in :func:`roughvisc.study.execution.run.run_case`.
 
     Raises
     ------
@@ -147,7 +148,8 @@ def distribute(
     name = f"roughvisc-{secrets.token_hex(4)}"
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
     courses = {key: _Course() for key in texts}
-    cases = _Dispatch(client, book, texts, (str(folder), name, threads), name, finished, courses)
+    transforms = transform_library() if same_bits else ""
+    cases = _Dispatch(client, book, texts, (str(book.folder), name, threads, transforms), name, finished, courses)
     client.subscribe_topic(name, cases.heard)
     try:
         book.begin(link)
@@ -164,7 +166,7 @@ def distribute(
             client.unsubscribe_topic(name)
 
 
-def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress) -> Path:
+def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, same_bits: bool) -> Path:
     """Bring one case to its file on a worker, and give the file's path.
 
     Raises
@@ -175,7 +177,7 @@ def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress) 
     watch = _Heard(progress) if callable(progress) else watcher(progress)
     book = Book(folder, {case.key: case}, {}, watch, [])
     try:
-        distribute({case.key: pack(case, folder / INPUTS)}, folder, book, client, None, client.dashboard_link)
+        distribute({case.key: pack(case, folder / INPUTS)}, book, client, None, client.dashboard_link, same_bits)
     finally:
         watch.close()
     outcome = book.outcomes[case.key]

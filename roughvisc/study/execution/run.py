@@ -7,7 +7,8 @@ import json
 import logging
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from importlib import metadata
@@ -83,11 +84,12 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
-    dataset.attrs = _provenance(case, dataset.attrs.pop("history", "")) | dataset.attrs | scan
+    transforms = transform_library() if keeper is None else keeper.saved.transforms
+    dataset.attrs = _provenance(case, dataset.attrs.pop("history", ""), transforms) | dataset.attrs | scan
     return dataset
 
 
-def _provenance(case: Case, before: str) -> dict[str, str]:
+def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -97,7 +99,7 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "title": case.title + varied,
         "source": f"roughvisc {version}",
-        "transforms": transform_library(),
+        "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
         "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "
@@ -117,6 +119,7 @@ def run_case(
     stop: Callable[[], bool] | None = None,
     checkpoint_seconds: float = 30.0,
     checkpoint_steps: int | None = None,
+    same_bits: bool = False,
 ) -> Path:
     """Bring one case to its file in a folder, and give the file's path.
 
@@ -138,6 +141,9 @@ def run_case(
         Time between checkpoints; longer where they would take a twentieth of the time. [s]
     checkpoint_steps : int, optional
         Accepted steps between checkpoints, whatever these take.
+    same_bits : bool
+        Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
+        digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
 
     Raises
     ------
@@ -150,7 +156,7 @@ def run_case(
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path) and not _leftovers(path):
+    if is_result_of(case, path, same_bits) and not _leftovers(path):
         return path
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     keep_memory()
@@ -166,14 +172,15 @@ def run_case(
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
                 stop=stop,
+                same_bits=same_bits,
             )
             with closing(keeper):
-                if not is_result_of(case, path):
+                if not is_result_of(case, path, same_bits):
                     keeper.resume()
                     _finish(case, folder, progress, keeper)
                 keeper.remove()
     except InUseError:
-        if is_result_of(case, path):  # the other run has just finished
+        if is_result_of(case, path, same_bits):  # the other run has just finished
             return path
         raise
     except OSError as error:
@@ -204,16 +211,33 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper)
         raise
 
 
-def is_result_of(case: Case, path: Path) -> bool:
-    """Whether a file is the whole result of a case."""
+def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
+    """Whether a file is the whole result of a case, and on request of the transforms that are here."""
     if not path.exists():
         return False
     try:
         with open_result(path) as dataset:
-            return bool(dataset.attrs.get("case_key") == case.key)
+            whole = bool(dataset.attrs.get("case_key") == case.key)
+            made_with = str(dataset.attrs.get("transforms", ""))
     except InputError as error:
         log.warning("%s", error)
         return False
+    if whole and made_with != transform_library():
+        log.warning("%s: %s", path, other_transforms([made_with]))
+        return not same_bits
+    return whole
+
+
+def other_transforms(made_with: Iterable[str]) -> str:
+    """What to tell of finished results by what they were made with; empty if there is nothing to tell."""
+    counts = Counter(made_with)
+    if set(counts) <= {transform_library()}:
+        return ""
+    found = ", ".join(f"{count} with {transforms}" for transforms, count in counts.items())
+    return (
+        f"{found}, where this process has {transform_library()}: equal within the tolerance, not to the last bit; "
+        "same_bits=True (--same-bits) computes the others anew"
+    )
 
 
 def _leftovers(path: Path) -> bool:

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def run(case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True) -> xr.Dataset:
+def run(
+    case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True, same_bits: bool = False
+) -> xr.Dataset:
     """Compute one case and keep it in one file.
 
     It is computed in this process, or by a worker of the ``dask.distributed.Client`` that you have made the default.
@@ -29,6 +31,9 @@ def run(case: Case | str | Path, out: str | Path | None = None, *, progress: boo
         beside the study.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
+    same_bits : bool
+        Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
+        digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
 
     Returns
     -------
@@ -48,11 +53,11 @@ def run(case: Case | str | Path, out: str | Path | None = None, *, progress: boo
         case = read_study(case)
     folder, client = result_folder(case, out), default_client()
     if client is None:
-        path = run_case(case, folder, progress=progress)
+        path = run_case(case, folder, progress=progress, same_bits=same_bits)
     else:
         from roughvisc.study.execution.dispatch import run_on
 
-        path = run_on(client, case, folder.absolute(), progress)
+        path = run_on(client, case, folder.absolute(), progress, same_bits)
     dataset = open_result(path)
     complaint = unconverged(dataset)
     if complaint:

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book, Watcher
 from roughvisc.study.execution.cluster import default_client, local_client
-from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.run import other_transforms, result_folder
 from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.task import Outcome, bring, outcome_of
 from roughvisc.study.statement.case import Case, read_cases
@@ -39,6 +40,7 @@ def sweep(
     retry_failed: bool = False,
     progress: bool = True,
     workers: int | None = None,
+    same_bits: bool = False,
 ) -> xr.Dataset:
     """Compute many cases, one file each, and open them together.
 
@@ -63,6 +65,8 @@ def sweep(
         Show how far it is.
     workers : int, optional
         Processes of the default cluster; 0: this process.
+    same_bits : bool
+        Compute anew what other versions of the transforms or of NumPy have computed; see :func:`roughvisc.run`.
 
     Returns
     -------
@@ -88,7 +92,13 @@ def sweep(
     from roughvisc.study.execution.watch import watcher
 
     outcomes = run_cases(
-        cases, folder, client=client, workers=workers, retry_failed=retry_failed, watch=watcher(progress)
+        cases,
+        folder,
+        client=client,
+        workers=workers,
+        retry_failed=retry_failed,
+        same_bits=same_bits,
+        watch=watcher(progress),
     )
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     for outcome in bad:
@@ -107,6 +117,7 @@ def run_cases(
     client: Client | None = None,
     workers: int | None = None,
     retry_failed: bool = False,
+    same_bits: bool = False,
 ) -> dict[str, Outcome]:
     """Bring all cases to their files; see :func:`sweep`.
 
@@ -134,7 +145,7 @@ def run_cases(
     folder.mkdir(parents=True, exist_ok=True)
     with _log_file(folder):
         index = index_of(folder)
-        outcomes = _known(distinct, folder, index, retry_failed)
+        outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         if client is None and _processes(workers, len(todo)):
             try:
@@ -146,7 +157,10 @@ def run_cases(
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
-            _compute(todo, folder, book, client, workers)
+            _compute(todo, folder, book, client, workers, same_bits)
+            told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
+            if told:
+                book.tell(told)
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise
@@ -160,38 +174,43 @@ def run_cases(
     return {key: outcomes[key] for key in distinct}
 
 
-def _known(distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool) -> dict[str, Outcome]:
+def _known(
+    distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool, same_bits: bool
+) -> dict[str, Outcome]:
     """What needs not be computed: finished cases, and those that are known to fail."""
     outcomes = {}
     for key in distinct:
         record = recorded_failure(folder, key)
-        if key in index.entries:
+        entry = index.entries.get(key)
+        if entry is not None and not (same_bits and entry.attributes.get("transforms") != transform_library()):
             forget_failure(folder, key)
-            outcomes[key] = outcome_of(index.entries[key], reused=True)
+            outcomes[key] = outcome_of(entry, reused=True)
         elif record is not None and not retry_failed:
             outcomes[key] = Outcome(key, "failed", record["message"], record["error"], reused=True)
     return outcomes
 
 
-def _compute(todo: Mapping[str, Case], folder: Path, book: Book, client: Client | None, workers: int | None) -> None:
+def _compute(
+    todo: Mapping[str, Case], folder: Path, book: Book, client: Client | None, workers: int | None, same_bits: bool
+) -> None:
     from dask.system import CPU_COUNT
 
     processes = _processes(workers, len(todo)) if client is None else 0
     if not todo or (client is None and not processes):
         book.begin()
         for case in todo.values():
-            book.ended(_here(case, folder, book, CPU_COUNT))
+            book.ended(_here(case, folder, book, CPU_COUNT, same_bits))
         return
     from roughvisc.study.execution.dispatch import distribute
 
     if client is not None:
         texts = {key: pack(case, folder / INPUTS) for key, case in todo.items()}
-        distribute(texts, folder, book, client, None, client.dashboard_link)
+        distribute(texts, book, client, None, client.dashboard_link, same_bits)
         return
     texts = {key: case.to_json() for key, case in todo.items()}
     with local_client(processes) as own:
         link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-        distribute(texts, folder, book, own, max(1, CPU_COUNT // processes), link)
+        distribute(texts, book, own, max(1, CPU_COUNT // processes), link, same_bits)
 
 
 def _processes(workers: int | None, cases: int) -> int:
@@ -203,12 +222,12 @@ def _processes(workers: int | None, cases: int) -> int:
     return min(workers or CPU_COUNT, cases)
 
 
-def _here(case: Case, folder: Path, book: Book, threads: int) -> Outcome:
+def _here(case: Case, folder: Path, book: Book, threads: int, same_bits: bool) -> Outcome:
     def report(now: float, end: float) -> None:
         book.watch.reached(case.key, now, end)
         book.watch.tick()
 
-    return bring(case, folder, progress=report, stop=None, threads=threads)
+    return bring(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)
 
 
 @contextmanager

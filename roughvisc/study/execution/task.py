@@ -15,6 +15,7 @@ import numpy as np
 from scipy import fft
 
 from roughvisc.errors import InUseError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
@@ -78,7 +79,15 @@ class Outcome:
     reused: bool = False
 
 
-def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bool] | None, threads: int) -> Outcome:
+def bring(
+    case: Case,
+    folder: Path,
+    *,
+    progress: Progress,
+    stop: Callable[[], bool] | None,
+    threads: int,
+    same_bits: bool = False,
+) -> Outcome:
     """Bring a case to its file and say how that ended; :class:`KeyboardInterrupt` passes through.
 
     Parameters
@@ -93,11 +102,13 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
         Asked at every step.
     threads : int
         Of the transforms.
+    same_bits : bool
+        As in :func:`roughvisc.study.execution.run.run_case`.
     """
     began = time.perf_counter()
     try:
         with fft.set_workers(threads):
-            path = run_case(case, folder, progress=progress, stop=stop)
+            path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
         kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
@@ -117,7 +128,7 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
     return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
 
 
-def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:
+def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None, transforms: str) -> Outcome:
     """The task of a worker: :func:`bring`, with progress sent to the scheduler.
 
     It ends as interrupted, with a checkpoint, if the sweep is stopped or the worker told to leave.
@@ -134,6 +145,8 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
         Name of the sweep: the topic of the reports, and what :func:`stop_sweep` is told.
     threads : int or None
         Of the transforms; None: as many as the worker has.
+    transforms : str
+        The library whose bits are asked for; empty: any.
     """
     from distributed import get_worker
 
@@ -159,11 +172,14 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
         report(0.0, 0.0)
         try:
             case = Case.from_json(text)
+            if transforms not in ("", transform_library()):
+                there = f"{worker.address} has {transform_library()}, and the bits of {transforms} are asked for"
+                return Outcome(key, "hindered", f"{there}: expected the same versions, or no same_bits")
             if case.key != key:
                 there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
                 return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
             threads = threads or worker.state.nthreads
-            return bring(case, Path(folder), progress=report, stop=stop, threads=threads)
+            return bring(case, Path(folder), progress=report, stop=stop, threads=threads, same_bits=bool(transforms))
         except RoughviscError as error:  # a file that this machine does not have
             return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it

@@ -9,6 +9,7 @@ import time
 from contextlib import contextmanager
 from types import SimpleNamespace
 
+import dask
 import pytest
 import xarray as xr
 from distributed import Client, KilledWorker, LocalCluster
@@ -16,6 +17,7 @@ from support import LOADS, LONG, assert_same, numbers
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError, InUseError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.sweep import run_cases, sweep
@@ -73,6 +75,65 @@ class Ear(Silence):
         while not condition(self.heard):
             assert time.monotonic() < until, "never heard of"
             time.sleep(0.02)
+
+
+@pytest.mark.long
+def test_killed_worker__with_all_cases_in_its_queue(study, tmp_path):
+    """A scheduler that forgives no death, and gives all cases to one worker at once: as bad as it can be."""
+    cases = study(LONG + LOADS)
+    settings = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": "inf"}
+    with dask.config.set(settings), bare_cluster() as client, worker_process(client):
+        client.wait_for_workers(1, timeout=60)
+        killed = kill_working(client, times=1)
+        outcomes = run_cases(cases, tmp_path / "out", watch=Ear(), client=client)
+        killed.join()
+        assert killed.victims
+    assert [o.kind for o in outcomes.values()] == ["done"] * 4
+
+
+@pytest.mark.long
+def test_lifetime__of_each_worker_is_shorter_than_the_sweep(study, tmp_path):
+    cases = study(LONG.replace('hold = "0.2 s"', 'hold = "0.4 s"').replace(', "200 ms"', "") + LOADS)
+    lifetime = ["--lifetime", "5s", "--lifetime-stagger", "1s", "--lifetime-restart"]
+    with bare_cluster() as client, worker_process(client, *lifetime), worker_process(client, *lifetime):
+        outcomes = run_cases(cases, tmp_path / "out", watch=(ear := Ear()), client=client)
+    assert [o.kind for o in outcomes.values()] == ["done"] * 4
+    assert sum(end == 0 for _, _, end in ear.heard) > 4, "some were begun again"
+    run_cases(cases, tmp_path / "calm", watch=Silence(), workers=0)
+    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# workers with other transforms
+
+
+def test_other_transforms__are_told_and_computed_anew_on_request(study, tmp_path, monkeypatch):
+    cases, ear = study()[:2], Ear()
+    scipy = transform_library()
+    run_cases(cases[:1], tmp_path, watch=ear, workers=0)
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
+    ducc0 = transform_library()
+    assert not ear.messages
+    assert [o.reused for o in run_cases(cases, tmp_path, watch=ear, workers=0).values()] == [True, False]
+    (message,) = ear.messages
+    assert message.startswith(f"1 with {scipy}, 1 with {ducc0}, where this process has {ducc0}: equal within")
+    outcomes = run_cases(cases, tmp_path, watch=ear, workers=0, same_bits=True)
+    assert [o.reused for o in outcomes.values()] == [False, True]
+    assert {o.entry.attributes["transforms"] for o in outcomes.values()} == {ducc0}
+    assert ear.messages == [message]
+
+
+def test_other_transforms__on_a_worker_are_named_where_bits_are_asked_for(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(dispatch, "transform_library", lambda: "fftw 3")
+    cases, here = study()[:2], transform_library()
+    with (
+        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        asked = run_cases(cases[:1], tmp_path, watch=Ear(), client=client, same_bits=True)[cases[0].key]
+        other = run_cases(cases[1:], tmp_path, watch=Ear(), client=client)[cases[1].key]
+    assert (asked.kind, other.kind) == ("hindered", "done")
+    assert f" has {here}, and the bits of fftw 3 are asked for" in asked.message
 
 
 # ----------------------------------------------------------------------------------------------------------------
