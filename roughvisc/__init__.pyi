@@ -22,7 +22,7 @@ from roughvisc.mechanics.materials.temperature import shifted as shifted
 from roughvisc.mechanics.materials.temperature import wlf_shift as wlf_shift
 from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.study.cost.plan import plan as plan
-from roughvisc.study.execution.run import run as run
+from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.simulation.friction import friction as friction
 from roughvisc.study.simulation.simulate import simulate as simulate

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import roughvisc as rv
@@ -12,6 +13,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
+from roughvisc.study.storage.store import open_result
 from roughvisc.units import quantity
 
 RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
@@ -53,6 +55,25 @@ hold = "0.2 s"
 fields = ["pressure", "displacement"]
 times = [0, "0.1 s", "200 ms"]
 """
+
+LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
+#: Takes some seconds a case, in steps of milliseconds.
+LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
+
+
+def numbers(folder):
+    """Every variable but the wall time of every result in a folder."""
+    found = {}
+    for path in sorted(folder.glob("*.nc")):
+        with open_result(path) as ds:
+            found[path.name] = ds.drop_vars("wall_time").load()
+    return found
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, ds in one.items():
+        xr.testing.assert_equal(ds, other[name])
 
 
 def direct(pressure, spacing):

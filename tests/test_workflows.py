@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from roughvisc.study.execution.run import run
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_cases, vary
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
 @click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
 @click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
+@click.option("--same-bits", is_flag=True, help="Compute again what other versions of the transforms have computed.")
 @click.option("--profile", is_flag=True, help="Say where the time went; computes in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: bool, **where: Any) -> None:
@@ -56,7 +57,7 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
         raise InputError("--profile: times this process only: expected no --scheduler, --scheduler-file or --workers")
     with _profile(console) if profile else nullcontext():
         if len(cases) == 1 and not elsewhere:
-            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
+            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots, where["same_bits"])
             if complaint:
                 complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
@@ -75,7 +76,7 @@ def _profile(console: Console) -> Iterator[None]:
     console.print(profile_table(profile))
 
 
-def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:
+def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
     from dask.system import CPU_COUNT
     from scipy import fft
@@ -88,7 +89,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     if is_result_of(case, result_path(folder, case.key)):
         console.print("Finished before: nothing has to be computed")
     with Bar(console, label, reached) as bar, fft.set_workers(CPU_COUNT):
-        path = run_case(case, folder, progress=bar.reached)
+        path = run_case(case, folder, progress=bar.reached, same_bits=same_bits)
     with open_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
@@ -109,6 +110,7 @@ def _run_all(
     scheduler: str | None,
     scheduler_file: Path | None,
     retry_failed: bool,
+    same_bits: bool,
 ) -> None:
     """Compute and sum up a sweep."""
     from contextlib import ExitStack
@@ -129,6 +131,7 @@ def _run_all(
             client=client,
             workers=workers,
             retry_failed=retry_failed,
+            same_bits=same_bits,
             watch=watcher(not console.quiet, console),
         )
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))

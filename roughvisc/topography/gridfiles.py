@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
@@ -65,11 +68,17 @@ def open_grid(
     return grid
 
 
-def _open(path: Path) -> xr.Dataset:
+@contextmanager
+def _open(path: Path) -> Iterator[xr.Dataset]:
     zarr = path.suffix.lower() == ".zarr"
     if zarr and find_spec("zarr") is None:
         raise InputError("it is in Zarr, which needs the package zarr: install it, or convert the file to netCDF")
-    return xr.open_dataset(path, engine="zarr" if zarr else "netcdf4", decode_times=False)
+    if zarr:
+        with xr.open_dataset(path, engine="zarr", decode_times=False) as dataset:
+            yield dataset
+    else:  # xarray would lock no more than the reading, and netCDF-4 does not stand two threads at all
+        with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, engine="netcdf4", decode_times=False, lock=False) as dataset:
+            yield dataset
 
 
 def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:

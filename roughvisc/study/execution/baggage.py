@@ -15,6 +15,9 @@ from roughvisc.study.storage.store import whole_file
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
+#: Folder of the copies, in that of the results.
+INPUTS = "inputs"
+
 
 def pack(case: Case, folder: Path) -> str:
     """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
 from roughvisc.topography.cards import read_toml
@@ -38,7 +37,8 @@ def identity(settings: Study) -> tuple[str, str]:
     """Digest of all that determines the numbers, sixteen hexadecimal digits, and that of the surface's file or recipe.
 
     Both come from one reading of the file. The surface counts by the content of its file and not by its path, as do
-    tables of a material; the program by its segments and not by how they were written, and no title counts.
+    tables of a material; the program by its segments and not by how they were written, and no title counts. Nor does
+    the library of the transforms, which changes the last digits: a result says what it was made with.
     """
     stated = settings.model_dump(
         mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
@@ -54,7 +54,7 @@ def identity(settings: Study) -> tuple[str, str]:
     stated["material"] = settings.material.content()
     surface = surface_content(settings.surface)
     stated["surface"] = surface
-    stated["numerics"] = [NUMERICS_REVISION, transform_library().split()[0]]
+    stated["numerics"] = NUMERICS_REVISION
     return _digest(stated)[:16], surface[0]
 
 

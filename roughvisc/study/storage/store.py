@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
 from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
+from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.study.storage.seal import flaw, seal
 from roughvisc.units import shown
 from roughvisc.variables import VARIABLES, of_step
@@ -304,7 +304,7 @@ def set_aside(path: Path) -> None:
 
 
 def open_result(path: str | Path) -> xr.Dataset:
-    """Open a result; its data are read when they are asked for.
+    """Open a result; its fields are read when they are asked for, in whatever thread or process.
 
     Its bytes are held against the checksum that they were written with first, which takes some 0.3 s for 1 GB.
 
@@ -332,7 +332,7 @@ def open_result(path: str | Path) -> xr.Dataset:
         raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
     require_whole(path)
     try:
-        dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
+        dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"

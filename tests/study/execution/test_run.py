@@ -11,7 +11,8 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.run import result_folder, run
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result
 

@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import numpy as np
@@ -17,7 +16,7 @@ import psutil
 import pytest
 import xarray as xr
 from rich.console import Console
-from support import BALL
+from support import BALL, LONG, assert_same, numbers
 
 import roughvisc as rv
 from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
@@ -27,15 +26,12 @@ from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence, Watch
-from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.table import CASES
 
-LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
-#: Takes some seconds a case, in steps of milliseconds.
-LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
 RUN = [sys.executable, "-m", "roughvisc.cli", "run"]
 
 pytestmark = pytest.mark.filterwarnings(
@@ -43,50 +39,6 @@ pytestmark = pytest.mark.filterwarnings(
     # as the interpreter collects what distributed leaves behind
     "ignore::pytest.PytestUnraisableExceptionWarning",
 )
-
-
-@pytest.fixture
-def study(tmp_path):
-    """Writes a study into a folder of its own and reads its cases."""
-
-    def write(text=BALL + LOADS, name="ball"):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(text)
-        return read_cases(path)
-
-    return write
-
-
-@pytest.fixture(scope="module")
-def by_hand(tmp_path_factory):
-    """Scheduler and two workers, each started by hand as a process of its own; gives the scheduler's file."""
-    folder = tmp_path_factory.mktemp("cluster")
-    file = folder / "scheduler.json"
-    environment = os.environ | {
-        "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
-        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
-    }
-    dask = [sys.executable, "-m", "dask"]
-    commands = [
-        [*dask, "scheduler", "--scheduler-file", file, "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
-        *[[*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"]] * 2,
-    ]
-    log = (folder / "log").open("w")
-    started = [
-        subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
-        for command in commands
-    ]
-    until = time.monotonic() + 60
-    while not file.exists() and time.monotonic() < until:
-        time.sleep(0.05)
-    with connect(file=file) as client:
-        client.wait_for_workers(2, timeout=60)
-    yield file
-    for process in reversed(started):
-        process.terminate()
-    for process in started:
-        process.wait(30)
-    log.close()
 
 
 @contextlib.contextmanager
@@ -101,21 +53,6 @@ def in_this_process(processes):
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
-
-
-def numbers(folder):
-    """Every variable but the wall time of every result in a folder."""
-    found = {}
-    for path in sorted(folder.glob("*.nc")):
-        with open_result(path) as ds:
-            found[path.name] = ds.drop_vars("wall_time").load()
-    return found
-
-
-def assert_same(one, other):
-    assert one.keys() == other.keys()
-    for name, ds in one.items():
-        xr.testing.assert_equal(ds, other[name])
 
 
 def leftovers(folder):
@@ -193,51 +130,6 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert "4, 4 of them before" in done.stdout
-
-
-def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
-    cases = study(LONG + LOADS)
-    wanted = {}
-    with connect(file=by_hand) as client:
-        killed = kill_working(client, times=1)
-        ds = sweep(cases[:2], tmp_path / "killed", client, progress=False)
-        killed.join()
-        assert killed.victims
-        wanted = sweep(cases[:2], tmp_path / "calm", client, progress=False)
-    assert ds.sizes["case"] == 2
-    xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
-
-
-def test_sweep__blames_no_case_whose_worker_dies_twice(study, tmp_path, by_hand):
-    (case,) = study(LONG)
-    with connect(file=by_hand) as client:
-        killed = kill_working(client, times=2)
-        with pytest.raises(RoughviscError, match=r"none of 1 cases .* died 2 times"):
-            sweep([case], tmp_path / "out", client, progress=False)
-        killed.join()
-        client.wait_for_workers(2, timeout=60)
-    assert not list((tmp_path / "out").glob("*.failed.json"))
-
-
-def kill_working(client, times):
-    """A thread that kills so many workers in the midst of a case."""
-
-    def kill():
-        until = time.monotonic() + 60
-        while len(killer.victims) < times and time.monotonic() < until:
-            busy = [worker for worker, keys in client.processing().items() if keys]
-            for worker in busy[:1]:
-                pid = client.run(os.getpid, workers=[worker], on_error="ignore").get(worker)
-                time.sleep(0.5)
-                if pid and pid not in killer.victims and client.processing().get(worker):
-                    os.kill(pid, signal.SIGKILL)
-                    killer.victims.append(pid)
-            time.sleep(0.1)
-
-    killer = threading.Thread(target=kill, daemon=True)
-    killer.victims = []
-    killer.start()
-    return killer
 
 
 def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):

@@ -19,14 +19,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import roughvisc as rv
 from roughvisc.errors import InUseError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.run import run, run_case
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
@@ -489,16 +490,40 @@ def test_other_revision__begins_again(whole, tmp_path, monkeypatch):
     assert stop.asked == steps
 
 
-def test_other_transforms__are_refused_and_the_checkpoint_stays(whole, tmp_path, monkeypatch):
+def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, caplog):
+    """The tolerance is kept by either; whoever asks for bits has them."""
     case, expected, steps = whole(MODES)
     stopped(case, tmp_path, steps // 2)
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint_module, "transform_library", lambda: "another engine")
-        with pytest.raises(rv.InputError, match=r"was written with scipy\.fft .*, this is another engine"):
-            run_case(case, tmp_path)
+    here = transform_library()
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
+    there = transform_library()
+    assert here.split()[0] == "scipy.fft" != there.split()[0], "the test extra has both"
     stop = Stop()
-    assert values(run_case(case, tmp_path, stop=stop)) == expected
+    path = run_case(case, tmp_path, stop=stop)
     assert stop.asked == steps - steps // 2
+    assert not caplog.records
+    with open_result(path) as mixed:
+        assert mixed.attrs["transforms"] == f"{here}; then {there}"
+        force = mixed.pressure.sum(("x", "y")).values
+    assert run_case(case, tmp_path, stop=stop) == path
+    assert stop.asked == steps - steps // 2, "it is finished"
+    (record,) = caplog.records
+    assert f"1 with {here}; then {there}, where this process has {there}: equal within" in record.getMessage()
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
+    assert values(run_case(case, tmp_path, same_bits=True)) == expected
+    with open_result(path) as same:
+        assert same.attrs["transforms"] == here
+        np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
+
+
+def test_other_transforms__begin_again_where_bits_are_asked_for(whole, tmp_path, monkeypatch):
+    case, _, steps = whole(MODES)
+    stopped(case, tmp_path, steps // 2)
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
+    stop = Stop()
+    with open_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
+        assert ds.attrs["transforms"] == transform_library()
+    assert stop.asked == steps
 
 
 def test_two_runs_at_once__the_second_says_so(whole, tmp_path):
