@@ -28,11 +28,11 @@ COLUMNS = [
 ]
 
 
-def main(cells=512, figure="friction_curve.png", result=None, last_octave=True):
+def main(cells=512, figure="friction_curve.png", result=None):
     side = 2e-3
     rough = rv.self_affine(side, cells, hurst=0.8, rms_slope=0.15, rolloff=side / 4, shortcut=8 * side / cells, seed=1)
     began = time.perf_counter()
-    curve = rv.friction(rough, RUBBER, pressure=PRESSURE, speeds=np.logspace(-4, 2, 13), last_octave=last_octave)
+    curve = rv.friction(rough, RUBBER, pressure=PRESSURE, speeds=np.logspace(-4, 2, 13), last_octave=True)
     print(f"{cells} x {cells}, {curve.sizes['speed']} speeds: {time.perf_counter() - began:.1f} s")
     print(curve[COLUMNS].to_dataframe().to_string(float_format="{:.4g}".format))
     if result is not None:
