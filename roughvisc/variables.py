@@ -10,12 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 #: How an accepted step ended; the values of ``status``, in order.
-STATUS_MEANINGS = (
-    "converged",
-    "not_converged",
-    "open",
-    "full_contact",
-)
+STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
@@ -326,20 +321,9 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
 
 
+_STATE = ("force", "approach", "contact_area", "contact_area_corrected", "contact_fraction", "mean_gap")
 #: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
-STEPPED = (
-    "force",
-    "approach",
-    "contact_area",
-    "contact_area_corrected",
-    "contact_fraction",
-    "mean_gap",
-    "work",
-    "stored_energy",
-    "dissipated_energy",
-    "time_error",
-    "status",
-)
+STEPPED = (*_STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
 
 
 def of_step(name: str) -> str:
@@ -354,8 +338,7 @@ def _over_steps(name: str) -> Variable:
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
-_OF_SLIDING = {"pressure", "gap", "force", "approach", "nominal_pressure", "contact_area", "contact_area_corrected"}
-_OF_SLIDING |= {"contact_fraction", "mean_gap", "iterations", "status", "wall_time"}
+_OF_SLIDING = {"pressure", "gap", *_STATE, "nominal_pressure", "iterations", "status", "wall_time"}
 
 
 def _over_speed(name: str) -> Variable:
@@ -396,4 +379,12 @@ SLIDING: dict[str, Variable] = {
     "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
     "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
     "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
+    "persson_friction_coefficient": Variable(
+        ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
+    ),
+    "persson_contact_fraction": Variable(("speed",), "1", "contact area over nominal area, by Persson's theory"),
+    "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
+    "last_octave_area": Variable(
+        ("speed",), "1", "part of the corrected contact area that the shortest octave of waves adds"
+    ),
 }

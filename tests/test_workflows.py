@@ -5,6 +5,7 @@ import pathlib
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_cases, vary
@@ -60,6 +61,25 @@ def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
     assert found.error.shape == (5, 5)
     assert float(found.duration.max() / found.duration.min()) == pytest.approx(1e24)
     assert (found.error < 1e-3).all(), "none refused, and the tolerance kept"
+
+
+def test_friction_curve__rises_and_falls_as_the_rubber_stiffens(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    module = importlib.import_module("friction_curve")
+    curve = module.main(48, tmp_path / "curve.png", tmp_path / "curve.nc")
+    assert (tmp_path / "curve.png").stat().st_size > 10_000
+    assert curve.speed.size == 13
+    assert (curve.status == 0).all()
+    friction = curve.friction_coefficient.values
+    most = int(friction.argmax())
+    assert 0 < most < 12
+    assert (np.diff(friction[: most + 1]) > 0).all()
+    assert (np.diff(friction[most:]) < 0).all()
+    assert (np.diff(curve.contact_area_corrected) < 0).all(), "the area falls with the speed"
+    assert ((curve.last_octave_friction > 0) & (curve.last_octave_friction < 1)).all()
+    assert (curve.last_octave_area < 0).all(), "finer roughness takes area away"
+    with xr.open_dataset(tmp_path / "curve.nc") as stored:
+        assert stored.identical(curve)
 
 
 def test_benchmarks__run_small(tmp_path, monkeypatch):

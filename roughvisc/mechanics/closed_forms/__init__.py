@@ -4,6 +4,7 @@ Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2
 material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
 """
 
+from roughvisc.mechanics.closed_forms.cylinder import SlidingCylinder, sliding_cylinder
 from roughvisc.mechanics.closed_forms.elastic import (
     AxisymmetricContact,
     FlatPunchContact,
@@ -55,6 +56,7 @@ __all__ = [
     "PunchOnSheet",
     "Sheet",
     "SingleMaximum",
+    "SlidingCylinder",
     "StepLoad",
     "WavyContact",
     "flat_punch",
@@ -72,6 +74,7 @@ __all__ = [
     "punch_force",
     "punch_pressure",
     "reduced_contact",
+    "sliding_cylinder",
     "sneddon_cone",
     "ting",
     "westergaard",

@@ -134,13 +134,13 @@ class Sliding:
         if not 0 < speed < math.inf:
             raise InputError(f"speed is {speed!r}: expected a positive number [m/s]")
         (nx, ny), (dx, dy) = shape, spacing
-        #: Wave numbers along x, without the shortest wave of an even grid, of which no sine is seen. [1/m]
-        self.qx = 2 * math.pi * fft.fftfreq(nx, dx)[:, None]
+        #: Wave numbers along x and along y, of a real transform. [1/m]
+        self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
         odd = self.qx.copy()
         if nx % 2 == 0:
             odd[nx // 2] = 0
         self._derivative = 1j * odd
-        response = body.transfer(self.qx, 2 * math.pi * fft.rfftfreq(ny, dy)[None, :])
+        response = body.transfer(self.qx, self.qy)
         acting = response > 0
         complex_compliance = np.broadcast_to(compliance(-self.qx * speed), response.shape)
         endless = acting & ~np.isfinite(complex_compliance)
@@ -153,8 +153,11 @@ class Sliding:
         kept = np.where(acting, complex_compliance.real, 1.0)
         #: The largest loss tangent.
         self.loss_tangent = float(np.max(loss / kept))
-        skew = np.where(acting, complex_compliance.imag, 0.0) * response
-        self._skew = 1j * np.where(odd == 0, 0.0, skew)
+        # Of the shortest wave of an even grid no sine is seen.
+        skew = np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response
+        #: Displacement over pressure of each wave. [m/Pa]
+        self.response = np.where(acting, complex_compliance.real, 0.0) * response + 1j * skew
+        self._skew = np.asarray(1j * skew, dtype=np.complex128)
         self._shape = shape
         self.even = HalfSpace(shape, spacing, "periodic", kernel=_InPhase(body, compliance, speed))
 

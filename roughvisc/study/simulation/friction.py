@@ -17,12 +17,14 @@ from roughvisc.mechanics.halfspace.sheet import Base
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.study.simulation.neighbours import staircase
 from roughvisc.study.simulation.notes import border_note, slope_note
 from roughvisc.study.simulation.scene import Ground, nominal_area
 from roughvisc.study.statement.body import body
 from roughvisc.study.statement.settings import Settings
+from roughvisc.topography.spectrum import without_last_octave
 from roughvisc.variables import STATUS_MEANINGS
 
 Direction = Literal["x", "-x", "y", "-y"]
@@ -48,6 +50,7 @@ def friction(
     base: Base | None = None,
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] = (),
+    last_octave: bool = False,
 ) -> xr.Dataset:
     """Friction of a rigid profile that slides steadily on a viscoelastic body, with periodic boundaries.
 
@@ -70,6 +73,9 @@ def friction(
         On what the iteration leaves of pressure (L1, over the load) and friction (relative).
     fields : sequence of str
         Fields to keep, of ``pressure`` and ``gap``, in the frame of the profile.
+    last_octave : bool
+        Whether to tell what the shortest octave of the surface's waves adds to friction and area, at twice the cost. If
+        that is much, the waves that the scan does not resolve would add as much again.
 
     Returns
     -------
@@ -112,30 +118,62 @@ def friction(
     if not ground.present.all():  # of a punch, which says so itself
         raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
 
-    order = np.argsort(asked)
     there, back = _turned(direction)
     gap = np.ascontiguousarray(there(ground.gap))
     sides = ground.spacing if direction.endswith("x") else ground.spacing[::-1]
     compliance = partial(complex_compliance, material, tolerance=0.1 * tolerance)
+    smooth, shortest = without_last_octave(gap, sides) if last_octave else (gap, 0.0)
+    if last_octave and not np.ptp(smooth) > 1e-9 * np.ptp(gap):
+        raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
     rows: list[dict[str, Any]] = [{} for _ in asked]
-    began, found = time.perf_counter(), None
-    for number in order:
-        sliding = Sliding(kernel, compliance, gap.shape, sides, float(asked[number]))
-        start = None if found is None else found.pressure
-        found = steady_state(sliding, gap, force, tolerance=tolerance, start=start)
-        rows[number] = _row(found, ground, there, back, float(asked[number]), force, wanted)
-        rows[number]["wall_time"] = time.perf_counter() - began
-    return _dataset(rows, asked, ground, settings, direction, kernel.described(), material)
+    began, found, without = time.perf_counter(), None, None
+    for number in np.argsort(asked):
+        speed = float(asked[number])
+        sliding = Sliding(kernel, compliance, gap.shape, sides, speed)
+        found = _state(sliding, gap, force, tolerance, found)
+        row = _row(found, ground, there, back, speed, force, wanted)
+        estimate = persson(sliding, gap, row["nominal_pressure"])
+        row["persson_friction_coefficient"] = estimate.friction_coefficient
+        row["persson_contact_fraction"] = estimate.contact_fraction
+        if last_octave:
+            without = _state(sliding, smooth, force, tolerance, without)
+            row |= _added(row, found, without, ground)
+        rows[number] = row | {"wall_time": time.perf_counter() - began}
+    dataset = _dataset(rows, asked, ground, settings, direction, kernel.described(), material)
+    return dataset.assign_attrs(last_octave=f"waves shorter than {shortest:.4g} m") if last_octave else dataset
+
+
+def _state(sliding: Sliding, gap: Array, force: float, tolerance: float, last: SteadyState | None) -> SteadyState:
+    """Steady state, begun with that of the last speed."""
+    start = None if last is None else last.pressure
+    return steady_state(sliding, gap, force, tolerance=tolerance, start=start)
+
+
+def _added(row: dict[str, Any], found: SteadyState, without: SteadyState, ground: Ground) -> dict[str, float]:
+    """What the shortest octave of waves adds, relative to what there is with it."""
+    if not (found.converged and without.converged and found.power_force > 0):
+        return {"last_octave_friction": np.nan, "last_octave_area": np.nan}
+    area = _areas(without.pressure > 0, float(np.prod(ground.spacing)))[1]
+    return {
+        "last_octave_friction": 1 - without.power_force / found.power_force,
+        "last_octave_area": 1 - area / row["contact_area_corrected"],
+    }
+
+
+def _areas(contact: NDArray[np.bool_], cell: float) -> tuple[float, float]:
+    """Contact area, counted and corrected. [m2]"""
+    counted = np.count_nonzero(contact) * cell
+    return counted, max(counted - staircase(contact, ~contact, cell, True), 0.0)
 
 
 def _row(
     found: SteadyState, ground: Ground, there: Any, back: Any, speed: float, force: float, wanted: tuple[str, ...]
 ) -> dict[str, Any]:
     pressure, displacement = back(found.pressure), back(found.displacement)
-    contact, cell = pressure > 0, float(np.prod(ground.spacing))
+    contact = pressure > 0
+    area, corrected = _areas(contact, float(np.prod(ground.spacing)))
     gap = np.maximum(ground.gap + displacement - found.approach, 0.0)
     gap[contact] = 0.0
-    area = np.count_nonzero(contact) * cell
     if not found.converged:
         status = "not_converged"
     else:
@@ -146,7 +184,7 @@ def _row(
         "nominal_pressure": force / ground.nominal_area,
         "approach": found.approach,
         "contact_area": area,
-        "contact_area_corrected": max(area - staircase(contact, ~contact, cell, True), 0.0),
+        "contact_area_corrected": corrected,
         "contact_fraction": area / ground.nominal_area,
         "mean_gap": float(gap.mean()),
         "friction_coefficient": found.power_force / force,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.variables import SLIDING
+from roughvisc.variables import SLIDING, STATUS_MEANINGS
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
@@ -81,6 +81,45 @@ def test_sheet__rubs_less_as_it_is_thinner(curve):
     assert float(thin.contact_area[0]) < 0.9 * float(curve.contact_area[0])
     thick = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=0.2, thickness=1e-2)
     assert float(thick.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
+
+
+def test_persson__is_that_of_the_surface_as_it_slides(curve):
+    """In full contact the theory is exact, whichever the direction; in partial contact its area is not far off."""
+    pressed = {"pressure": 1e7, "speeds": [0.02, 0.2], "tolerance": 1e-6}
+    for direction in ("x", "-y"):
+        full = rv.friction(ROUGH, RUBBER, **pressed, direction=direction)
+        assert (full.status == STATUS_MEANINGS.index("full_contact")).all()
+        np.testing.assert_allclose(full.persson_friction_coefficient, full.friction_coefficient, rtol=1e-5)
+    np.testing.assert_allclose(curve.persson_contact_fraction, curve.contact_fraction, rtol=0.5)
+
+
+def test_last_octave__is_the_change_from_a_surface_without_it():
+    """Two waves: the shorter is what is left out; in full contact each has the friction of its own."""
+    x, k = (np.arange(63) + 0.5) / 63 * 1e-3, 2 * np.pi / 1e-3
+    both = 1e-6 * (np.cos(k * x) + 0.4 * np.cos(5 * k * x + 1))
+    long, two = (rv.from_array(np.repeat(z[:, None], 3, 1), spacing=1e-3 / 63) for z in (1e-6 * np.cos(k * x), both))
+    press = {"pressure": 1e6, "speeds": [0.02, 0.2], "tolerance": 1e-6}
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
+    exact = 1 - less.friction_coefficient / found.friction_coefficient
+    assert (exact > 0.2).all()
+    np.testing.assert_allclose(found.last_octave_friction, exact, rtol=1e-6)
+    np.testing.assert_allclose(found.last_octave_area, 0, atol=1e-12)
+    assert found.attrs["last_octave"] == "waves shorter than 0.0004 m"
+    assert "last_octave" not in less.attrs
+    assert set(found.variables) <= set(SLIDING)
+    press["pressure"] = 1e3
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
+    np.testing.assert_allclose(
+        found.last_octave_area, 1 - less.contact_area_corrected / found.contact_area_corrected, rtol=1e-9
+    )
+    assert (found.last_octave_area < -0.1).all(), "finer roughness takes area away"
+    with pytest.raises(rv.InputError, match="no waves beyond its shortest octave"):
+        rv.friction(long, RUBBER, **press, last_octave=True)
+
+
+def test_last_octave__of_a_body_without_friction_is_not_known():
+    found = rv.friction(ROUGH, rv.elastic(1e6), pressure=2e4, speeds=0.2, last_octave=True)
+    assert np.isnan(found.last_octave_friction).all()
 
 
 def test_measured_material__by_its_series(curve):
