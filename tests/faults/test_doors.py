@@ -177,7 +177,7 @@ def test_open_result__variables_of_foreign_files(tmp_path):
     whole = hertz_creep((6, 5), 3)
     for name, change in (
         ("force over", {"force": ("x", np.zeros(6))}),
-        ("force as <U1", {"force": ("time", np.array(["a", "b", "c"], dtype=object))}),
+        ("force as (<U1|object)", {"force": ("time", np.array(["a", "b", "c"], dtype=object))}),
         ("force, approach", {}),
     ):
         foreign = whole.drop_vars(["force", "approach"]).assign(change and {"approach": whole.approach, **change})

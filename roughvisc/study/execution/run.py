@@ -178,7 +178,7 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path, same_bits):
-                    if path.exists():
+                    if path.exists() and not is_result_of(case, path):  # damaged, and not of other transforms
                         set_aside(path)
                     keeper.resume()
                     _finish(case, folder, progress, keeper)

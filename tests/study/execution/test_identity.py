@@ -11,7 +11,7 @@ from support import BALL
 from roughvisc.errors import ChangedError, InputError, RoughviscError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.baggage import pack
-from roughvisc.study.execution.run import run
+from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence
 from roughvisc.study.statement.case import Case, read_cases, read_study

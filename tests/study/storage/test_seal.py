@@ -13,7 +13,7 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.execution.run import run
+from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.seal import flaw, is_sealed, unsealed

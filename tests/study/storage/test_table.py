@@ -49,7 +49,7 @@ def test_table__says_what_the_results_say(folder):
                 "time [s]": ds.time[-1],
                 "force [N]": ds.force[-1],
                 "approach [m]": ds.approach[-1],
-                "contact_area_corrected [m2]": ds.contact_area_corrected[-1],
+                "contact_area_corrected [m^2]": ds.contact_area_corrected[-1],
                 "contact_fraction": ds.contact_fraction[-1],
                 "mean_gap [m]": ds.mean_gap[-1],
                 "largest stated_error": ds.stated_error.max(),
