@@ -270,11 +270,15 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
                 self.pressed = True
                 raise interruption
 
-        pressed = False
+        def stopping(self):
+            self.stopped = True
+
+        pressed = stopped = False
 
     ear = CtrlC()
     with bare_cluster() as client, pytest.raises(interruption):
         run_cases(study(), tmp_path / "out", watch=ear, client=client)
+    assert ear.stopped
     (message,) = ear.messages
     assert message.startswith("the cluster has had no worker for 0 s (4 cases to go): start workers")
     assert "the cluster has had no worker" in (logged := (tmp_path / "out" / "sweep.log").read_text())
