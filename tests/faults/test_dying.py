@@ -32,7 +32,7 @@ def struck(tmp_path, most):
     """What happened, at which operation, and how the run ended, for each run."""
     script = Path(__file__).with_name("dying.py")
     command = [sys.executable, script, tmp_path / "ball.toml", tmp_path, most, "20", *WAYS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=True)
     assert "Traceback" not in done.stderr
     return [line.split(" ", 2) for line in done.stdout.splitlines()]
 
@@ -49,6 +49,7 @@ def wanted(case, tmp_path):
         return ds.drop_vars("wall_time").load()
 
 
+@pytest.mark.timeout(7200)  # the large one: some 700 runs
 @pytest.mark.parametrize("most", ["2", pytest.param("all", marks=pytest.mark.long)])
 def test_at_a_file_operation(case, wanted, tmp_path, most):
     lines = struck(tmp_path, most)
