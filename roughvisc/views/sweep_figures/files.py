@@ -17,6 +17,7 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result, whole_file
+from roughvisc.views.figures.axes import verbatim
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.case_names import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
@@ -152,5 +153,5 @@ def _with_title(figure: Figure, title: str) -> Bbox:
     width, height = figure.get_size_inches()
     whole = title.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")  # lines end at commas
     lines = textwrap.wrap(whole, int(13 * width))
-    figure.text(0.5, 1 + 0.03 / height, "\n".join(lines), ha="center", va="bottom", fontsize=9)
+    figure.text(0.5, 1 + 0.03 / height, "\n".join(map(verbatim, lines)), ha="center", va="bottom", fontsize=9)
     return Bbox.from_extents(0, 0, width, height + 0.08 + 0.16 * len(lines))
