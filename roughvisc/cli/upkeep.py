@@ -20,7 +20,7 @@ def verify(results: Path) -> None:
 
     \b
     Example:
-      roughvisc verify results/study
+      roughvisc verify results/ground_steel-study
     """
     from roughvisc.study.storage.verify import verify as verified
 
@@ -46,7 +46,7 @@ def clean(results: Path, everything: bool) -> None:
 
     \b
     Example:
-      roughvisc clean results/study
+      roughvisc clean results/ground_steel-study
     """
     from roughvisc.study.storage.tidy import tidy
 
