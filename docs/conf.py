@@ -55,18 +55,22 @@ copyright = author
 
 def _with_tables(app, docname, source):
     """Put the table of the vocabulary, and those of the keys of study files, where the pages ask for them."""
-    from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+    from roughvisc.variables import SLIDING, STATUS_MEANINGS, VARIABLES
 
-    if docname == "nomenclature":
+    def table(variables):
         rows = ["| variable | dimensions | unit | meaning |", "|---|---|---|---|"]
-        for name, one in VARIABLES.items():
+        for name, one in variables.items():
             meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
             if name == "status":
                 meaning += ": " + ", ".join(
                     f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS)
                 )
             rows.append(f"| `{name}` | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |")
-        source[0] = source[0].replace("VARIABLES_TABLE", "\n".join(rows))
+        return "\n".join(rows)
+
+    if docname == "nomenclature":
+        source[0] = source[0].replace("VARIABLES_TABLE", table(VARIABLES))
+        source[0] = source[0].replace("SLIDING_TABLE", table(SLIDING))
     if docname == "study-files":
         from study_keys import filled
 

@@ -2,7 +2,7 @@
 
     python docs/make_gallery.py [STUDY ...]
 
-writes gallery.md and small PNG files; the page is written whole, figures only of the studies named (default: all). The
+writes gallery.md, small PNG files and the README's second picture; the page is written whole, figures only of the studies named (default: all). The
 notebook ``first_contact`` is run as well, if it is named or nothing is.
 """
 
@@ -36,6 +36,10 @@ FIGURES = {
             results, "approach", times=[0.01, 0.05], kind="lines"
         ),
     },
+    "thickness_sweep": {
+        "approach": lambda results: rv.plot.sweep(results, "approach"),
+        "area": rv.plot.sweep,
+    },
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}
@@ -44,7 +48,8 @@ FIGURES = {
     "stability_map": {},  # drawn by its script
 }
 SCRIPTS = {
-    name: f"figures/{name}.png" for name in ("maxwell_step", "zener_step", "stability_map")
+    name: f"figures/{name}.png"
+    for name in ("maxwell_step", "zener_step", "thin_sheet", "stability_map")
 }
 
 
@@ -92,6 +97,26 @@ def draw(name, folder):
             with Image.open(path) as picture:
                 picture.convert("RGB").save(path, optimize=True)
     xr.backends.file_manager.FILE_CACHE.clear()
+
+
+def draw_readme(study="quickstart"):
+    """The second picture of the README: maps and histories of the study that it begins with."""
+    with tempfile.TemporaryDirectory() as folder:
+        ds = rv.run(WORKFLOWS / f"{study}.toml", folder, progress=False)
+        pictures = []
+        for kind, figure in {"maps": rv.plot.maps(ds), "history": rv.plot.history(ds)}.items():
+            path = Path(folder, f"{kind}.png")
+            figure.savefig(path, dpi=110)
+            with Image.open(path) as picture:
+                pictures.append(picture.convert("RGB"))
+        ds.close()
+    xr.backends.file_manager.FILE_CACHE.clear()
+    width, height = max(p.width for p in pictures), sum(p.height for p in pictures)
+    whole, top = Image.new("RGB", (width, height), "white"), 0
+    for picture in pictures:
+        whole.paste(picture, ((width - picture.width) // 2, top))
+        top += picture.height
+    whole.save(HERE / "figures" / f"{study}.png", optimize=True)
 
 
 def page():
@@ -150,6 +175,8 @@ def main(names):
             run_notebook(HERE / f"{name}.ipynb")
         elif FIGURES[name]:
             draw(name, folder)
+        if name == "quickstart":
+            draw_readme(name)
     (HERE / "gallery.md").write_text(page(), encoding="utf-8")
 
 

@@ -1,11 +1,9 @@
-"""The tables of the page on study files: keys, kinds, units and defaults from the schema, meanings from a file.
+"""The tables of the page on study files: keys, kinds, units, defaults and meanings as the schema has them.
 
-``rows(name)`` gives those of one table of ``study_keys.toml``, ``table(name)`` the same in Markdown.
+``rows(name)`` gives those of one table of ``keys.toml``, ``table(name)`` the same in Markdown.
 """
 
 import re
-import tomllib
-from pathlib import Path
 
 from roughvisc.study.statement.schema import (
     StudyFile,
@@ -15,11 +13,11 @@ from roughvisc.study.statement.schema import (
     settings,
     surface,
 )
+from roughvisc.study.statement.schema.meanings import meaning as first_meaning
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
 from roughvisc.study.statement.schema.units import unit_of
 
-FILE = Path(__file__).with_name("study_keys.toml")
-MEANINGS = tomllib.loads(FILE.read_text(encoding="utf-8"))
 HEAD = ("key", "expected", "unit", "default", "meaning", "example")
 _STEPS = conditioning.Prepared.model_fields
 _GENERATED = {f"generate: {name}": one for name, one in surface.GENERATED.items()}
@@ -59,8 +57,12 @@ TABLES = {
         )
         for name, one in _GENERATED.items()
     },
-    **{name: ("material", _own(one, {"model", *TEMPERATURE})) for name, one in _MODELS.items()},
+    **{
+        name: ("material", _own(one, {"model", *TEMPERATURE, *THICKNESS}))
+        for name, one in _MODELS.items()
+    },
     "material: temperature": ("material", _only(material.SECTIONS["elastic"], TEMPERATURE)),
+    "material: thickness": ("material", _only(material.SECTIONS["elastic"], THICKNESS)),
     **{
         f"program: {name}": ("program.0", kind["load"].model_fields)
         for name, kind in program.KINDS.items()
@@ -93,10 +95,7 @@ _UNITS = {
 
 def meaning(name, key):
     """Meaning and example of a key."""
-    for table in (name, _SHARED.get(name.partition(":")[0])):
-        if key in MEANINGS.get(table, {}):
-            return MEANINGS[table][key]
-    raise KeyError(f"{FILE.name}: [{name!r}] has no {key}: expected its meaning and an example")
+    return first_meaning((name, _SHARED.get(name.partition(":")[0], "")), key)
 
 
 def rows(name):

@@ -5,15 +5,29 @@ A variable that is not declared, or whose dimensions differ, is refused.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from roughvisc.variables import STATUS_MEANINGS, VARIABLES, Variable, of_step
+from roughvisc.errors import InputError
+from roughvisc.units import quantity
+from roughvisc.variables import SLIDING, STATUS_MEANINGS, VARIABLES, Variable, of_step
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def heading(name: str, unit: str) -> str:
+    """Heading of a column: the name and, in brackets, the unit if there is one.
+
+    Examples
+    --------
+    >>> heading("force", "N"), heading("contact_fraction", "1")
+    ('force [N]', 'contact_fraction')
+    """
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 def annotate(dataset: xr.Dataset) -> xr.Dataset:
@@ -38,7 +52,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
             other[name] = variable.astype(declared.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
     for name, variable in annotated.variables.items():
-        declared = VARIABLES[str(name)]
+        declared = _vocabulary(variable.dims)[str(name)]
         variable.attrs.update(declared.attributes())
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
@@ -74,10 +88,39 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
     return described
 
 
+def expect_declared_units(dataset: xr.Dataset) -> None:
+    """Refuse a result that was converted to other units: what is derived from it and drawn is counted in SI.
+
+    Raises
+    ------
+    InputError
+        If a declared variable states a unit that is not the declared one in other words.
+    """
+    for name, variable in dataset.variables.items():
+        declared = VARIABLES[str(name)].units if name in VARIABLES else ""
+        found = str(variable.attrs.get("units", declared))
+        if declared and found != declared and not _same_unit(found, declared):
+            raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
+
+
+def _same_unit(found: str, declared: str) -> bool:
+    """Whether two texts are one unit: ``m2``, as UDUNITS and earlier results write it, is ``m^2``."""
+    try:
+        factor = quantity("1 " + re.sub(r"(?<=[a-zA-Z])(-?\d)", r"^\1", found), declared)
+    except InputError:
+        return False
+    return factor == 1.0
+
+
+def _vocabulary(dims: tuple[Hashable, ...]) -> dict[str, Variable]:
+    return SLIDING if "speed" in dims else VARIABLES
+
+
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
-    if name not in VARIABLES:
+    known = _vocabulary(dims)
+    if name not in known:
         raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-    declared = VARIABLES[name]
+    declared = known[name]
     if dims[-len(declared.dims) :] != declared.dims:
         raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
     return declared

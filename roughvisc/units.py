@@ -1,16 +1,22 @@
-"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI.
+"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI, and a float a readable text.
 
-Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats.
+Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats. Figures,
+tables and reprs show them with a prefix that suits: a :class:`Unit` is chosen from the data, then used for all of it.
 """
 
 from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from numbers import Real
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 
@@ -20,6 +26,11 @@ _FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
 # pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
 _ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradian"}
+
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 @cache
@@ -62,17 +73,37 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     >>> quantity("25 degC", "K"), quantity("25 °C", "K")
     (298.15, 298.15)
     """
-    label = f"{name} is {value!r}" if name else f"found {value!r}"
+    label = f"{name} is {shown(value)}" if name else f"found {shown(value)}"
     wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
     if isinstance(value, str):
         result = _parsed(value, unit, label, wanted, difference)
     elif isinstance(value, Real) and not isinstance(value, bool):
-        result = float(value)
+        try:
+            result = float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            result = math.inf
     else:
         raise InputError(f"{label}: expected {wanted}")
     if not math.isfinite(result):
         raise InputError(f"{label}: expected {wanted}, finite")
     return result
+
+
+def number_and_unit(text: str) -> tuple[float, str]:
+    """Number and unit of a quantity as they are written.
+
+    Parameters
+    ----------
+    text : str
+        A quantity that :func:`quantity` takes.
+
+    Examples
+    --------
+    >>> number_and_unit("0.1 MPa s"), number_and_unit("1e-3")
+    ((0.1, 'MPa s'), (0.001, ''))
+    """
+    number, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]
+    return float(number), unit or ""
 
 
 def is_quantity(value: Any, unit: str) -> bool:
@@ -165,6 +196,7 @@ def bounded_quantity(
         raise
     outside = (
         (above is not None and not number > above)
+        or (above == 0 and number < sys.float_info.min)  # whose reciprocal no double can hold
         or (least is not None and not number >= least)
         or (most is not None and not number <= most)
         or (below is not None and not number < below)
@@ -185,19 +217,113 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
         if dimensionless:
             return number
         raise InputError(f"{label}, a text without a unit: expected {wanted} (such as {f'{matched[1]} {unit}'!r})")
+    from pint import PintError  # slow to import
+
+    expected = _registry().Unit("" if dimensionless else unit)
     try:
-        given = _registry().Unit("percent" if found == "%" else found.replace("·", "*"))
-        expected = _registry().Unit("" if dimensionless else unit)
-    except Exception as error:  # pint raises half a dozen kinds, AssertionError and tokenizer errors among them
+        names = _registry().parse_units_as_container("percent" if found == "%" else found.replace("·", "*"))
+        given = _registry().Unit(names)
+        same_kind = given.dimensionality == expected.dimensionality
+        converted, begins = (
+            float(_registry().Quantity(value, given).to(expected).magnitude) if same_kind else math.nan
+            for value in (number, 0.0)
+        )
+    # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
+    except (PintError, ValueError, KeyError, AssertionError) as error:
         raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
-    angle = expected.dimensionless and any(part in _ANGLES for part in given._units)
-    if given.dimensionality != expected.dimensionality or (angle and str(expected) not in _ANGLES):
+    angle = expected.dimensionless and any(name in _ANGLES for name in names)
+    if not same_kind or (angle and str(expected) not in _ANGLES):
         raise InputError(f"{label}, which is in {given}: expected {wanted}")
-    try:
-        converted = float(_registry().Quantity(number, given).to(expected).magnitude)
-        begins = float(_registry().Quantity(0.0, given).to(expected).magnitude)
-    except Exception as error:  # logarithmic units: decibels
-        raise InputError(f"{label}, which does not convert: expected {wanted}") from error
     if difference and begins:
         raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit to show values in: ``shown = values / factor``.
+
+    Parameters
+    ----------
+    factor : float
+        Size of the unit in SI.
+    symbol : str
+        How it is written; empty for a pure number.
+    """
+
+    factor: float
+    symbol: str
+
+    def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Values [SI] in this unit."""
+        return np.asarray(values, dtype=float) / self.factor
+
+    def label(self, name: str) -> str:
+        """Axis label: the name and, in brackets, the unit."""
+        return f"{name} [{self.symbol}]" if self.symbol else name
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """One value [SI] with its unit, as read in running text."""
+        shown = float(value) / self.factor
+        if 1e3 <= abs(shown) < 1e6:  # not 5e+03
+            return f"{shown:.0f} {self.symbol}".rstrip()
+        return f"{shown:.{digits}g} {self.symbol}".rstrip()
+
+
+def unit_for(values: ArrayLike, si: str) -> Unit:
+    """Unit with the engineering prefix that suits the largest of some values.
+
+    Parameters
+    ----------
+    values : array_like
+        Values of one axis; missing and infinite ones are ignored. [SI]
+    si : str
+        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"Pa s"``, ``"m^2"``, ``"N/m"``,
+        ``"s"``, ``"1"``, ``"1/Pa"``.
+
+    Returns
+    -------
+    Unit
+
+    Examples
+    --------
+    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m^2").symbol, unit_for([0.04, 2e6], "Pa").symbol
+    ('µm', 'mm²', 'MPa')
+    >>> unit_for([9000.0], "s")
+    Unit(factor=3600.0, symbol='h')
+    >>> unit_for([2e-7], "1/Pa").text(2e-7)
+    '0.2 1/MPa'
+    """
+    size = np.abs(np.asarray(values, dtype=float))
+    largest = float(np.max(size, initial=0.0, where=np.isfinite(size)))
+    if si in ("1", ""):
+        return Unit(1.0, "")
+    if si.startswith("1/"):
+        bare = si[2:].strip("()")
+        inverse = unit_for([100 / largest if largest else 1.0], bare)  # shown from 0.1 to 100
+        return Unit(1 / inverse.factor, "1/" + (f"({inverse.symbol})" if " " in inverse.symbol else inverse.symbol))
+    if si == "s":
+        for least, factor, symbol in _CLOCK:
+            if largest >= least:
+                return Unit(factor, symbol)
+    head, _, tail = si.partition("/")
+    name = head.rstrip("^0123456789")  # results of old have m2
+    power = int(head[len(name) :].strip("^") or 1)
+    least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
+    exponent = 0
+    if largest > 0:
+        exponent = 3 * math.floor(math.log10(largest / least * 1.0005) / (3 * power))  # 0.99999 N is not 1000 mN
+    exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
+    symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
+    return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
+
+
+def said(value: float, unit: str, digits: int = 6) -> str:
+    """One value in SI as read in running text, to so many digits.
+
+    Examples
+    --------
+    >>> said(1e5, "Pa s"), said(0.05, "s"), said(2.0, "N")
+    ('100 kPa s', '50 ms', '2 N')
+    """
+    return unit_for([value], unit).text(value, digits)

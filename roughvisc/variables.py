@@ -10,12 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 #: How an accepted step ended; the values of ``status``, in order.
-STATUS_MEANINGS = (
-    "converged",
-    "not_converged",
-    "open",
-    "full_contact",
-)
+STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
 
@@ -136,7 +131,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "contact_area": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "real contact area, counted",
         "cells that carry pressure",
         ancillary=("contact_area_lower", "contact_area_upper"),
@@ -144,7 +139,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "contact_area_corrected": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "real contact area, corrected for the grid",
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
@@ -196,11 +191,11 @@ VARIABLES: dict[str, Variable] = {
     "work_error": Variable(_SERIES, "J", "stated error of the work"),
     "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy"),
     "contact_area_lower": Variable(
-        _SERIES, "m2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
+        _SERIES, "m^2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
     ),
     "contact_area_upper": Variable(
         _SERIES,
-        "m2",
+        "m^2",
         "area that is not certainly out of contact",
         "counted, at the stated error; without the grid's part",
     ),
@@ -222,22 +217,22 @@ VARIABLES: dict[str, Variable] = {
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time"),
     # derived from a result: see roughvisc.views.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
-    "cluster_area_mean": Variable(_SERIES, "m2", "mean area of a contact cluster"),
-    "cluster_area_largest": Variable(_SERIES, "m2", "area of the largest contact cluster"),
+    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster"),
+    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster"),
     "cluster_area": Variable(
-        ("time", "cluster"), "m2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
+        ("time", "cluster"), "m^2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
     ),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
     "pressure_density": Variable(
         ("time", "pressure_bin"),
-        "Pa-1",
+        "1/Pa",
         "probability density of the contact pressure",
         "over the cells in contact: its integral is 1",
     ),
     "gap_density": Variable(
         ("time", "gap_bin"),
-        "m-1",
+        "1/m",
         "probability density of the gap",
         "over the present cells out of contact: its integral is 1",
     ),
@@ -326,20 +321,9 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
 
 
+_STATE = ("force", "approach", "contact_area", "contact_area_corrected", "contact_fraction", "mean_gap")
 #: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
-STEPPED = (
-    "force",
-    "approach",
-    "contact_area",
-    "contact_area_corrected",
-    "contact_fraction",
-    "mean_gap",
-    "work",
-    "stored_energy",
-    "dissipated_energy",
-    "time_error",
-    "status",
-)
+STEPPED = (*_STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
 
 
 def of_step(name: str) -> str:
@@ -354,3 +338,53 @@ def _over_steps(name: str) -> Variable:
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
+_OF_SLIDING = {"pressure", "gap", *_STATE, "nominal_pressure", "iterations", "status", "wall_time"}
+
+
+def _over_speed(name: str) -> Variable:
+    """The same variable over the speeds of steady sliding."""
+    one = VARIABLES[name]
+    return replace(one, dims=tuple("speed" if dim == "time" else dim for dim in one.dims), ancillary=())
+
+
+#: The vocabulary of steady sliding: what a Dataset over ``speed`` may hold.
+SLIDING: dict[str, Variable] = {
+    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
+    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
+    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
+    "friction_coefficient": Variable(
+        ("speed",),
+        "1",
+        "friction coefficient of steady sliding",
+        "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
+        ancillary=("friction_residual",),
+        short="friction coefficient",
+    ),
+    "friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force against the motion",
+        "the power that the material dissipates, over the speed",
+        ancillary=("friction_residual",),
+        short="friction force",
+    ),
+    "slope_friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force by pressure times slope of the profile",
+        "equal to friction_force but for what the grid leaves open at the edges of contact",
+    ),
+    "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
+    "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
+    "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
+    "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
+    "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
+    "persson_friction_coefficient": Variable(
+        ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
+    ),
+    "persson_contact_fraction": Variable(("speed",), "1", "contact area over nominal area, by Persson's theory"),
+    "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
+    "last_octave_area": Variable(
+        ("speed",), "1", "part of the corrected contact area that the shortest octave of waves adds"
+    ),
+}

@@ -1,6 +1,9 @@
 """What tests of several modules share: cases, scenes, and how they are looked at."""
 
+import re
+
 import numpy as np
+import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import roughvisc as rv
@@ -10,6 +13,8 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
+from roughvisc.study.storage.store import open_result
+from roughvisc.units import quantity
 
 RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
 RUBBER = rv.zener(3e6, 3e6, 0.3e6)
@@ -50,6 +55,25 @@ hold = "0.2 s"
 fields = ["pressure", "displacement"]
 times = [0, "0.1 s", "200 ms"]
 """
+
+LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
+#: Takes some seconds a case, in steps of milliseconds.
+LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
+
+
+def numbers(folder):
+    """Every variable but the wall time of every result in a folder."""
+    found = {}
+    for path in sorted(folder.glob("*.nc")):
+        with open_result(path) as ds:
+            found[path.name] = ds.drop_vars("wall_time").load()
+    return found
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, ds in one.items():
+        xr.testing.assert_equal(ds, other[name])
 
 
 def direct(pressure, spacing):
@@ -153,6 +177,29 @@ def labels(figure):
 
 def lines(ax):
     return {line.get_label(): line for line in ax.lines}
+
+
+def told(figure):
+    """What a figure says beside its axes' labels and ticks: titles, legends, notes."""
+    found = [figure._suptitle, figure._supxlabel]
+    for ax in figure.axes:
+        found += [ax.title, ax._left_title, ax._right_title, *ax.texts]
+        found += ax.get_legend().get_texts() if ax.get_legend() else []
+    found += [text for legend in figure.legends for text in legend.get_texts()]
+    return [text.get_text() for text in found if text is not None and text.get_gid() != "exaggeration"]
+
+
+_TOLD = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?: ((?:[fpnµmkMGT]?(?:m²|m|Pa|N|J|s)|h|d|%)(?!\w)))?")
+
+
+def numbers_told(figure):
+    """Numbers with their units in what a figure says, in SI; formulas are left out."""
+    texts = [re.sub(r"\$[^$]*\$", "", text) for text in told(figure)]
+    units = {"%": "1", "h": "s", "d": "s", "": "1"}
+    found = [match.groups(default="") for text in texts for match in _TOLD.finditer(text)]
+    si = [units.get(unit) or re.sub("^[fpnµmkMGT](?=.)", "", unit).replace("²", "2") for _, unit in found]
+    pairs = zip(found, si, strict=True)
+    return sorted(quantity(f"{number} {unit}".strip(), one.replace("m2", "m^2")) for (number, unit), one in pairs)
 
 
 def text_boxes(figure):

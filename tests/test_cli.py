@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and how it ends."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -12,8 +13,10 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.study.storage.store import write_result
+from roughvisc.study.trade.files import trade_folder
 
 
 def write_study(text=BALL, *replacements):
@@ -44,6 +47,18 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
         assert words in out
 
 
+def test_run__of_what_is_finished_says_that_nothing_is_computed(invoke):
+    sweep = '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]'
+    for text, options, said in (
+        (BALL, ("--no-plots",), "Finished before: nothing has to be computed"),
+        (BALL + sweep, ("--workers", 0), "2, all before: nothing had to be computed"),
+    ):
+        study = write_study(text)
+        first, again = (invoke("run", study, *options)[1] for _ in range(2))
+        assert said not in first
+        assert said in again
+
+
 def test_run__quiet_says_nothing(invoke, tmp_path):
     assert invoke("run", write_study(), "--out", "there", "--no-plots", "-q") == (0, "", "")
     assert [p.suffix for p in (tmp_path / "there").iterdir()] == [".nc"]
@@ -64,7 +79,7 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
         "2, 0 of them before",
     ):
         assert words in out
-    assert "Results: results/ball\nLog: results/ball/sweep.log\n" in out
+    assert "Results: results/ball\nTable of the cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
 
     status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
     assert (status, out) == (1, "")
@@ -94,6 +109,27 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
     status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
     assert status == 2
+
+
+def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
+    study = write_study(BALL, ("level = 0", "crop = { x = ['2 mm', '3 mm'] }"))
+    status, out, err = invoke("plan", study)
+    assert (status, out) == (2, "")
+    assert err.startswith("roughvisc: ball.toml: cannot run as it stands: surface: crop")
+    ramp = 'approach = "1 um"'
+    text = BALL.replace('load = "5 mN"', ramp).replace('"zener"\nshear', '"kelvin_voigt"\nshear')
+    text = text.replace('kelvin_modulus = "1 MPa"\nkelvin_', "")
+    sweep = '[sweep]\n"program.0.over" = [0, 0.1]'
+    status, out, err = invoke("plan", write_study(text + sweep))
+    assert status == 2
+    assert "cannot run as it stands: 1 of 2 cases: at 0 s the approach jumps" in err
+    assert [line.split()[-2:] for line in out.splitlines() if "cannot" in line] == [["cannot", "run"]]
+
+
+def test_help__summaries_of_commands_are_whole(invoke):
+    listed = invoke("--help")[1].split("Commands:")[1].strip().splitlines()
+    assert len(listed) == 10
+    assert all(line.endswith(".") and not line.endswith("..") for line in listed)
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
@@ -208,6 +244,41 @@ def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan
         assert words in err
     assert (tmp_path / "mine.toml").read_text() == "# mine\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.toml", "tilted.nc"]
+
+
+def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
+    status, out, err = invoke("new")
+    assert (status, err) == (0, "")
+    assert "Scan: ground_steel.x3p\nStudy: ground_steel-study.toml\nNext: " in out
+    (case,) = read_cases("ground_steel-study.toml")
+    assert case.height().shape == (256, 224)
+    ds = rv.run(vary(case, {"surface.resample": [24, 21], "keep.times": 2}), progress=False)
+    assert 0 < float(ds.contact_fraction[-1]) < 1
+    assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"
+    (tmp_path / "ground_steel.x3p").write_bytes(b"mine")
+    for arguments, words in (
+        (["-o", "third.toml"], "ground_steel.x3p: exists already, and is not written over"),
+        (["-o", "third.toml", "--unit", "um"], "--unit: says how a file is read, and none is named: expected FILE"),
+    ):
+        status, _, err = invoke("new", *arguments)
+        assert status == 2
+        assert words in err
+    assert not (tmp_path / "third.toml").exists()
+
+
+def test_help__names_what_the_example_has_written(invoke):
+    assert invoke("new")[0] == 0
+    (case,) = read_cases("ground_steel-study.toml")
+    results, traded = result_folder(case), trade_folder(case, None)
+    there = {"ground_steel.x3p", "ground_steel-study.toml", str(results), str(traded / "trade.nc")}
+    named = set()
+    for command in (main, *main.commands.values()):
+        lines = re.findall(r"^ *roughvisc (\w+) ?(.*)$", command.help, re.M)
+        assert lines, f"{command.name} has no example"
+        for verb, arguments in lines:
+            assert verb in main.commands
+            named |= {word for word in arguments.split()[:1] if not word.startswith("-")}
+    assert named == there
 
 
 def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):

@@ -15,16 +15,16 @@ PACKAGE = ROOT / "roughvisc"
 _LABELS = {"errors", "labels", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
-_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact"}
+_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact", "mechanics.sliding"}
 _EXECUTION = {*_SIMULATION, "study.simulation"}
 _COST = {*_EXECUTION, "study.execution"}
 _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "variables": set(),
-    "labels": {"variables"},
+    "labels": {"errors", "units", "variables"},
     "units": {"errors"},
-    "mechanics.materials": {"errors"},
+    "mechanics.materials": {"errors", "units"},
     "mechanics.halfspace": {"errors"},
     "mechanics.contact": {"errors", "mechanics.halfspace"},
     "mechanics.hereditary": {"errors", "mechanics.materials"},
@@ -36,11 +36,12 @@ ALLOWED = {
         "mechanics.materials",
         "units",
     },
-    "mechanics.closed_forms": {"errors", "mechanics.materials", "mechanics.stepping"},
+    "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.halfspace"},
+    "mechanics.closed_forms": {"errors", "mechanics.halfspace", "mechanics.materials", "mechanics.stepping"},
     "topography": _LABELS,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,
-    "study.progress": set(),
+    "study.progress": {"errors"},
     "study.simulation": _SIMULATION,
     "study.execution": _EXECUTION,
     "study.cost": _COST,

@@ -6,9 +6,11 @@ import tomllib
 import pytest
 from test_docs import BASE, DOCS, there  # noqa: F401  a fixture
 
+import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.schema.material import COLUMNS, MODELS
+from roughvisc.study.statement.schema.meanings import meanings
 from roughvisc.study.statement.schema.surface import RECIPES
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.views.sweep_figures.case_text import study_text
@@ -21,6 +23,8 @@ BESIDE = {
     **dict.fromkeys(TEMPERATURE, WLF),
     "activation_energy": ARRHENIUS,
     "shift_factor": {},
+    "thickness": {},
+    "base": {"thickness": 1e-3},
 }
 #: a CSV file whose headings have no units, for the keys that say them
 PLAIN = "0.01, 1\n0.1, 2\n1, 3\n"
@@ -49,7 +53,7 @@ def test_page__has_every_table_and_every_model(study_keys):
 
 
 def test_meanings__are_of_keys_that_exist(study_keys):
-    for name, keys in study_keys.MEANINGS.items():
+    for name, keys in meanings().items():
         if name.endswith(": any") and name != "generate: any":
             known = {
                 key for table in study_keys.TABLES if table.startswith("material") for key, *_ in study_keys.rows(table)
@@ -57,12 +61,12 @@ def test_meanings__are_of_keys_that_exist(study_keys):
             known.add("model")
         else:
             known = {key for key, *_ in study_keys.rows(name)}
-        assert set(keys) - {"base"} <= known, name
+        assert set(keys) - {"beside"} <= known, name
 
 
 def test_rows__say_what_the_schema_says(study_keys):
     found = {row[0]: row[1:4] for row in study_keys.rows("solve")}
-    assert found["tolerance"] == ("a number above 0 and below 1", "", "`0.001`")
+    assert found["tolerance"] == ("a number at least 1e-12 and below 1", "", "`0.001`")
     assert found["time_step"] == ("'auto', or a time above 0", "s", "`auto`")
     zener = {row[0]: row[1:4] for row in study_keys.rows("material: zener")}
     assert zener["kelvin_viscosity"] == ("a quantity above 0", "Pa s", "required")
@@ -70,9 +74,20 @@ def test_rows__say_what_the_schema_says(study_keys):
     assert second["offset"] == ("a length, or a list of two, along x and along y", "m", "`[0.0, 0.0]`")
 
 
+def test_schema__says_what_every_key_means():
+    schema = rv.study_schema()
+    sections = {"study": schema, **schema["$defs"]}
+    for name, section in sections.items():
+        for key, one in section["properties"].items():
+            assert one["description"], f"{name}.{key}"
+    of_solve = schema["$defs"]["SolveSection"]["properties"]["edge"]["description"]
+    assert of_solve.startswith(meanings()["solve"]["edge"][0])
+    assert schema["$defs"]["SecondFile"]["properties"]["flip"]["description"].startswith("axis along which")
+
+
 def test_meaning__that_is_missing_is_named(study_keys, monkeypatch):
-    monkeypatch.delitem(study_keys.MEANINGS["solve"], "edge")
-    with pytest.raises(KeyError, match=r"study_keys\.toml: \['solve'\] has no edge"):
+    monkeypatch.delitem(meanings()["solve"], "edge")
+    with pytest.raises(KeyError, match=r"keys\.toml: \['solve'\] has no edge"):
         study_keys.table("solve")
 
 
@@ -82,7 +97,7 @@ def surfaces(study_keys, name, key, example):
         return {"file": "surfaces/ground_steel.x3p"} | ({key: example} if key not in ("file", "channel") else {})
     if name.startswith("generate: "):
         recipe = name.removeprefix("generate: ").replace("any", "sphere")
-        base = tomllib.loads(study_keys.MEANINGS[name].get("base", ""))
+        base = tomllib.loads(meanings()[name].get("beside", ""))
         needed = {k: value(e) for k, _, _, default, _, e in study_keys.rows(name) if default == "required"}
         shared = (
             {"size": "1 mm", "shape": 32, "radius": "10 mm"} if recipe == "sphere" else {"size": "1 mm", "shape": 32}
@@ -102,10 +117,10 @@ def surfaces(study_keys, name, key, example):
 def materials(study_keys, name, key, example, folder):
     """``[material]`` with an example of one of its keys."""
     model = name.removeprefix("material: ")
-    if model == "temperature":
+    if model in ("temperature", "thickness"):
         return {**BASE["material"], **BESIDE[key], key: example}
     needed = {k: value(e) for k, _, _, default, _, e in study_keys.rows(name) if default == "required"}
-    base = {} if name not in study_keys.MEANINGS else tomllib.loads(study_keys.MEANINGS[name].get("base", ""))
+    base = {} if name not in meanings() else tomllib.loads(meanings()[name].get("beside", ""))
     columns = {} if key == "file" else {k: value(study_keys.meaning(name, k)[1]) for k in COLUMNS.get(model, {})}
     if key.endswith("_unit") and key not in needed:
         heads = [column.name for column in COLUMNS[model].values() if not column.optional]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity
+from roughvisc.units import quantity, unit_for
 
 PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
 
@@ -64,6 +64,13 @@ def test_quantity__takes_plain_numbers_as_they_are(number):
         ("3 s", "m", ("'3 s'", "second", " m,")),
         ("3 Pa", "Pa s", ("pascal", "Pa s")),
         ("3 bananas", "m", ("bananas", "not known")),
+        ("3 nan", "m", ("nan", "not known")),
+        ("3 m^0", "m", ("m^0", "not known")),
+        ("3 abohm^0", "m", ("abohm", "not known")),
+        ("3 m \u037a", "m", ("\u037a", "not known")),
+        ("3 dB^2", "m", ("dB", "not known")),
+        ("3 dBW", "m", ("decibelwatt", " m,")),
+        ("3 degC^2", "K", ("degree_Celsius", " K,")),
         ("3", "m", ("without a unit", "'3 m'")),
         ("um", "m", ("no quantity",)),
         ("", "m", ("no quantity",)),
@@ -103,3 +110,29 @@ def test_quantity__does_not_hang_on_hostile_text(text):
 def test_quantity__any_text_gives_a_number_or_an_input_error(text):
     with contextlib.suppress(InputError):
         assert math.isfinite(quantity(text, "m"))
+
+
+@pytest.mark.parametrize(
+    ("values", "si", "text"),
+    [
+        ([3e-9], "m", "3 nm"),
+        ([-2e-6, 1e-9], "m", "2 µm"),
+        ([0.9999999], "N", "1 N"),
+        ([999.0], "N", "999 N"),
+        ([4e5], "N/m", "400 kN/m"),
+        ([0.05e-6], "m^2", "0.05 mm²"),
+        ([2e-12], "m2", "2 µm²"),
+        ([7200.0], "s", "2 h"),
+        ([3000.0], "s", "3000 s"),
+        ([3 * 86400.0], "s", "3 d"),
+        ([2e-5], "J", "20 µJ"),
+        ([0.0, np.nan], "Pa", "0 Pa"),
+        ([2e5], "Pa s", "200 kPa s"),
+        ([4e-7], "1/Pa", "0.4 1/MPa"),
+        ([2e-5], "1/(Pa s)", "20 1/(MPa s)"),
+        ([0.0], "1/Pa", "0 1/Pa"),
+        ([0.25], "1", "0.25"),
+    ],
+)
+def test_unit_for__reads_well(values, si, text):
+    assert unit_for(values, si).text(np.nanmax(np.abs(values))) == text

@@ -5,8 +5,9 @@ import pathlib
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from roughvisc.study.execution.run import run
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_cases, vary
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
@@ -39,6 +40,20 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    figure = importlib.import_module("thin_sheet").main(cells=21, figure=tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    ratio, deviation = ({line.get_label(): line.get_data() for line in axes.lines} for axes in figure.axes)
+    at, computed = ratio["computed"]
+    exact = np.interp(at, *ratio["integral equation"])
+    np.testing.assert_allclose(computed, exact, rtol=5e-3)
+    np.testing.assert_allclose(deviation["computed"][1], 100 * (computed / exact - 1), atol=1e-9)
+    off = np.interp([0.5, 1.0], *deviation["Dimitriadis et al. (2002)"])
+    np.testing.assert_allclose(off, [-8, -16], atol=0.5)
+    assert len(capsys.readouterr().out.splitlines()) == len(at), "the table"
+
+
 def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)
@@ -46,6 +61,25 @@ def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
     assert found.error.shape == (5, 5)
     assert float(found.duration.max() / found.duration.min()) == pytest.approx(1e24)
     assert (found.error < 1e-3).all(), "none refused, and the tolerance kept"
+
+
+def test_friction_curve__rises_and_falls_as_the_rubber_stiffens(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    module = importlib.import_module("friction_curve")
+    curve = module.main(48, tmp_path / "curve.png", tmp_path / "curve.nc")
+    assert (tmp_path / "curve.png").stat().st_size > 10_000
+    assert curve.speed.size == 13
+    assert (curve.status == 0).all()
+    friction = curve.friction_coefficient.values
+    most = int(friction.argmax())
+    assert 0 < most < 12
+    assert (np.diff(friction[: most + 1]) > 0).all()
+    assert (np.diff(friction[most:]) < 0).all()
+    assert (np.diff(curve.contact_area_corrected) < 0).all(), "the area falls with the speed"
+    assert ((curve.last_octave_friction > 0) & (curve.last_octave_friction < 1)).all()
+    assert (curve.last_octave_area < 0).all(), "finer roughness takes area away"
+    with xr.open_dataset(tmp_path / "curve.nc") as stored:
+        assert stored.identical(curve)
 
 
 def test_benchmarks__run_small(tmp_path, monkeypatch):

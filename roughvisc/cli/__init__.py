@@ -1,4 +1,4 @@
-"""The command line: ``roughvisc scan | new | plan | run | trade | plot | report | validate``.
+"""The command line: ``roughvisc scan | new | plan | run | trade | plot | report | verify | clean | validate``.
 
 Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted. Heavy imports
 are made inside the commands, so that ``--help`` is quick.
@@ -9,8 +9,9 @@ from roughvisc.cli.new import new
 from roughvisc.cli.results import plot, report, validate
 from roughvisc.cli.scans import scan
 from roughvisc.cli.studies import plan, run, trade
+from roughvisc.cli.upkeep import clean, verify
 
 __all__ = ["main"]
 
-for _command in (run, plan, trade, scan, new, plot, report, validate):
+for _command in (run, plan, trade, scan, new, plot, report, verify, clean, validate):
     main.add_command(_command)

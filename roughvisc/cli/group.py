@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from roughvisc.cli.reading import naming_keys, naming_options
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.errors import InputError, RoughviscError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,13 +27,24 @@ class Failure(click.ClickException):
         self.exit_code = status
 
     def show(self, file: Any = None) -> None:
-        click.echo(f"roughvisc: {self.message}", err=True)
+        complain(self.message)
+
+
+def complain(message: str) -> None:
+    """One message on the standard error stream."""
+    click.echo(f"roughvisc: {printable(message)}", err=True)
+
+
+def counted(count: int, what: str) -> str:
+    """A count of things, in words."""
+    return f"{count} {what}" + ("" if count == 1 else "s")
 
 
 def say(console: Console, what: str, path: Path) -> None:
     """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)
-    console.print(f"{what}: {path if shown.startswith('..') else shown}", soft_wrap=True, highlight=False)
+    line = printable(f"{what}: {path if shown.startswith('..') else shown}")
+    console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 class Commands(click.Group):
@@ -51,6 +62,19 @@ class Commands(click.Group):
             if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
                 raise
             raise Failure(f"{error.filename or 'input or output'}: {error.strerror or error}", 1) from error
+        except MemoryError as error:
+            raise Failure("not enough memory: roughvisc plan says how much a study needs", 1) from error
+        except RecursionError as error:
+            raise Failure("the input is nested too deeply: expected tables of a few levels", 2) from error
+        except OverflowError as error:
+            raise Failure(
+                f"a number of the input is too large ({error}): expected one that a double can hold", 2
+            ) from error
+        except RuntimeError as error:
+            if not str(error).startswith("NetCDF: "):
+                raise
+            advice = "a file is damaged, and roughvisc verify says which"
+            raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
         except KeyboardInterrupt as error:
             raise Failure("interrupted; what was finished is kept", 130) from error
 
@@ -64,7 +88,8 @@ def main() -> None:
 
     \b
     Example:
-      roughvisc scan ground.sur
-      roughvisc run study.toml
-      roughvisc plot results/study
+      roughvisc new
+      roughvisc scan ground_steel.x3p
+      roughvisc run ground_steel-study.toml
+      roughvisc report results/ground_steel-study
     """

@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import click
 
 from roughvisc.cli.group import say
 from roughvisc.cli.reading import read_options, reading_options
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
+
+#: Scan that is written where none is named, and folders that hold it: of an installation, and of a checkout.
+EXAMPLE = "ground_steel.x3p"
+_PACKAGE = Path(__file__).parents[1]
+_HELD_IN = (_PACKAGE / "example", _PACKAGE.parent / "surfaces")
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path), required=False)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="The study. [default: FILE's name-study.toml, here]")
 @reading_options
-def new(file: Path, out: Path | None, **given: str | None) -> None:
-    """Write a first study for a scan, with comments: ready to be run, and to be changed.
+def new(file: Path | None, out: Path | None, **given: str | None) -> None:
+    """Write a first study for a scan, to be run and to be changed.
 
-    The scan is looked at as `roughvisc scan` does, and the study conditions it accordingly. It is pressed on a rubber
-    with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a surface card.
+    The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
+    on a rubber with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a
+    surface card; without one a scan is written here to try things with, ground_steel.x3p.
 
     \b
     Example:
-      roughvisc new ground.sur
-      roughvisc plan ground-study.toml
-      roughvisc run ground-study.toml
+      roughvisc new
+      roughvisc plan ground_steel-study.toml
+      roughvisc run ground_steel-study.toml
+      roughvisc new ground_steel.x3p --out other.toml
     """
     from rich.console import Console
 
@@ -36,18 +44,37 @@ def new(file: Path, out: Path | None, **given: str | None) -> None:
     from roughvisc.views.console.scan_advice import advice_table
 
     options = read_options(**given)
-    out = out or Path(f"{file.stem}-study.toml")
+    wanted = file or Path(EXAMPLE)
+    out = out or Path(f"{wanted.stem}-study.toml")
     if out.suffix.lower() != ".toml":
         raise InputError(f"{out}: found the suffix {out.suffix!r}: expected the name of a study, .toml")
     if out.exists():
         raise InputError(f"{out}: exists already, and is not written over: expected another name (--out)")
-    found = inspect_scan(open_scan(file, **options))
-    text = starter_study(file, out, options, found)
+    if file is None:
+        for option in (name for name, value in given.items() if value):
+            raise InputError(f"--{option}: says how a file is read, and none is named: expected FILE")
+        _write_example(wanted)
+    found = inspect_scan(open_scan(wanted, **options))
+    text = starter_study(wanted, out, options, found)
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()
     console.print(advice_table(found))
     console.print()
+    if file is None:
+        say(console, "Scan", wanted)
     say(console, "Study", out)
     following = f"Next: roughvisc plan {out}\n      roughvisc run {out}"
-    console.print(following, soft_wrap=True, highlight=False, markup=False)
+    console.print(printable(following), soft_wrap=True, highlight=False, markup=False)
+
+
+def _write_example(path: Path) -> None:
+    """Write the scan that ships with roughvisc; one that is there already stays, and has to be the same."""
+    from roughvisc.study.storage.store import whole_file
+
+    held = next(folder / EXAMPLE for folder in _HELD_IN if (folder / EXAMPLE).exists())
+    if not path.exists():
+        with whole_file(path) as temporary:
+            shutil.copyfile(held, temporary)
+    elif path.read_bytes() != held.read_bytes():
+        raise InputError(f"{path}: exists already, and is not written over: expected an empty folder, or your own FILE")

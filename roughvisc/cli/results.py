@@ -13,33 +13,36 @@ from roughvisc.cli.group import Failure, say
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
 def plot(result: Path, out: Path | None) -> None:
-    """Draw the figures of a result, of all results in a folder, or of a trade.
+    """Draw the figures of a result, of a folder, or of a trade.
 
-    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases.
+    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases. What
+    was varied in a case stands above its figures and in the names of their files.
 
     \b
     Example:
-      roughvisc plot results/quickstart --out figures
-      roughvisc plot results/study-trade/trade.nc
+      roughvisc plot results/ground_steel-study --out figures
+      roughvisc plot results/ground_steel-study-trade/trade.nc
     """
     from rich.console import Console
 
     from roughvisc.study.storage.store import no_results, open_result, result_files
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import results_of, write_figure
+    from roughvisc.views.sweep_figures.files import cases_in, results_of, write_figure
 
     paths = result_files(result) if result.is_dir() else [result]
     if not paths:
         raise no_results(result)
     console = Console()
+    names = cases_in(paths) if result.is_dir() else {}
     for path in paths:
         if path.is_file() and is_trade(path):
             picture = (out or path.parent) / f"{path.stem}.png"
             say(console, "Figure", write_figure(trade(open_trade(path)), picture))
             continue
+        stem, title = names.get(path, (path.stem, ""))
         with open_result(path) as dataset:
-            for figure in save_figures(dataset, out or path.parent, path.stem):
+            for figure in save_figures(dataset, out or path.parent, stem, title=title):
                 say(console, "Figure", figure)
     together = results_of(result) if len(paths) > 1 else None
     for figure in save_sweep_figures(together, out or result) if together is not None else ():
@@ -50,14 +53,15 @@ def plot(result: Path, out: Path | None) -> None:
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Page. [default: report.html in the folder]")
 def report(results: Path, output: Path | None) -> None:
-    """Write one self-contained page (HTML) about a result, or about all results in a folder.
+    """Write one page (HTML) about a result, or about a folder.
 
     What was run, the surface and its conditioning, figures, cases with accuracy and cost, and how to run them again;
-    case and time can be picked. Nothing is fetched from anywhere when the page is looked at.
+    case and time can be picked. The page is one file, with all results of the folder. Nothing is fetched
+    from anywhere when the page is looked at.
 
     \b
     Example:
-      roughvisc report results/quickstart -o quickstart.html
+      roughvisc report results/ground_steel-study -o steel.html
     """
     from rich.console import Console
 

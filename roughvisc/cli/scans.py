@@ -15,6 +15,7 @@ from roughvisc.errors import InputError
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--plot", type=click.Path(path_type=Path), help="Quick-look picture. [default: FILE's name.png, here]")
 @click.option("--to", type=click.Path(path_type=Path), help="Convert: write the heights to a .nc, .x3p or .sdf file.")
+@click.option("--force", is_flag=True, help="Write over a picture or a converted file that is there.")
 @click.option(
     "--card",
     type=click.Path(path_type=Path),
@@ -29,18 +30,20 @@ def scan(
     plot: Path | None,
     to: Path | None,
     card: Path | None,
+    force: bool,
     **given: str | None,
 ) -> None:
-    """Say what is in a scan and what to do with it, and draw it; convert it, or write a surface card for it.
+    """Say what is in a scan and what to do with it, and draw it.
 
     Size, channels, missing points, areal parameters; spikes, tilt, form, borders and noise, each with what follows
     from it; and a [surface] table that is ready for a study. The picture is of the scan less its mean plane, as the
-    parameters are. FILE is an instrument file or a surface card.
+    parameters are. No file that is there already is written over without --force. FILE is an instrument file or a
+    surface card; it can be converted, and be given a surface card.
 
     \b
     Example:
-      roughvisc scan ground.sur --plot ground.png
-      roughvisc scan ground.sur --to ground.x3p --card
+      roughvisc scan ground_steel.x3p --plot steel.png
+      roughvisc scan ground_steel.x3p --to steel.nc --card
     """
     from rich.console import Console
 
@@ -63,9 +66,10 @@ def scan(
     text = card_text(file, card.parent, options) if card else ""
     if to:
         known_suffix(to)
-    for out in filter(None, (to, card, picture)):
-        if out.exists() and (out == card or out.samefile(file)):
-            raise InputError(f"{out}: exists already, and is not written over: expected another name")
+    for out in filter(None, (to, card, picture if plot or force else None)):
+        if out.exists() and (not force or out == card or out.samefile(file)):
+            advice = "expected another name" + (" (or --force)" if out != card and not out.samefile(file) else "")
+            raise InputError(f"{out}: exists already, and is not written over: {advice}")
     console = Console()
     levelled = level(height)
     console.print(scan_table(height, parameters(levelled), file.name, channels))
@@ -74,7 +78,10 @@ def scan(
     console.print(advice_table(found))
     console.print()
     console.print(surface_table(file, Path(), options, found.steps), soft_wrap=True, highlight=False, markup=False)
-    say(console, "Picture", write_figure(surface(levelled), picture))
+    if picture.exists() and not force and not plot:
+        say(console, "Not written over (--force does)", picture)
+    else:
+        say(console, "Picture", write_figure(surface(levelled), picture))
     if to:
         with whole_file(to) as temporary:
             save_scan(height, temporary)

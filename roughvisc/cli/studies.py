@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure, say
-from roughvisc.errors import InputError
+from roughvisc.cli.group import Failure, complain, say
+from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
 @click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
 @click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
+@click.option("--same-bits", is_flag=True, help="Compute again what other versions of the transforms have computed.")
 @click.option("--profile", is_flag=True, help="Say where the time went; computes in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: bool, **where: Any) -> None:
@@ -40,8 +41,8 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
 
     \b
     Example:
-      roughvisc run workflows/quickstart.toml --out /tmp/quickstart
-      roughvisc run workflows/load_sweep.toml --scheduler-file scheduler.json
+      roughvisc run ground_steel-study.toml --out steel
+      roughvisc run ground_steel-study.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
 
@@ -56,9 +57,9 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
         raise InputError("--profile: times this process only: expected no --scheduler, --scheduler-file or --workers")
     with _profile(console) if profile else nullcontext():
         if len(cases) == 1 and not elsewhere:
-            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots)
+            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots, where["same_bits"])
             if complaint:
-                click.echo(f"roughvisc: {study.stem}: {complaint}", err=True)
+                complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
         else:
             _run_all(cases, folder, console, **(where | {"workers": 0} if profile else where))
@@ -75,18 +76,20 @@ def _profile(console: Console) -> Iterator[None]:
     console.print(profile_table(profile))
 
 
-def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool) -> str:
+def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
     from dask.system import CPU_COUNT
     from scipy import fft
 
-    from roughvisc.study.execution.run import run_case, unconverged
+    from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.progress import Bar
-    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.storage.store import open_result, result_path
     from roughvisc.views.console.tables import reached, result_table
 
+    if is_result_of(case, result_path(folder, case.key)):
+        console.print("Finished before: nothing has to be computed")
     with Bar(console, label, reached) as bar, fft.set_workers(CPU_COUNT):
-        path = run_case(case, folder, progress=bar.reached)
+        path = run_case(case, folder, progress=bar.reached, same_bits=same_bits)
     with open_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
@@ -107,6 +110,7 @@ def _run_all(
     scheduler: str | None,
     scheduler_file: Path | None,
     retry_failed: bool,
+    same_bits: bool,
 ) -> None:
     """Compute and sum up a sweep."""
     from contextlib import ExitStack
@@ -114,6 +118,7 @@ def _run_all(
     from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.sweep import LOG, run_cases
     from roughvisc.study.execution.watch import watcher
+    from roughvisc.study.storage.table import CASES
     from roughvisc.views.console.tables import sweep_table
 
     with ExitStack() as stack:
@@ -126,17 +131,19 @@ def _run_all(
             client=client,
             workers=workers,
             retry_failed=retry_failed,
+            same_bits=same_bits,
             watch=watcher(not console.quiet, console),
         )
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     say(console, "Results", folder)
+    say(console, "Table of the cases", folder / CASES)
     say(console, "Log", folder / LOG)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
     for outcome in bad:
         again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
         where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
-        click.echo(f"roughvisc: {where}: {outcome.message}", err=True)
+        complain(f"{where}: {outcome.message}")
     if all(outcome.error in ("InputError", "EdgeContactError") for outcome in outcomes.values()):
         raise Failure("no case could be computed: the input is wrong", 2)
     if bad:
@@ -148,14 +155,14 @@ def _run_all(
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
 @click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
-    """Say what a study will model and what it will cost, before anything is spent.
+    """Say what a study will model, and what it will cost.
 
-    Nothing is written. Steps and transforms are those of coarse marches, seconds those of a solve that is timed here;
-    a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+    Nothing is run or written. Steps and transforms are those of coarse marches, seconds those of a solve that is
+    timed here; a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
 
     \b
     Example:
-      roughvisc plan workflows/load_sweep.toml
+      roughvisc plan ground_steel-study.toml
     """
     from rich.console import Console
 
@@ -163,9 +170,10 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     from roughvisc.views.console.tables import plan_tables
 
     costs = planned(study, out, workers=workers)
-    Console().print(plan_tables(costs))
-    if costs.attrs["refusal"]:
-        raise Failure(f"{study}: cannot run as it stands: {costs.attrs['refusal']}", 2)
+    if not costs["refusal"].all():
+        Console().print(plan_tables(costs))
+    if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
+        raise Failure(f"{study}: cannot run as it stands: {why}", 2)
 
 
 @click.command()
@@ -176,7 +184,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.option("--budget", metavar="TIME", default="5 min", help="Wall time of all runs together.", show_default=True)
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
-    """Measure what accuracy costs in a study, and say which setting to take.
+    """Measure what accuracy costs, and say which setting to take.
 
     The case is computed under a ladder of settings: tolerances, grids, fixed steps, memories, the seed paper's
     algorithm. Each is timed and held against a closed form where the case has one, else against its own finest run.
@@ -184,8 +192,8 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     \b
     Example:
-      roughvisc trade workflows/ball_on_rubber.toml
-      roughvisc trade study.toml --apply 1%
+      roughvisc trade ground_steel-study.toml
+      roughvisc trade ground_steel-study.toml --apply 1%
     """
     from dask.system import CPU_COUNT
     from rich.console import Console
@@ -218,4 +226,5 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
             shortfall = recommend.shortfall(dataset, quantity, part)
             raise Failure(f"{study}: --apply {target}: {shortfall}; the study is as it was", 1)
         changes = apply(study, recommend.keys_of(dataset, index))
-        console.print(f"{study}: {changes or 'as it should be already'}", soft_wrap=True, highlight=False)
+        said = printable(f"{study}: {changes or 'as it should be already'}")
+        console.print(said, soft_wrap=True, highlight=False, markup=False)

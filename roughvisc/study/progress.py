@@ -13,6 +13,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.errors import printable
+
 #: Seconds between two lines, and between two pictures.
 LINE_EVERY, PICTURE_EVERY = 10.0, 0.2
 
@@ -70,7 +72,7 @@ class Display:
         """Write a line, once; a picture stays below it."""
         if line != self._said:
             self._said = line
-            self.console.print(Text(line), soft_wrap=True)
+            self.console.print(Text(printable(line)), soft_wrap=True)
 
     def stop(self) -> None:
         """Draw no more: the picture vanishes."""
@@ -82,7 +84,7 @@ class Display:
         rows = Table.grid(padding=(0, 1))
         for label, done, total, text in self._rows():
             bar = "" if total is None else ProgressBar(total=total or 1.0, completed=done, width=30)
-            rows.add_row(Text(label), bar, Text(text))
+            rows.add_row(Text(printable(label)), bar, Text(text))
         return Group(rows, *([Text(self._line())] if self._below else []))
 
 

@@ -16,9 +16,9 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography import conditioning
-from roughvisc.topography.readers import existing, read_file, sha256
+from roughvisc.topography.readers import existing, read_file, regular, sha256
 from roughvisc.topography.recipes import RECIPES, UNITS, make
-from roughvisc.units import quantity
+from roughvisc.units import quantity, shown
 
 _PROVENANCE = ("title", "description", "licence", "source")
 _FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "spacing")
@@ -55,10 +55,7 @@ def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.Dat
     path = Path(path)
     if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
         raise InputError(f"{path}: found {named} beside a surface card: expected it in the card")
-    try:
-        card = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: this is no surface card in TOML: {error}") from error
+    card = read_toml(path, "surface card in TOML")
     try:
         if ("file" in card) == ("generate" in card):
             raise InputError(
@@ -73,6 +70,25 @@ def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.Dat
         raise InputError(f"{path}: {error}") from error
     instrument = {"instrument": card["instrument"]} if "instrument" in card else {}
     return h.assign_attrs(card=path.name, **about, **instrument)
+
+
+def read_toml(path: Path, wanted: str) -> dict[str, Any]:
+    """Tables of a TOML file, with a byte-order mark or without.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, cannot be read, or is not what is ``wanted``.
+    """
+    regular(path)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except ValueError as error:  # of TOML, of the text's encoding, of an integer of thousands of digits
+        raise InputError(f"{path}: is no {wanted}: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{path}: is no {wanted}: it is nested too deeply") from error
 
 
 def generate(table: Mapping[str, Any]) -> xr.DataArray:
@@ -90,8 +106,8 @@ def generate(table: Mapping[str, Any]) -> xr.DataArray:
         If the recipe or a key is unknown, a parameter is missing, or a value is wrong.
     """
     name = table["generate"]
-    if name not in RECIPES:
-        raise InputError(f"generate is {name!r}: expected one of {', '.join(RECIPES)}")
+    if not isinstance(name, str) or name not in RECIPES:
+        raise InputError(f"generate is {shown(name)}: expected one of {', '.join(RECIPES)}")
     given = {key: value for key, value in table.items() if key != "generate"}
     _known(given, RECIPES[name], f"{name} takes")
     try:

@@ -1,7 +1,7 @@
 """The labelled grid that every reader, recipe and conditioning step gives: height over (x, y).
 
 Coordinates are those of the cell centres, in metres; the grid covers ``n`` cells of one size in each direction, so
-that the spacing is size over n. Missing points are NaN.
+that the spacing is size over n. Missing points are NaN. Whatever a user gives as heights passes :func:`checked`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.units import quantity, shown
 from roughvisc.variables import VARIABLES
+
+#: Attributes of numbers as a file packs them, before xarray decodes them.
+_PACKED = {"scale_factor", "add_offset", "_FillValue", "missing_value"}
+
+#: 16384 squared: a field of doubles takes 2 GB.
+MOST_CELLS = 1 << 28
 
 
 def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] | None = None) -> xr.DataArray:
@@ -48,12 +55,16 @@ def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] |
 
 
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
-    """The grid as float64 over ``("x", "y")``, after a check that it is one.
+    """The grid as float64 in metres over ``("x", "y")``, after a check that it is one: the door for all heights.
+
+    Heights and coordinates that state a unit of length, as an attribute ``units`` or as pint arrays, are converted;
+    those that state none are metres. A Dataset stands for its variable ``height``; masked points become NaN; any
+    order of the dimensions and any type of real numbers will do.
 
     Parameters
     ----------
-    h : xarray.DataArray
-        Heights over x and y. [m]
+    h : xarray.DataArray or xarray.Dataset
+        Heights over x and y, or a Dataset that holds them as ``height``.
     step : str
         Who asks, for the message.
     least : int
@@ -62,21 +73,90 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     Raises
     ------
     InputError
-        If `h` is no DataArray over exactly the dimensions x and y, has fewer than `least` points in a direction,
-        no numeric coordinates, or unequal steps; the message names the `step` that asked.
+        If `h` holds no real numbers over exactly the dimensions x and y, has fewer than `least` points in a
+        direction, no numeric coordinates, unequal steps, or a unit that is no length; the message names the `step`
+        that asked.
     """
+    if isinstance(h, xr.Dataset):
+        if "height" not in h.data_vars:
+            held = ", ".join(map(str, h.data_vars)) or "nothing"
+            raise InputError(f"{step}: found a Dataset that holds {held}: expected one that holds 'height'")
+        h = h["height"]
     if not isinstance(h, xr.DataArray):
         raise InputError(f"{step}: found {type(h).__name__}: expected an xarray.DataArray of heights (see from_array)")
-    if set(h.dims) != {"x", "y"} or h.dtype.kind not in "fiu":
-        raise InputError(
-            f"{step}: found dimensions {tuple(map(str, h.dims))} of {h.dtype}: expected numbers over ('x', 'y')"
-        )
-    h = h.transpose("x", "y").astype(float, copy=False)
+    if set(h.dims) != {"x", "y"}:
+        raise InputError(f"{step}: found dimensions {tuple(map(str, h.dims))}: expected heights over ('x', 'y')")
+    h = h.transpose("x", "y").compute()
+    h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
+    positions = {
+        axis: (axis, in_metres(h[axis], f"{step}: coordinate {axis!r}"), h[axis].attrs)
+        for axis in ("x", "y")
+        if axis in h.coords and unit_of(h[axis]) not in (None, "m")
+    }
+    h = h.assign_coords(positions) if positions else h
+    for axis in ("x", "y"):
+        if axis in h.coords:
+            h[axis].attrs["units"] = "m"
     spacing(h, step)
     for axis in ("x", "y"):
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
     return h
+
+
+def unit_of(numbers: Any) -> str | None:
+    """Unit that an array states: a pint array its own, a DataArray the attribute ``units``; None if none."""
+    held = numbers.data if isinstance(numbers, xr.DataArray) else numbers
+    if hasattr(held, "magnitude"):
+        return str(held.units)
+    stated = numbers.attrs.get("units") if isinstance(numbers, xr.DataArray) else None
+    return None if stated is None else str(stated)
+
+
+def metres_in(unit: str, name: str) -> float:
+    """Metres in a unit of length; an :class:`InputError` that names who is in it, if it is none."""
+    if unit == "m":
+        return 1.0
+    try:
+        return quantity(f"1 {unit}", "m")
+    except InputError as error:
+        raise InputError(f"{name} has the unit {unit!r}: expected a length, such as 'm' or 'um'") from error
+
+
+def in_metres(numbers: Any, name: str) -> np.ndarray:
+    """Plain float64 numbers of heights or positions, converted from the unit that they state; NaN where masked. [m]
+
+    Parameters
+    ----------
+    numbers : DataArray, pint array or array_like
+        Real numbers; metres if they state no unit.
+    name : str
+        What they are, for the message.
+
+    Raises
+    ------
+    InputError
+        If they are no real numbers, are packed as in a file, or their unit is no length.
+    """
+    unit = unit_of(numbers)
+    factor = 1.0 if unit is None else metres_in(unit, name)
+    if isinstance(numbers, xr.DataArray):
+        packed = _PACKED & set(numbers.attrs)
+        if packed:
+            raise InputError(
+                f"{name} is packed (attribute {sorted(packed)[0]!r}): expected decoded numbers, as xarray opens them "
+                "with mask_and_scale=True"
+            )
+        numbers = numbers.data
+    held = getattr(numbers, "magnitude", numbers)
+    try:
+        held = held if isinstance(held, np.ma.MaskedArray) else np.asarray(held)
+    except ValueError as error:  # rows of different lengths
+        raise InputError(f"{name} is {type(held).__name__}: expected real numbers, as many in each row") from error
+    if held.dtype.kind not in "fiu":
+        raise InputError(f"{name} is of {held.dtype}: expected real numbers")
+    values = np.ma.filled(held.astype(float, copy=False), np.nan)
+    return values if factor == 1.0 else values * factor
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
@@ -88,7 +168,8 @@ def axis_step(h: xr.DataArray | xr.Dataset, axis: str, step: str) -> float:
     """Side of the cells along one axis of a grid [m], as :func:`cell_side` gives it."""
     if axis not in h.coords:
         raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
-    return cell_side(h[axis].values, f"{step}: coordinate {axis!r}")
+    name = f"{step}: coordinate {axis!r}"
+    return cell_side(in_metres(h[axis], name), name)
 
 
 def cell_side(centres: Any, name: str = "the coordinate") -> float:
@@ -194,5 +275,9 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole:
-        raise InputError(f"{name} is {value!r}: expected a whole number of cells of at least {low}, or a pair of them")
+        raise InputError(
+            f"{name} is {shown(value)}: expected a whole number of cells of at least {low}, or a pair of them"
+        )
+    if both[0] * both[1] > MOST_CELLS:
+        raise InputError(f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}")
     return int(both[0]), int(both[1])

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import with_coordinates
+from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
@@ -28,7 +31,8 @@ def is_labelled(path: Path) -> bool:
     """Whether an HDF5 file holds a variable over x and y, as netCDF does."""
     try:
         return any(channel.is_height for channel in grid_channels(path))
-    except Exception:  # of another layout, or damaged: its own reader will say so
+    # of another layout, or damaged: its own reader will say so
+    except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError):
         return False
 
 
@@ -46,7 +50,7 @@ def open_grid(
         h = h.load() if heights else h.copy(data=np.broadcast_to(np.nan, h.shape)).compute()
     extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
     h = h.transpose("x", "y")
-    metres = _metres(h.attrs.get("units"), unit, channel.name)
+    metres = _metres(unit_of(h), unit, channel.name)
     axes = []
     for axis, given in zip(("x", "y"), spacing or (None, None), strict=True):
         if given is not None:
@@ -54,7 +58,7 @@ def open_grid(
         elif axis not in h.coords:
             raise InputError(f"there is no coordinate {axis!r}: pass spacing= [m]")
         else:
-            axes.append(h[axis].values.astype(float) * _metres(h[axis].attrs.get("units"), unit, axis))
+            axes.append(h[axis].values.astype(float) * _metres(unit_of(h[axis]), unit, axis))
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
     grid = with_coordinates(h.values.astype(float) * metres if heights else h.values, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
@@ -64,11 +68,17 @@ def open_grid(
     return grid
 
 
-def _open(path: Path) -> xr.Dataset:
+@contextmanager
+def _open(path: Path) -> Iterator[xr.Dataset]:
     zarr = path.suffix.lower() == ".zarr"
     if zarr and find_spec("zarr") is None:
         raise InputError("it is in Zarr, which needs the package zarr: install it, or convert the file to netCDF")
-    return xr.open_dataset(path, engine="zarr" if zarr else "netcdf4", decode_times=False)
+    if zarr:
+        with xr.open_dataset(path, engine="zarr", decode_times=False) as dataset:
+            yield dataset
+    else:  # xarray would lock no more than the reading, and netCDF-4 does not stand two threads at all
+        with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, engine="netcdf4", decode_times=False, lock=False) as dataset:
+            yield dataset
 
 
 def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:
@@ -91,9 +101,9 @@ def _is_length(unit: Any) -> bool:
         return False
 
 
-def _metres(stated: Any, unit: float | None, name: str) -> float:
+def _metres(stated: str | None, unit: float | None, name: str) -> float:
     if stated is not None:
-        return quantity(f"1 {stated}", "m", f"the unit of {name}")
+        return metres_in(stated, name)
     if unit is None:
         raise InputError(f"{name} has no attribute 'units': pass unit= (such as unit='um')")
     return unit

@@ -9,7 +9,9 @@ row j of the file is ``y[j]``, as it stands there.
 from __future__ import annotations
 
 import traceback
+import zipfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
@@ -37,6 +39,8 @@ _PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metrop
 _PLAIN |= {"plu", "tmd", "wsxm", "xyz"}
 #: No deflated stream expands further than this.
 EXPANSION = 1040
+#: Measured heights are not compressed so far: a file that expands so, and beyond this size, is none. [1, byte]
+_PLAUSIBLE, _SMALL = 100, 256 << 20
 
 
 @dataclass(frozen=True)
@@ -111,13 +115,10 @@ def open_instrument(path: Path, format: str | None) -> Opened:
         return _npy(path)
     failures: dict[str, Exception] = {}
     for candidate in candidates:
-        try:
-            return _surface_topography(path, candidate)
-        except InputError:
-            raise
-        except Exception as error:  # each reader has its own kinds, struct.error and KeyError among them
-            forget(error)
-            failures[candidate] = error
+        opened = _tried(path, candidate)
+        if isinstance(opened, Opened):
+            return opened
+        failures[candidate] = opened
     raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
 
 
@@ -193,11 +194,22 @@ def affordable(path: Path, points: int, expansion: float) -> None:
     held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
+    _modest(8 * points, held)
+
+
+def _modest(size: int, held: int) -> None:
+    if size > max(_PLAUSIBLE * held, _SMALL):
+        raise InputError(
+            f"it would take {size:.3g} bytes in memory, {size / held:.0f} times as many as the file has: expected "
+            f"measured heights, at most {_PLAUSIBLE} times"
+        )
 
 
 def _x3p(path: Path) -> Opened:
     import x3pio
 
+    with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as parts:  # the reader says what is wrong with it
+        _modest(sum(part.file_size for part in parts.infolist()), path.stat().st_size)
     info = x3pio.info(path, verify=False)
     surface = info.feature_type == x3pio.FeatureType.SURFACE and len(info.shape) == 2
     affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)), EXPANSION)
@@ -243,12 +255,9 @@ _BUILT_IN = frozenset(OWN_SUFFIXES)
 
 def _csv(path: Path) -> Opened:
     """Points x, y, z one a line, as SurfaceTopography takes them, or else a matrix."""
-    try:
-        return _surface_topography(path, "xyz")
-    except InputError:
-        raise
-    except Exception as error:  # no such points
-        forget(error)
+    opened = _tried(path, "xyz")
+    if isinstance(opened, Opened):
+        return opened
     return replace(_surface_topography(path, "asc", source=separated_by_blanks(path)), format="csv")
 
 
@@ -266,6 +275,17 @@ def _detected(path: Path) -> str:
     from SurfaceTopography.IO import detect_format
 
     return detect_format(str(path))
+
+
+def _tried(path: Path, format: str) -> Opened | Exception:
+    """The header by one reader of SurfaceTopography, or why that cannot read it."""
+    try:
+        return _surface_topography(path, format)
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001  (each reader has its own kinds, struct.error and KeyError among them)
+        forget(error)
+        return error
 
 
 def _surface_topography(path: Path, format: str, source: TextIO | None = None) -> Opened:

@@ -23,7 +23,7 @@ PARAMETERS = {
     "rms_slope": ("1", "root mean square slope, both directions together: the same as Sdq"),
     "rms_slope_x": ("1", "root mean square slope along x"),
     "rms_slope_y": ("1", "root mean square slope along y"),
-    "rms_curvature": ("m-1", "root mean square of the mean curvature, half the Laplacian"),
+    "rms_curvature": ("1/m", "root mean square of the mean curvature, half the Laplacian"),
     "missing_fraction": ("1", "share of the points that are missing"),
 }
 

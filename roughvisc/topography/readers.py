@@ -21,7 +21,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography import gridfiles, instruments
-from roughvisc.topography.grid import checked, labelled, noted, pair
+from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.instruments import Channel, Opened, brief, forget
 from roughvisc.topography.orientation import orientation
@@ -53,9 +53,13 @@ def read_file(
     metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
     sides = None if spacing is None else pair("spacing", spacing)
     read = _from_grid if _is_grid(path, format) else _from_instrument
+    before = path.stat()
     h, opened, chosen = read(path, format, channel, metres, sides, heights)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
+    now = path.stat()
+    if (before.st_ino, before.st_size, before.st_mtime_ns) != (now.st_ino, now.st_size, now.st_mtime_ns):
+        raise InputError(f"{path}: was changed while it was read: expected a file that stays as it is")
     others = [other.name for other in opened.channels if other.index != chosen.index]
     attrs["orientation"] = orientation(opened.format)
     attrs |= {"instrument": opened.instrument} if opened.instrument else {}
@@ -75,7 +79,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Heights over (x, y), peaks up, NaN where missing. [m]
+        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m]
     spacing : float or pair of float
         Cell sides (dx, dy). [m]
 
@@ -89,10 +93,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     InputError
         If the array is not two-dimensional with at least two points each way, or holds no or infinite heights.
     """
-    try:
-        values = np.array(np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"heights is {type(heights).__name__}: expected numbers of shape (nx, ny)") from error
+    values = np.array(in_metres(heights, "heights"))
     if values.ndim != 2 or min(values.shape) < 2:
         raise InputError(f"heights has shape {values.shape}: expected (nx, ny) of at least 2 x 2")
     h = labelled(values, pair("spacing", spacing))
@@ -144,6 +145,7 @@ def supported_formats() -> dict[str, tuple[str, ...]]:
 
 def sha256(path: Path) -> str:
     """Checksum of a file's content; of a folder's files in order of their names."""
+    regular(path)
     if path.is_dir():
         parts = (f"{p.relative_to(path)} {sha256(p)}" for p in sorted(path.rglob("*")) if p.is_file())
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
@@ -229,9 +231,16 @@ def existing(path: Any) -> Path:
         raise InputError(f"path is {type(path).__name__}: expected the name of a file") from error
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
+    regular(path)
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
     return path
+
+
+def regular(path: Path) -> None:
+    """Refuse what is there and is neither a file nor a folder: reading a device or a pipe need not end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(f"{path}: is a device or a pipe: expected a file")
 
 
 def _is_grid(path: Path, format: str | None) -> bool:

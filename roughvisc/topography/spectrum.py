@@ -11,6 +11,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, spacing
 
+# Of the mean square slope, what tells the shortest wave of a surface.
+_OF_SLOPE = 0.99
+
 
 def hann(z: np.ndarray) -> np.ndarray:
     """Heights under a Hann window whose mean square is one. [m]"""
@@ -47,6 +50,34 @@ def modes(
     if ny % 2 == 0:
         count[-1] = 1.0
     return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
+
+
+def without_last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, float]:
+    """Heights that repeat, without the shortest octave of their waves.
+
+    Parameters
+    ----------
+    z : ndarray, shape (nx, ny)
+        Heights. [m]
+    cells : tuple of float
+        Cell sides. [m]
+
+    Returns
+    -------
+    heights : ndarray, shape (nx, ny)
+        Without the waves shorter than the length below. [m]
+    shortest : float
+        Twice the wavelength above which 99 % of the mean square slope lie: what is below that one counts as none. [m]
+    """
+    q_x, q_y, power, count = modes(z, cells)
+    q = np.hypot(q_x, q_y)
+    order = np.argsort(q, axis=None)
+    slope = np.cumsum((count * q**2 * power).ravel()[order])
+    if not slope[-1] > 0:
+        return z, 0.0
+    most = 0.5 * float(q.ravel()[order][np.searchsorted(slope, _OF_SLOPE * slope[-1])])
+    kept = scipy.fft.irfft2(np.where(q <= most, scipy.fft.rfft2(z), 0.0), s=z.shape)
+    return kept, 2 * np.pi / most
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
@@ -98,7 +129,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         np.bincount(ring + 1, weight)[1:] for weight in (count, count * q.ravel(), count * density.ravel())
     )
     ring = np.flatnonzero(counted)
-    density_attrs = {"units": "m4", "long_name": "power spectral density of height, radial average"}
+    density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
     return xr.Dataset(
         {

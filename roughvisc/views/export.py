@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from roughvisc.labels import heading
 from roughvisc.study.storage.store import whole_file
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.views.figures.axes import frame_at, require
@@ -43,16 +44,11 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     table = dataset[names].reset_coords(drop=True).to_dataframe().replace([np.inf, -np.inf], np.nan)
     if "status" in table:
         table["status"] = [STATUS_MEANINGS[value] for value in table["status"]]
-    heading = [_heading(dataset[name]) for name in names]
-    settings = {"index_label": _heading(dataset["time"]), "lineterminator": "\r\n"}  # the same on every system
+    headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in ("time", *names)]
+    settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # the same on every system
     with whole_file(path) as temporary:
-        table.to_csv(temporary, header=heading, compression=None, **settings)
+        table.to_csv(temporary, header=headings[1:], compression=None, **settings)
     return Path(path)
-
-
-def _heading(variable: xr.DataArray) -> str:
-    unit = variable.attrs.get("units", "")
-    return f"{variable.name} [{unit}]" if unit not in ("", "1") else str(variable.name)
 
 
 def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:

@@ -6,18 +6,21 @@ readable prefixes; nothing here touches matplotlib's global state.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import xarray as xr
+from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.views.figures.animate import animate
 from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require
-from roughvisc.views.figures.distributions import contact_clusters, distributions
+from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
 from roughvisc.views.figures.fields import maps
+from roughvisc.views.figures.friction import friction
 from roughvisc.views.figures.histories import history
-from roughvisc.views.figures.loops import hysteresis
+from roughvisc.views.figures.loops import has_loop, hysteresis
 from roughvisc.views.figures.sections import section
 from roughvisc.views.figures.stability import stability_map
 from roughvisc.views.figures.surfaces import surface
@@ -31,6 +34,7 @@ __all__ = [
     "area_against_load",
     "contact_clusters",
     "distributions",
+    "friction",
     "histories_of_cases",
     "history",
     "hysteresis",
@@ -60,11 +64,29 @@ FIGURES = {
     "surface": (surface, ("height",), ()),
 }
 
+#: Those of them that are drawn only where they say something.
+TELLING = {"clusters": has_clusters, "hysteresis": has_loop}
 
-def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
-    """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
+
+def figures_of(dataset: xr.Dataset, leave: str = "") -> Iterator[tuple[str, Figure]]:
+    """Name and figure of all that the variables of a result allow and that says something of it, but of one to leave.
 
     The section is drawn at the last time of the largest contact area.
+    """
+    for name, (draw, needed, wanted) in FIGURES.items():
+        stored = all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
+        if name == leave or not stored or (name in TELLING and not TELLING[name](dataset)):
+            continue
+        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
+        yield name, draw(dataset, **options)
+
+
+def save_figures(
+    dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0, title: str = ""
+) -> list[Path]:
+    """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
+
+    Clusters are drawn where the contact has three or more, hysteresis where the approach comes back.
 
     Parameters
     ----------
@@ -78,6 +100,8 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
     dpi : float
         Resolution of pictures made of pixels.
+    title : str
+        What stands above each figure, such as the case that it shows.
 
     Returns
     -------
@@ -90,14 +114,9 @@ def save_figures(dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png"
         If the Dataset is not one case's result or allows no figure.
     """
     require(dataset)
-    written = []
-    for name, (draw, needed, wanted) in FIGURES.items():
-        if not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted)):
-            continue
-        if name == "hysteresis" and dataset.sizes["time"] < 3:
-            continue  # two states are no loop
-        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
-        written.append(write_figure(draw(dataset, **options), Path(folder, f"{stem}-{name}{suffix}"), dpi))
+    written = [
+        write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title) for name, figure in figures_of(dataset)
+    ]
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
         raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")

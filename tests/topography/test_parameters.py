@@ -26,7 +26,7 @@ def test_parameters__are_declared_with_units():
     found = parameters(ROUGH)
     assert set(found) == set(PARAMETERS)
     assert all(found[name].dims == () and found[name].attrs["long_name"] for name in found)
-    assert (found["Sq"].attrs["units"], found["rms_curvature"].attrs["units"]) == ("m", "m-1")
+    assert (found["Sq"].attrs["units"], found["rms_curvature"].attrs["units"]) == ("m", "1/m")
     found.to_netcdf()
 
 
@@ -108,7 +108,7 @@ def test_parameters__are_the_same_in_nanometres_and_at_a_large_offset():
     small = (ROUGH * 1e-3).assign_coords(x=ROUGH.x * 1e-3, y=ROUGH.y * 1e-3)
     found, tiny, lifted = parameters(ROUGH), parameters(small), parameters(ROUGH + 7e-2)
     for name in found:
-        scale = {"m": 1e-3, "m-1": 1e3}.get(found[name].attrs["units"], 1)
+        scale = {"m": 1e-3, "1/m": 1e3}.get(found[name].attrs["units"], 1)
         assert float(tiny[name]) == pytest.approx(scale * float(found[name]), rel=1e-9), name
         assert float(lifted[name]) == pytest.approx(float(found[name]), rel=1e-6), name
 

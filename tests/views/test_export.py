@@ -9,6 +9,7 @@ from pathlib import Path
 
 import netCDF4
 import numpy as np
+import pint
 import pytest
 import sample_results as made
 import xarray as xr
@@ -16,10 +17,10 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.storage.store import write_result
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 #: Units as UDUNITS, which CF refers to, writes them.
-UDUNITS = {"1", "s", "m", "m2", "Pa", "N", "J"}
+UDUNITS = {"1", "s", "m", "m^2", "Pa", "N", "J"}
 CARD = Path(__file__).parents[2] / "surfaces" / "ground_steel.toml"
 SAMPLES = {"creep": made.hertz_creep, "rough": made.rough_creep, "open": made.open_contact, "one": made.one_frame}
 
@@ -42,12 +43,40 @@ def computed(tmp_path_factory):
     return rv.simulate(scan, rubber, press, **options)
 
 
+def test_units__are_read_by_pint():
+    read = pint.UnitRegistry()
+    for name, variable in VARIABLES.items():
+        if variable.units:
+            assert read.Unit(variable.units), name
+    powers = {"contact_area": "meter ** 2", "gap_density": "1 / meter", "pressure_density": "1 / pascal"}
+    assert {name: str(read.Unit(VARIABLES[name].units)) for name in powers} == powers
+
+
+def test_quantities_of_pint__from_a_whole_result(computed):
+    pytest.importorskip("pint_xarray")
+    quantities = computed.pint.quantify()
+    assert str(quantities.contact_area.pint.units) == "meter ** 2"
+    assert float(quantities.pressure.max().pint.to("kPa").pint.magnitude) == float(computed.pressure.max()) / 1e3
+    xr.testing.assert_allclose(rv.observables.clusters(quantities.pint.dequantify()), rv.observables.clusters(computed))
+
+
+@pytest.mark.parametrize(
+    "use", [rv.observables.pressure_distribution, rv.plot.maps, rv.deformed], ids=lambda use: use.__name__
+)
+def test_result__in_other_units_is_refused(use, computed):
+    converted = computed.assign(pressure=(computed.pressure / 1e6).assign_attrs(units="MPa"))
+    with pytest.raises(InputError, match="has 'pressure' in 'MPa': expected 'Pa'"):
+        use(converted)
+    of_old = computed.assign(contact_area=computed.contact_area.assign_attrs(units="m2"))
+    use(of_old)
+
+
 def test_csv__gives_every_history_back(computed, tmp_path):
     path = rv.to_csv(computed, tmp_path / "there" / "histories.csv")
     with open(path, newline="", encoding="utf-8") as stream:
         heading, *rows = csv.reader(stream)
     assert heading[0] == "time [s]"
-    assert {"force [N]", "approach [m]", "contact_area [m2]", "contact_fraction", "status"} <= set(heading)
+    assert {"force [N]", "approach [m]", "contact_area [m^2]", "contact_fraction", "status"} <= set(heading)
     columns = dict(zip((name.partition(" ")[0] for name in heading), zip(*rows, strict=True), strict=True))
     assert set(columns) == {"time", *(n for n, v in computed.data_vars.items() if v.dims == ("time",))}
     for name, texts in columns.items():

@@ -4,6 +4,7 @@ Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2
 material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
 """
 
+from roughvisc.mechanics.closed_forms.cylinder import SlidingCylinder, sliding_cylinder
 from roughvisc.mechanics.closed_forms.elastic import (
     AxisymmetricContact,
     FlatPunchContact,
@@ -36,7 +37,9 @@ from roughvisc.mechanics.closed_forms.growing_contact import (
 )
 from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
 from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
+from roughvisc.mechanics.closed_forms.sheet import OnSheet, PunchOnSheet
 from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
+from roughvisc.mechanics.halfspace.sheet import Sheet
 
 __all__ = [
     "AxisymmetricContact",
@@ -47,9 +50,13 @@ __all__ = [
     "GrowingContact",
     "Indenter",
     "KelvinVoigtStep",
+    "OnSheet",
     "Paraboloid",
     "PowerLawRamp",
+    "PunchOnSheet",
+    "Sheet",
     "SingleMaximum",
+    "SlidingCylinder",
     "StepLoad",
     "WavyContact",
     "flat_punch",
@@ -67,6 +74,7 @@ __all__ = [
     "punch_force",
     "punch_pressure",
     "reduced_contact",
+    "sliding_cylinder",
     "sneddon_cone",
     "ting",
     "westergaard",

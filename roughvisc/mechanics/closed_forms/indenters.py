@@ -9,6 +9,7 @@ on a row of independent springs. An elastic contact of radius ``a`` has then the
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -20,7 +21,7 @@ from roughvisc.errors import InputError
 Array = NDArray[np.float64]
 
 
-class Indenter(Protocol):
+class Indenter(Hashable, Protocol):
     """What the closed forms ask of an axisymmetric indenter."""
 
     def height(self, r: ArrayLike) -> Array:
@@ -52,7 +53,7 @@ class Indenter(Protocol):
         ...
 
 
-def _positive(name: str, value: float, unit: str) -> None:
+def positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0):
         raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
 
@@ -70,7 +71,7 @@ class Paraboloid:
     radius: float
 
     def __post_init__(self) -> None:
-        _positive("radius", self.radius, "m")
+        positive("radius", self.radius, "m")
 
     def height(self, r: ArrayLike) -> Array:
         """Gap ``r^2 / (2 R)``. [m]"""
@@ -120,7 +121,7 @@ class Cone:
     slope: float
 
     def __post_init__(self) -> None:
-        _positive("slope", self.slope, "-")
+        positive("slope", self.slope, "-")
 
     def height(self, r: ArrayLike) -> Array:
         """Gap ``m r``. [m]"""

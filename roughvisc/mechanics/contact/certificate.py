@@ -91,9 +91,10 @@ def _under_approach(problem: Problem, pressure: Array, displacement: Array, here
     excess = float((pressure * (here - problem.target)).sum())
     missing = max(0.0, problem.target - lowest)
     if problem.definite and problem.uniform[0] > 0:
-        # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform
+        # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform over the cells that are there
         uniform, response = problem.uniform
-        duality_gap = excess + missing * uniform * float(displacement.sum())
+        displaced = displacement if problem.present is None else displacement[problem.present]
+        duality_gap = excess + missing * uniform * float(displaced.sum())
         return duality_gap + 0.5 * missing**2 * uniform**2 * response
     # No such q exists, as a half-space's periodic kernel is singular. The pressure is certified under its own load, and
     # its own approach must be the one asked for.

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,6 +72,10 @@ class Kernel(Protocol):
             Positive; at ``q = 0`` the displacement by uniform pressure where that is finite, and zero where it is not:
             the mean displacement is left out then, and approach with periodic boundaries counts without it. [m]
         """
+
+    def described(self) -> dict[str, Any]:
+        """What a result says of the body: names of attributes and their values."""
+        return {"kernel": repr(self)}
 
     def under_rectangle(
         self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]

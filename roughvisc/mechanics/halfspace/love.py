@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,6 +126,10 @@ class Love(Kernel):
         """``2 / |q|``; zero at ``q = 0``: the mean displacement of a periodic half-space is undefined. [m]"""
         magnitude = np.asarray(np.hypot(qx, qy), dtype=float)
         return np.asarray(2 / np.where(magnitude > 0, magnitude, math.inf))
+
+    def described(self) -> dict[str, Any]:
+        """Nothing: it is what is pressed if nothing else is said."""
+        return {}
 
     def under_rectangle(
         self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]

@@ -112,14 +112,14 @@ def choose_memory(
             )
         return Choice(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")
     if isinstance(material, Prony):
-        return Choice(_recursive(material, acts_on, duration), 0.0, _terms(material))
+        return Choice(_recursive(material, acts_on, duration), 0.0, terms(material))
     if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
         glassy = float(material.contact_compliance(0.0))
         return Choice(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
     material.contact_compliance(duration)  # refuses what ends before
     series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
-    said = [_terms(series.prony)]
+    said = [terms(series.prony)]
     if series.pressed != series.prony:
         said[0] += (
             f" in place of the compliance, within {series.error:.1e} of it at once and from {series.shortest:.1g} s"
@@ -152,7 +152,8 @@ def _may_ring(material: Material, duration: float) -> bool:
     return bool(np.any(material.contact_compliance(steps) > _RINGING * mean))
 
 
-def _terms(series: Prony) -> str:
+def terms(series: Prony) -> str:
+    """What a series consists of, in words."""
     if not series.times and not series.fluidity:
         return "no memory: elastic"
     count = len(series.times)

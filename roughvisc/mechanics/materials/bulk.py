@@ -46,7 +46,15 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
     glassy = shear.glassy + 3 * volume * shear.glassy / (volume + shear.glassy)
     note = f"effective compliance J + 3B for an elastic bulk modulus of {bulk_modulus:g} Pa"
     note = f"{shear.note}; {note}" if shear.note else note
-    return Prony(glassy, shear.fluidity, tuple(compliances), tuple(times), 0.5, note)
+    return Prony(
+        glassy,
+        shear.fluidity,
+        tuple(compliances),
+        tuple(times),
+        0.5,
+        note,
+        "a body with an elastic bulk modulus, whose Poisson ratio changes in time",
+    )
 
 
 def in_volume(shear: Prony, poisson: float | None, bulk_modulus: float | None) -> Prony:

@@ -171,6 +171,10 @@ def zener(
     return in_volume(shear, poisson, bulk_modulus)
 
 
+#: What a pair stands for.
+TWO_BODIES = "a pair of bodies"
+
+
 @dataclass(frozen=True)
 class Pair:
     """Two deformable bodies pressed on each other; made by :func:`pair`."""
@@ -178,10 +182,19 @@ class Pair:
     a: Material
     b: Material
 
+    def __repr__(self) -> str:
+        """As it was built."""
+        return f"pair({self.a!r}, {self.b!r})"
+
     @property
     def poisson(self) -> float:
         """A half, as for a series that stands for two bodies; each body has its own."""
         return 0.5
+
+    @property
+    def stands_for(self) -> str:
+        """No one body."""
+        return TWO_BODIES
 
     @property
     def note(self) -> str:
@@ -233,7 +246,9 @@ def pair(a: Material, b: Material) -> Prony | Pair:
         fluidity += share * body.fluidity
         for compliance, time in zip(body.compliances, body.times, strict=True):
             compliances[time] = compliances.get(time, 0.0) + share * compliance
-    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b))
+    return Prony(
+        glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b), stands_for=TWO_BODIES
+    )
 
 
 def _notes(a: Material, b: Material) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
+from roughvisc.mechanics.materials.words import as_built
 
 Array = NDArray[np.float64]
 
@@ -60,6 +61,18 @@ class PowerLaw:
         check_poisson(self.poisson)
         if not 0 < self.exponent < 1:
             raise InputError(f"exponent is {self.exponent!r}: expected a number above 0 and below 1")
+
+    def __repr__(self) -> str:
+        """With readable units."""
+        return as_built(
+            "PowerLaw",
+            self.poisson,
+            self.note,
+            glassy=(self.glassy, "1/Pa"),
+            coefficient=(self.coefficient, "1/Pa"),
+            exponent=(self.exponent, "1"),
+            time_scale=(self.time_scale, "s"),
+        )
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""

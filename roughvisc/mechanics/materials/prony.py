@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.secular import merged, secular_roots
+from roughvisc.mechanics.materials.words import as_built
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,8 @@ class Prony:
         Poisson ratio, constant in time.
     note : str
         How the series was found, if not stated: number of terms, misfit. No part of the comparison.
+    stands_for : str
+        What the series makes contact like, if that is not one body with this Poisson ratio; empty if it is.
 
     Raises
     ------
@@ -47,6 +51,7 @@ class Prony:
     times: tuple[float, ...] = ()
     poisson: float = 0.5
     note: str = field(default="", compare=False)
+    stands_for: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))
@@ -61,6 +66,26 @@ class Prony:
         check_poisson(self.poisson)
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
             raise InputError("all compliances are zero: a rigid material cannot be pressed")
+
+    def __repr__(self) -> str:
+        """As springs and dashpots where it is a model of few of them, else as the series."""
+        parameters: dict[str, tuple[Any, str]]
+        name, spring = "Prony", (1 / self.glassy if self.glassy else np.inf, "Pa")
+        parameters = {"glassy": (self.glassy, "1/Pa")}
+        if self.fluidity and self.glassy and not self.times:
+            name, parameters = "maxwell", {"shear_modulus": spring, "viscosity": (1 / self.fluidity, "Pa s")}
+        elif not self.fluidity and not self.times:
+            name, parameters = "elastic", {"shear_modulus": spring}
+        elif not self.fluidity and len(self.times) == 1 and self.compliances[0]:
+            modulus, viscosity = (1 / self.compliances[0], "Pa"), (self.times[0] / self.compliances[0], "Pa s")
+            name, parameters = "kelvin_voigt", {"shear_modulus": modulus, "viscosity": viscosity}
+            if self.glassy:
+                kelvin = {"kelvin_modulus": modulus, "kelvin_viscosity": viscosity}
+                name, parameters = "zener", {"shear_modulus": spring, **kelvin}
+        else:
+            parameters |= {"fluidity": (self.fluidity, "1/(Pa s)")} if self.fluidity else {}
+            parameters |= {"compliances": (self.compliances, "1/Pa"), "times": (self.times, "s")} if self.times else {}
+        return as_built(name, self.poisson, self.note, **parameters)
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""

@@ -11,6 +11,7 @@ from scipy.optimize import isotonic_regression
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
+from roughvisc.mechanics.materials.words import as_built
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,12 @@ class Tabulated:
     def note(self) -> str:
         """The notes as one text."""
         return "; ".join(self.notes)
+
+    def __repr__(self) -> str:
+        """With readable units; of a long table its ends."""
+        noise = {"noise": (self.noise, "1")} if self.noise else {}
+        rows = {"times": (self.times, "s"), "compliances": (self.compliances, "1/Pa")}
+        return as_built("Tabulated", self.poisson, self.remark, **rows, **noise)
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +110,7 @@ def arrhenius_shift(temperature: float, reference_temperature: float, activation
     check_number("temperature", temperature, "K")
     check_number("reference_temperature", reference_temperature, "K")
     check_number("activation_energy", activation_energy, "J/mol")
-    return _power(np.e, activation_energy / GAS_CONSTANT * (1 / temperature - 1 / reference_temperature))
+    return _power(math.e, activation_energy / GAS_CONSTANT * (1 / temperature - 1 / reference_temperature))
 
 
 def shifted(material: Material, factor: float) -> Material:

@@ -10,16 +10,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, get_args
 
 import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.segment import CONTROLS, PUSHING, UNITS, Control, Segment
-from roughvisc.units import bounded_quantity, shown
+from roughvisc.units import bounded_quantity, said, shown
 
 #: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
+
+#: Segments that a program tells one by one.
+_TOLD = 8
 
 
 def _said(value: Any, unit: str, key: str, **bounds: Any) -> float:
@@ -59,10 +63,22 @@ class Program:
     5.1
     >>> [segment.end for segment in program.segments]
     [2.0, None, 0.0]
+    >>> program
+    Program: load to 2 N over 50 ms, hold 5 s, load to 0 N over 50 ms
     """
 
     segments: tuple[Segment, ...] = ()
     note: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        """In words; of a long table its first segments."""
+        told, more = self.segments[:_TOLD], len(self.segments) - _TOLD
+        words = [str(segment) for segment in told] or ["nothing"]
+        for number, (before, segment) in enumerate(pairwise(told), 1):
+            if segment.end is None and not segment.amplitude and segment.control == before.control:
+                words[number] = f"hold {said(segment.duration, 's')}"  # what else
+        words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
+        return f"Program: {', '.join(words)}"
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)

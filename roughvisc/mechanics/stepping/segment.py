@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from roughvisc.errors import InputError
-from roughvisc.units import shown
+from roughvisc.units import said, shown
 
 Control = Literal["load", "approach", "pressure"]
 #: what may be prescribed -> its unit
@@ -54,6 +54,18 @@ class Segment:
             raise InputError(f"{reached}: expected no negative {self.control}, contact here has no adhesion")
         if self.amplitude and not (self.period > 0 and math.isfinite(self.period)):
             raise InputError(f"period of a cycle is {self.period!r}: expected a positive number [s]")
+
+    def __str__(self) -> str:
+        """In words, such as ``load to 2 N over 50 ms``."""
+        lasting, unit = said(self.duration, "s"), UNITS[self.control]
+        named = "nominal pressure" if self.control == "pressure" else self.control
+        if self.amplitude:
+            wave = f"{said(self.end or 0.0, unit)} ± {said(self.amplitude, unit)}"
+            return f"{named} {wave} in {self.duration / self.period:g} cycles of {said(self.period, 's')}"
+        if self.end is None:
+            return f"hold {named} {lasting}"
+        reached = f"{named} to {said(self.end, unit)}"
+        return f"{reached} over {lasting}" if self.duration else f"{reached} at once"
 
     def value(self, elapsed: float, start: float) -> float:
         """Prescribed value [N or m] a time [s] after the start of the segment, which began at ``start``."""

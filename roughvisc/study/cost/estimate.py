@@ -24,6 +24,7 @@ from roughvisc.study.simulation.scene import Ground, prepare
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import axis_step
+from roughvisc.variables import STEPPED
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
 #: to 512 squared the convolutions so found were -1 to +22 % off, the steps -8 to +7 %.
@@ -43,6 +44,8 @@ _AGAIN = 1.5
 _PROCESS = 230e6
 #: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
 _WRITE, _ROUNDED = 3e-9, 0.5
+#: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed.
+_CHUNK, _COMPRESSED = 8, 0.03
 #: Frames of a field that are in memory at once while the file is written.
 _FRAMES_TOGETHER = 8
 
@@ -67,6 +70,8 @@ class March:
         Largest approach: what lies deeper cannot be touched. [m]
     force : float
         Largest force. [N]
+    kept : tuple of float
+        Contact fraction at each kept time that a coarse march reached.
     """
 
     steps: float
@@ -77,6 +82,7 @@ class March:
     whole: bool
     level: float = math.inf
     force: float = math.nan
+    kept: tuple[float, ...] = ()
 
 
 def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
@@ -124,13 +130,16 @@ def _march(case: Case, height: xr.DataArray) -> March:
     steps = rows = damped = 0
     reached = contact = level = force = 0.0
     work, instants = 0, [0.0]
-    kept = set(scene.times or ())
+    kept, contacts = set(scene.times or ()), []
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
         steps += 1
-        rows += settings.times is None or now in kept
+        share = float(np.mean(step.shown.pressure > 0))
+        if settings.times is None or now in kept:
+            rows += 1
+            contacts.append(share)
         damped += now > reached and _is_damped(scene, now - reached)
-        contact = max(contact, float(np.mean(step.shown.pressure > 0)))
+        contact = max(contact, share)
         level, force = max(level, step.level), max(force, step.shown.force)
         work, reached = step.state.convolutions, now
         instants.append(now)
@@ -143,7 +152,8 @@ def _march(case: Case, height: xr.DataArray) -> March:
         pace = (reached - instants[half]) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
-    return March(steps * stretch, kept_rows, work * stretch, part, contact, bool(whole), level, force)
+    known = (part, contact, bool(whole), level, force, tuple(contacts))
+    return March(steps * stretch, kept_rows, work * stretch, *known)
 
 
 def _is_damped(scene: Scene, length: float) -> bool:
@@ -250,6 +260,11 @@ def bytes_needed(settings: Settings, cells: int, found: March, choice: Choice, p
 def disk(case: Case, cells: int, found: March) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
-    pressure = found.contact if found.contact < 0.02 else dense
-    fields = sum(pressure if name == "pressure" else dense for name in case.settings.keep.fields)
-    return 20e3 + 8.0 * cells * (found.rows * fields + 1.0) + found.rows * 120
+    rows = found.rows
+    if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
+        rows = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
+    kept = np.array(found.kept or (found.contact,))
+    few = kept[len(kept) // 2] < _COMPRESSED  # the frame that the writer asks
+    pressure = found.rows * (float(np.mean(kept)) + 0.01) if few else rows * dense
+    fields = sum(pressure if name == "pressure" else rows * dense for name in case.settings.keep.fields)
+    return 20e3 + 8.0 * cells * (fields + 1.0) + found.rows * 120 + found.steps * 8 * len(STEPPED)

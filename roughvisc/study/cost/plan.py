@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,11 +20,12 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.simulation.notes import left_out
+from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.results import parameters_of
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
@@ -41,7 +43,7 @@ _COLUMNS = {
     "cells_x": ("1", "cells along x"),
     "cells_y": ("1", "cells along y"),
     "grows": ("", "whether the grid may grow"),
-    "left_out": ("", "what is not modelled, computed or kept, since nothing asks for it"),
+    "left_out": ("", "what costs nothing, and why: it is not modelled, computed or kept"),
     "steps": ("1", "accepted time steps expected"),
     "rows": ("1", "kept times expected"),
     "contact_fraction": (
@@ -55,6 +57,7 @@ _COLUMNS = {
     "memory": ("byte", "memory of the process at its peak"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
+    "body_note": ("", "what the base of a sheet does, by the coarse march; empty of a half-space"),
     "program_note": ("", "how a measured history became segments"),
     "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
     "refusal": ("", "why it cannot run; empty if it can"),
@@ -243,7 +246,10 @@ def _row(
     cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
     reachable = surface.windows if window else surface.windows[-1:]
     part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
+    sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
+    final = float(choice.material.contact_compliance(case.program().duration))
     return row | {
+        "body_note": body_note(settings.kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,
@@ -275,7 +281,7 @@ def _scheme(settings: Settings, choice: Choice, found: March) -> str:
     steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
     if choice.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"
-    damped = f", BDF2 in {100 * found.damped:.0f} % of the steps" if found.damped else ""
+    damped = f", the two-step rule (BDF2) in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     return f"piecewise-linear pressure{damped}, steps {steps}"
 
 
@@ -293,8 +299,9 @@ def _whole(dataset: xr.Dataset, folder: Path, processes: int) -> dict[str, Any]:
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
     together = float(np.sum(largest[:processes]))
     size = float(np.nansum(dataset["disk"].values))
-    refusals = [str(text) for text in dataset["refusal"].values if text]
-    reasons = [f"{len(refusals)} of {dataset.sizes['case']} cases cannot run: {refusals[0]}"] if refusals else []
+    total = dataset.sizes["case"]
+    refusals = Counter(str(text) for text in dataset["refusal"].values if text)
+    reasons = [f"{count} of {total} cases: {why}" if total > 1 else why for why, count in refusals.most_common(3)]
     if together > _PART * free_memory:
         fitting = int(np.searchsorted(np.cumsum(largest), _PART * free_memory, side="right"))
         advice = f"use --workers {fitting}" if fitting else "use a coarser grid, or keep fewer times or fields"

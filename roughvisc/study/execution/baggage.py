@@ -6,12 +6,17 @@ import hashlib
 import json
 import os
 import shutil
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from roughvisc.errors import ChangedError, InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import whole_file
+from roughvisc.topography.cards import read_toml
+from roughvisc.topography.readers import sha256
+
+#: Folder of the copies, in that of the results.
+INPUTS = "inputs"
 
 
 def pack(case: Case, folder: Path) -> str:
@@ -48,17 +53,16 @@ def _copy(path: Path, folder: Path) -> Path:
     named = _named_by(path)
     files = [path] if named is None else [path, Path(os.path.normpath(path.parent / named))]
     root = Path(os.path.commonpath([file.parent for file in files]))
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(f"{file.relative_to(root)}\0".encode())
-        with file.open("rb") as stream:
-            digest.update(hashlib.file_digest(stream, "sha256").digest())
-    there = folder / digest.hexdigest()[:16]
-    for file in files:
-        copy = there / file.relative_to(root)
-        if not copy.exists():
+    digests = {file.relative_to(root): sha256(file) for file in files}
+    whole = "".join(f"{place}\0{digest}\0" for place, digest in digests.items())
+    there = folder / hashlib.sha256(whole.encode()).hexdigest()[:16]
+    for place, digest in digests.items():
+        copy = there / place
+        if not copy.is_file() or sha256(copy) != digest:
             with whole_file(copy) as temporary:
-                shutil.copyfile(file, temporary)
+                shutil.copyfile(root / place, temporary)
+                if sha256(temporary) != digest:
+                    raise ChangedError(f"{root / place}: was changed while it was copied: run the study again")
     return there / path.relative_to(root)
 
 
@@ -67,7 +71,7 @@ def _named_by(path: Path) -> str | None:
     if path.suffix.lower() != ".toml":
         return None
     try:
-        named = tomllib.loads(path.read_text(encoding="utf-8")).get("file")
-    except (OSError, ValueError):
+        named = read_toml(path, "surface card in TOML").get("file")
+    except InputError:
         return None  # it is refused where it is opened
     return named if isinstance(named, str) and not Path(named).is_absolute() else None

@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import signal
 import sys
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError
 
@@ -40,26 +41,63 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.admin.system-monitor.gil.enabled": False,
         "distributed.scheduler.active-memory-manager.start": False,  # cases share no data
     } | _quick_start()
-    with (
-        dask.config.set(settings),
-        LocalCluster(
-            n_workers=processes,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        client.run(_leave_interrupts_to_the_sweep)
+    with dask.config.set(settings), ExitStack() as stack:
+        with _interrupts_wait():  # a process that dies while it begins leaves the others in disorder
+            cluster = LocalCluster(
+                n_workers=processes,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
+            client = stack.enter_context(Client(cluster, set_as_default=False))
+            client.run(_leave_interrupts_to_the_sweep)
         yield client
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Put an interrupt off until what is inside is done; a second one is not put off."""
+    if threading.current_thread() is not threading.main_thread():  # which alone is interrupted
+        yield
+        return
+    seen: list[int] = []
+
+    def note(number: int, _: Any) -> None:
+        if seen:
+            raise KeyboardInterrupt
+        seen.append(number)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if seen:
+        raise KeyboardInterrupt
+
+
+def default_client() -> Client | None:
+    """The client that the user has made the default; none within a Dask task, which is there to compute itself."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:  # nobody has made one
+        return None
+    with suppress(ValueError):
+        distributed.get_worker()
+        return None
+    with suppress(ValueError):
+        return distributed.default_client()
+    return None
 
 
 def _quick_start() -> dict[str, str]:
     """Settings with which workers are forked from one process that has imported everything: each saves a second."""
     if sys.platform != "linux":  # elsewhere a fork is not safe, or there is none
         return {}
+    from multiprocessing import forkserver
+
     import dask
 
     try:
@@ -69,6 +107,12 @@ def _quick_start() -> dict[str, str]:
     settings = {"distributed.worker.multiprocessing-method": "forkserver"}
     with dask.config.set(settings):
         get_mp_context().set_forkserver_preload(_PRELOADED)  # as Dask asks for it, whose own list would import more
+    if threading.current_thread() is threading.main_thread():  # a Ctrl-C meanwhile is this process's own
+        mine = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which it, and all that it forks, begin with
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.signal(signal.SIGINT, mine)
     return settings
 
 

@@ -7,7 +7,8 @@ import json
 import logging
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from importlib import metadata
@@ -17,14 +18,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError
+from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.simulate import press
-from roughvisc.study.statement.case import Case, read_study
+from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, result_path, torn_files, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
 from roughvisc.variables import NOT_CONVERGED
 
 if TYPE_CHECKING:
@@ -43,42 +44,6 @@ Progress = Callable[[float, float], None]
 SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
 
 
-def run(case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True) -> xr.Dataset:
-    """Compute one case and keep it in one file.
-
-    Parameters
-    ----------
-    case : Case or path
-        A case, or the study file that states one.
-    out : path, optional
-        Folder of the result. Default: ``results/`` and the study's name, beside the study.
-    progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length. [s]
-
-    Returns
-    -------
-    xarray.Dataset
-        The result, ``(time, x, y)``, whose fields are read from its file when they are asked for; the file is
-        ``ds.encoding["source"]``, named by the case's key. A case that was finished before is not computed again, one
-        that was interrupted goes on; see :func:`run_case`.
-
-    Raises
-    ------
-    InputError
-        If the input is wrong; nothing is written.
-    ConvergenceError
-        If a step did not converge. The result is written all the same, and the message says where.
-    """
-    if not isinstance(case, Case):
-        case = read_study(case)
-    path = run_case(case, result_folder(case, out), progress=progress)
-    dataset = open_result(path)
-    complaint = unconverged(dataset)
-    if complaint:
-        raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
-    return dataset
-
-
 def result_folder(case: Case, out: str | Path | None = None) -> Path:
     """Folder that the results of a study go to, refused here where nothing could be written there.
 
@@ -88,7 +53,7 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
         If it is no folder, or may not be made or written to.
     """
     if out is not None:
-        folder = Path(out)
+        folder = Path(out).expanduser()
     elif case.origin is not None:
         folder = case.origin.parent / "results" / case.origin.stem
     else:
@@ -114,16 +79,17 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     height = case.height()
     try:
         dataset = press(height, case.material(), case.program(), case.solving(), progress=progress, keeper=keeper)
-    except InUseError:
+    except HinderedError:
         raise
     except (InputError, ConvergenceError) as error:
         raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
-    dataset.attrs = _provenance(case, dataset.attrs.pop("history", "")) | dataset.attrs | scan
+    transforms = transform_library() if keeper is None else keeper.saved.transforms
+    dataset.attrs = _provenance(case, dataset.attrs.pop("history", ""), transforms) | dataset.attrs | scan
     return dataset
 
 
-def _provenance(case: Case, before: str) -> dict[str, str]:
+def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -133,7 +99,7 @@ def _provenance(case: Case, before: str) -> dict[str, str]:
         "Conventions": "CF-1.11",
         "title": case.title + varied,
         "source": f"roughvisc {version}",
-        "transforms": transform_library(),
+        "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
         "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "
@@ -153,6 +119,7 @@ def run_case(
     stop: Callable[[], bool] | None = None,
     checkpoint_seconds: float = 30.0,
     checkpoint_steps: int | None = None,
+    same_bits: bool = False,
 ) -> Path:
     """Bring one case to its file in a folder, and give the file's path.
 
@@ -167,27 +134,31 @@ def run_case(
     folder : path
         Where the file goes; it is named by the case's key. What an unfinished run keeps is in hidden files beside it.
     progress : bool or callable
-        As in :func:`run`.
+        A progress bar, or a function called with the time reached and the program's length. [s]
     stop : callable, optional
         Asked at every accepted step; if it says so, a checkpoint is written and :class:`KeyboardInterrupt` raised.
     checkpoint_seconds : float
         Time between checkpoints; longer where they would take a twentieth of the time. [s]
     checkpoint_steps : int, optional
         Accepted steps between checkpoints, whatever these take.
+    same_bits : bool
+        Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
+        digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
 
     Raises
     ------
     InputError, ConvergenceError
-        As :func:`run`; also if a checkpoint was written by other versions, whose last digits differ. An unconverged
-        result is kept and none of these.
+        As :func:`roughvisc.run`. An unconverged result is kept and none of these.
     InUseError
         If another run is at work on this case in this folder.
+    ChangedError
+        If the surface's file was changed after the study was read.
     OSError
         If the disk is full; the last checkpoint stays.
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path) and not _leftovers(path):
+    if is_result_of(case, path, same_bits) and not _leftovers(path):
         return path
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     keep_memory()
@@ -203,14 +174,17 @@ def run_case(
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
                 stop=stop,
+                same_bits=same_bits,
             )
             with closing(keeper):
-                if not is_result_of(case, path):
+                if not is_result_of(case, path, same_bits):
+                    if path.exists() and not is_result_of(case, path):  # damaged, and not of other transforms
+                        set_aside(path)
                     keeper.resume()
                     _finish(case, folder, progress, keeper)
                 keeper.remove()
     except InUseError:
-        if is_result_of(case, path):  # the other run has just finished
+        if is_result_of(case, path, same_bits):  # the other run has just finished
             return path
         raise
     except OSError as error:
@@ -231,7 +205,7 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper)
         dataset = compute(case, progress=progress, keeper=keeper)
         keeper.check()
         keep(dataset, case, folder)
-    except InUseError:
+    except HinderedError:
         raise
     except RoughviscError:  # it would fail again in the same way
         keeper.remove()
@@ -241,16 +215,33 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper)
         raise
 
 
-def is_result_of(case: Case, path: Path) -> bool:
-    """Whether a file is the whole result of a case."""
+def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
+    """Whether a file is the whole result of a case, and on request of the transforms that are here."""
     if not path.exists():
         return False
     try:
         with open_result(path) as dataset:
-            return bool(dataset.attrs.get("case_key") == case.key)
+            whole = bool(dataset.attrs.get("case_key") == case.key)
+            made_with = str(dataset.attrs.get("transforms", ""))
     except InputError as error:
         log.warning("%s", error)
         return False
+    if whole and made_with != transform_library():
+        log.warning("%s: %s", path, other_transforms([made_with]))
+        return not same_bits
+    return whole
+
+
+def other_transforms(made_with: Iterable[str]) -> str:
+    """What to tell of finished results by what they were made with; empty if there is nothing to tell."""
+    counts = Counter(made_with)
+    if set(counts) <= {transform_library()}:
+        return ""
+    found = ", ".join(f"{count} with {transforms}" for transforms, count in counts.items())
+    return (
+        f"{found}, where this process has {transform_library()}: equal within the tolerance, not to the last bit; "
+        "same_bits=True (--same-bits) computes the others anew"
+    )
 
 
 def _leftovers(path: Path) -> bool:

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import logging
 import os
-import secrets
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
-from roughvisc.errors import InputError, RoughviscError
-from roughvisc.study.execution.baggage import pack
-from roughvisc.study.execution.cluster import local_client
-from roughvisc.study.execution.run import result_folder
+from roughvisc.errors import DiskFullError, InputError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.study.execution.baggage import INPUTS, pack
+from roughvisc.study.execution.book import Book, Watcher
+from roughvisc.study.execution.cluster import default_client, local_client
+from roughvisc.study.execution.run import other_transforms, result_folder
 from roughvisc.study.execution.script import refuse_unguarded_script
-from roughvisc.study.execution.task import Outcome, bring, on_worker, outcome_of, stop_sweep
+from roughvisc.study.execution.task import Outcome, bring, outcome_of
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.storage.failures import forget_failure, record_failure, recorded_failure
-from roughvisc.study.storage.index import Entry, Index, index_of, save_index
+from roughvisc.study.storage.failures import forget_failure, recorded_failure
+from roughvisc.study.storage.index import Index, index_of
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.tidy import tidy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,32 +31,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 LOG = "sweep.log"
-#: Seconds between two savings of the index while a sweep runs.
-_SAVE_EVERY = 60.0
-#: Seconds that running cases get to reach the end of their step when a sweep is interrupted.
-_PATIENCE = 120.0
-
-
-class Watcher(Protocol):
-    """Who is told how a sweep goes on; times in seconds."""
-
-    def begin(self, cases: Sequence[Case], link: str) -> None:
-        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
-
-    def reached(self, key: str, now: float, end: float) -> None:
-        """A running case is at this time of so much; from any thread."""
-
-    def ended(self, outcome: Outcome) -> None:
-        """A case ended."""
-
-    def tick(self) -> None:
-        """Called several times a second."""
-
-    def stopping(self) -> None:
-        """The sweep is interrupted and waits for the running cases to stop."""
-
-    def close(self) -> None:
-        """Nothing more follows."""
 
 
 def sweep(
@@ -68,6 +41,7 @@ def sweep(
     retry_failed: bool = False,
     progress: bool = True,
     workers: int | None = None,
+    same_bits: bool = False,
 ) -> xr.Dataset:
     """Compute many cases, one file each, and open them together.
 
@@ -83,14 +57,17 @@ def sweep(
         Folder of the results, on a file system that all workers see under the same path. Default: ``results/`` and
         the study's name, beside the study.
     client : distributed.Client, optional
-        Where to compute. Default: a cluster on this machine, one process a core; a single case is computed in
-        this process.
+        Where to compute. Default: the client that you have made the default by making one (``Client()``); if there
+        is none, or `workers` is given, a cluster on this machine, one process a core, and for a single case this
+        process.
     retry_failed : bool
         Compute cases again that failed before.
     progress : bool
         Show how far it is.
     workers : int, optional
         Processes of the default cluster; 0: this process.
+    same_bits : bool
+        Compute anew what other versions of the transforms or of NumPy have computed; see :func:`roughvisc.run`.
 
     Returns
     -------
@@ -111,10 +88,18 @@ def sweep(
     if not cases:
         raise InputError("cases is empty: expected at least one case")
     folder = result_folder(cases[0], out).absolute()
+    if client is None and workers is None:
+        client = default_client()
     from roughvisc.study.execution.watch import watcher
 
     outcomes = run_cases(
-        cases, folder, client=client, workers=workers, retry_failed=retry_failed, watch=watcher(progress)
+        cases,
+        folder,
+        client=client,
+        workers=workers,
+        retry_failed=retry_failed,
+        same_bits=same_bits,
+        watch=watcher(progress),
     )
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     for outcome in bad:
@@ -133,6 +118,7 @@ def run_cases(
     client: Client | None = None,
     workers: int | None = None,
     retry_failed: bool = False,
+    same_bits: bool = False,
 ) -> dict[str, Outcome]:
     """Bring all cases to their files; see :func:`sweep`.
 
@@ -145,6 +131,8 @@ def run_cases(
     ------
     InputError
         If a setting is wrong.
+    DiskFullError
+        If the disk is full; the cases that are left are not begun.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt
@@ -159,8 +147,9 @@ def run_cases(
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     with _log_file(folder):
+        tidy(folder)
         index = index_of(folder)
-        outcomes = _known(distinct, folder, index, retry_failed)
+        outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         if client is None and _processes(workers, len(todo)):
             try:
@@ -170,11 +159,17 @@ def run_cases(
                     folder.rmdir()
                 raise
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        book = _Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
+        book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
-            _compute(todo, folder, book, client, workers)
-        except KeyboardInterrupt:
+            _compute(todo, folder, book, client, workers, same_bits)
+            told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
+            if told:
+                book.tell(told)
+        except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
+            raise
+        except DiskFullError as error:
+            log.warning("%s", error)
             raise
         finally:
             book.save()
@@ -186,77 +181,43 @@ def run_cases(
     return {key: outcomes[key] for key in distinct}
 
 
-def _known(distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool) -> dict[str, Outcome]:
+def _known(
+    distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool, same_bits: bool
+) -> dict[str, Outcome]:
     """What needs not be computed: finished cases, and those that are known to fail."""
     outcomes = {}
     for key in distinct:
         record = recorded_failure(folder, key)
-        if key in index.entries:
+        entry = index.entries.get(key)
+        if entry is not None and not (same_bits and entry.attributes.get("transforms") != transform_library()):
             forget_failure(folder, key)
-            outcomes[key] = outcome_of(index.entries[key], reused=True)
+            outcomes[key] = outcome_of(entry, reused=True)
         elif record is not None and not retry_failed:
             outcomes[key] = Outcome(key, "failed", record["message"], record["error"], reused=True)
     return outcomes
 
 
-@dataclass
-class _Book:
-    """Keeps account of a sweep: who is told, what is recorded, what the index holds."""
-
-    folder: Path
-    cases: Mapping[str, Case]
-    outcomes: dict[str, Outcome]
-    watch: Watcher
-    entries: list[Entry]
-    saved: float = 0.0
-
-    def begin(self, link: str = "") -> None:
-        self.saved = time.monotonic()
-        self.watch.begin(list(self.cases.values()), link)
-        for outcome in self.outcomes.values():
-            self.watch.ended(outcome)
-        if link:
-            log.info("dashboard: %s", link)
-
-    def ended(self, outcome: Outcome) -> None:
-        self.outcomes[outcome.key] = outcome
-        case = self.cases[outcome.key]
-        varied = json.dumps(dict(case.varied))
-        level = logging.INFO if outcome.kind == "done" else logging.WARNING
-        log.log(level, "%s %s %.3g s %s %s", outcome.key, outcome.kind, outcome.seconds, varied, outcome.message)
-        if outcome.trace:
-            log.error("%s", outcome.trace)
-        if outcome.kind == "failed" and len(self.cases) > 1:
-            record_failure(self.folder, case, outcome.message, outcome.error, outcome.trace)
-        elif outcome.entry is not None:
-            self.entries.append(outcome.entry)
-            forget_failure(self.folder, outcome.key)
-        self.watch.ended(outcome)
-        if time.monotonic() - self.saved > _SAVE_EVERY:
-            self.save()
-
-    def save(self) -> None:
-        self.saved = time.monotonic()
-        entries = index_of(self.folder, self.entries).entries
-        save_index(self.folder, Index(entries, tuple(self.cases)))
-
-
-def _compute(todo: Mapping[str, Case], folder: Path, book: _Book, client: Client | None, workers: int | None) -> None:
+def _compute(
+    todo: Mapping[str, Case], folder: Path, book: Book, client: Client | None, workers: int | None, same_bits: bool
+) -> None:
     from dask.system import CPU_COUNT
 
-    if client is not None and todo:
-        luggage = folder / "inputs"
-        texts = {key: pack(case, luggage) for key, case in todo.items()}
-        _distributed(texts, folder, book, client, None, client.dashboard_link)
-    elif not (processes := _processes(workers, len(todo))):
+    processes = _processes(workers, len(todo)) if client is None else 0
+    if not todo or (client is None and not processes):
         book.begin()
         for case in todo.values():
-            book.ended(_here(case, folder, book, CPU_COUNT))
-    else:
-        texts = {key: case.to_json() for key, case in todo.items()}
-        with local_client(processes) as own:
-            link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-            _distributed(texts, folder, book, own, max(1, CPU_COUNT // processes), link)
+            book.ended(_here(case, folder, book, CPU_COUNT, same_bits))
+        return
+    from roughvisc.study.execution.dispatch import distribute
+
+    if client is not None:
+        texts = {key: pack(case, folder / INPUTS) for key, case in todo.items()}
+        distribute(texts, book, client, None, client.dashboard_link, same_bits)
+        return
+    texts = {key: case.to_json() for key, case in todo.items()}
+    with local_client(processes) as own:
+        link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
+        distribute(texts, book, own, max(1, CPU_COUNT // processes), link, same_bits)
 
 
 def _processes(workers: int | None, cases: int) -> int:
@@ -268,82 +229,18 @@ def _processes(workers: int | None, cases: int) -> int:
     return min(workers or CPU_COUNT, cases)
 
 
-def _here(case: Case, folder: Path, book: _Book, threads: int) -> Outcome:
+def _here(case: Case, folder: Path, book: Book, threads: int, same_bits: bool) -> Outcome:
     def report(now: float, end: float) -> None:
         book.watch.reached(case.key, now, end)
         book.watch.tick()
 
-    return bring(case, folder, progress=report, stop=None, threads=threads)
-
-
-def _distributed(
-    texts: Mapping[str, str], folder: Path, book: _Book, client: Client, threads: int | None, link: str
-) -> None:
-    """One future a case; small arguments and a small outcome each."""
-    from distributed import as_completed
-
-    name = f"roughvisc-{secrets.token_hex(4)}"
-    client.subscribe_topic(name, lambda event: book.watch.reached(event[1]["key"], event[1]["now"], event[1]["end"]))
-    try:
-        book.begin(link)
-        futures = {
-            client.submit(on_worker, text, key, str(folder), name, threads, key=f"{name}-{key}", pure=False): key
-            for key, text in texts.items()
-        }
-        finished = as_completed(futures, loop=client.loop, with_results=True, raise_errors=False)
-        try:
-            _drain(finished, futures, book)
-        except KeyboardInterrupt:
-            book.watch.stopping()
-            client.run(stop_sweep, name, on_error="ignore")
-            _drain(finished, futures, book, _PATIENCE)
-            client.cancel(list(futures))
-            raise
-    finally:
-        with suppress(Exception):  # the scheduler may be gone
-            client.unsubscribe_topic(name)
-
-
-def _drain(finished: Any, futures: dict[Any, str], book: _Book, patience: float = float("inf")) -> None:
-    """Take up what ends, until nothing is left."""
-    until = time.monotonic() + patience
-    while futures and time.monotonic() < until:
-        for future, result in finished.next_batch(block=False):
-            outcome = _outcome(futures.pop(future), result)
-            if outcome.kind != "interrupted":
-                book.ended(outcome)
-        book.watch.tick()
-        time.sleep(0.1)
-
-
-def _outcome(key: str, result: Any) -> Outcome:
-    """What a future came to."""
-    from concurrent.futures import CancelledError as Cancelled
-
-    from distributed import CancelledError, KilledWorker
-
-    if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
-        result = result[1]
-    if isinstance(result, Outcome):
-        return result
-    if isinstance(result, KilledWorker):
-        times = result.allowed_failures + 1
-        return Outcome(
-            key,
-            "failed",
-            f"the process that computed it died {times} times, the last on {result.last_worker.address}: killed, or "
-            "out of memory (roughvisc plan says how much a case needs)",
-            "KilledWorker",
-        )
-    if isinstance(result, CancelledError | Cancelled):
-        raise RoughviscError("the scheduler was lost: what was finished is kept, and the same command goes on")
-    return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)
+    return bring(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)
 
 
 @contextmanager
 def _log_file(folder: Path) -> Iterator[None]:
     """Everything that roughvisc logs, appended to a file beside the results."""
-    handler = logging.FileHandler(folder / LOG, delay=True, encoding="utf-8")
+    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
     handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
     level = log.level
     log.addHandler(handler)
@@ -353,4 +250,12 @@ def _log_file(folder: Path) -> Iterator[None]:
     finally:
         log.setLevel(level)
         log.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that stops nothing where it cannot be written."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import threading
 import time
@@ -9,12 +10,13 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 from scipy import fft
 
-from roughvisc.errors import InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, HinderedError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
@@ -23,8 +25,9 @@ log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
 
-#: How a case ended. ``hindered``: something outside the case was in the way (a full disk, another run that computes
-#: it), so the same command tries again; ``failed`` is what would fail again.
+#: How a case ended. ``hindered``: something outside the case was in the way (a full disk, too little memory, a process
+#: that was killed, another run that computes it), so the same command goes on from its checkpoint; ``failed`` is what
+#: would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
 #: Seconds between two reports of one case.
 _REPORT_EVERY = 0.5
@@ -33,6 +36,15 @@ _REPORT_EVERY = 0.5
 _stopped: set[str] = set()
 #: netCDF-4 does not stand two threads, so a process brings one case at a time whatever its number of threads.
 _one_at_a_time = threading.Lock()
+
+
+class Report(TypedDict):
+    """What a worker reports of a case: the time reached and the time at the end, both 0 when it begins. [s]"""
+
+    key: str
+    worker: str
+    now: float
+    end: float
 
 
 @dataclass(frozen=True)
@@ -69,7 +81,15 @@ class Outcome:
     reused: bool = False
 
 
-def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bool] | None, threads: int) -> Outcome:
+def bring(
+    case: Case,
+    folder: Path,
+    *,
+    progress: Progress,
+    stop: Callable[[], bool] | None,
+    threads: int,
+    same_bits: bool = False,
+) -> Outcome:
     """Bring a case to its file and say how that ended; :class:`KeyboardInterrupt` passes through.
 
     Parameters
@@ -84,19 +104,27 @@ def bring(case: Case, folder: Path, *, progress: Progress, stop: Callable[[], bo
         Asked at every step.
     threads : int
         Of the transforms.
+    same_bits : bool
+        As in :func:`roughvisc.study.execution.run.run_case`.
     """
     began = time.perf_counter()
     try:
         with fft.set_workers(threads):
-            path = run_case(case, folder, progress=progress, stop=stop)
+            path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
-        kind: Kind = "hindered" if isinstance(error, InUseError) else "failed"
+        kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)
+    except MemoryError:
+        text = "not enough memory; what was computed up to the last checkpoint is kept: roughvisc plan says how much a "
+        outcome = Outcome(
+            case.key, "hindered", f"{text}case needs, and fewer --workers leave more to each", "MemoryError"
+        )
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""
-        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", type(error).__name__)
-    except Exception as error:
+        kind_of = DiskFullError if error.errno in (errno.ENOSPC, errno.EDQUOT) else type(error)
+        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", kind_of.__name__)
+    except Exception as error:  # noqa: BLE001  (whatever it is, it stops no other case; its traceback is kept)
         text = f"{type(error).__name__}: {error}"
         outcome = Outcome(case.key, "failed", text, type(error).__name__, traceback.format_exc())
     return replace(outcome, seconds=time.perf_counter() - began)
@@ -108,8 +136,10 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
     return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
 
 
-def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:
+def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None, transforms: str) -> Outcome:
     """The task of a worker: :func:`bring`, with progress sent to the scheduler.
+
+    It ends as interrupted, with a checkpoint, if the sweep is stopped or the worker told to leave.
 
     Parameters
     ----------
@@ -123,29 +153,41 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
         Name of the sweep: the topic of the reports, and what :func:`stop_sweep` is told.
     threads : int or None
         Of the transforms; None: as many as the worker has.
+    transforms : str
+        The library whose bits are asked for; empty: any.
     """
     from distributed import get_worker
 
+    from roughvisc.study.execution.worker import is_leaving, leave_in_order
+
     worker = get_worker()
+    leave_in_order(worker)
     last = -np.inf
 
     def report(now: float, end: float) -> None:
         nonlocal last
         if time.monotonic() - last >= _REPORT_EVERY:
             last = time.monotonic()
-            worker.log_event(sweep, {"key": key, "now": float(now), "end": float(end)})
+            event: Report = {"key": key, "worker": worker.address, "now": float(now), "end": float(end)}
+            worker.log_event(sweep, event)
+
+    def stop() -> bool:
+        return sweep in _stopped or is_leaving(worker)
 
     with _one_at_a_time:
-        if sweep in _stopped:
+        if stop():
             return Outcome(key, "interrupted")
         report(0.0, 0.0)
         try:
             case = Case.from_json(text)
+            if transforms not in ("", transform_library()):
+                there = f"{worker.address} has {transform_library()}, and the bits of {transforms} are asked for"
+                return Outcome(key, "hindered", f"{there}: expected the same versions, or no same_bits")
             if case.key != key:
                 there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
                 return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
             threads = threads or worker.state.nthreads
-            return bring(case, Path(folder), progress=report, stop=lambda: sweep in _stopped, threads=threads)
+            return bring(case, Path(folder), progress=report, stop=stop, threads=threads, same_bits=bool(transforms))
         except RoughviscError as error:  # a file that this machine does not have
             return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it

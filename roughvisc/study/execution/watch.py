@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -23,12 +24,17 @@ def watcher(progress: bool, console: Console | None = None) -> Watch | Silence:
 
 
 class Silence:
-    """Shows nothing."""
+    """Shows nothing but what the user should know at once."""
 
     def begin(self, cases: Sequence[Case], link: str) -> None: ...
     def reached(self, key: str, now: float, end: float) -> None: ...
     def ended(self, outcome: Outcome) -> None: ...
     def tick(self) -> None: ...
+
+    def told(self, message: str) -> None:
+        """Something the user should know at once."""
+        print(f"roughvisc: {message}", file=sys.stderr)
+
     def stopping(self) -> None: ...
     def close(self) -> None: ...
 
@@ -77,10 +83,14 @@ class Watch:
         """Show what has changed."""
         self._display.tick()
 
+    def told(self, message: str) -> None:
+        """Something the user should know at once."""
+        self._display.say(message)
+
     def stopping(self) -> None:
         """The sweep is interrupted and waits for the running cases to stop."""
         self._stopping = True
-        self._display.say("stopping: the running cases finish their step")
+        self._display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
 
     def close(self) -> None:
         """Nothing more follows."""

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from roughvisc.mechanics.hereditary.choice import Choice
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.sheet import Sheet, complement
+from roughvisc.mechanics.hereditary.choice import Choice, terms
+from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.borders import JUMP, border_mismatch
@@ -26,24 +29,24 @@ _AT_ONCE = 0.1
 
 
 def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
-    """What nothing asks for, and is therefore not modelled, computed or kept."""
+    """What costs nothing, and why: what nothing asks for is not modelled, computed or kept."""
     out = []
     if choice.note.startswith("no memory"):
-        out.append("history (the material is elastic)")
-    elif choice.memory.acts_on != "pressure" and settings.method == "fast":
-        out.append("convolutions of the past")
+        out.append("past pressures: not needed, the material is elastic")
+    elif isinstance(choice.memory, Modes) and choice.memory.acts_on != "pressure" and settings.method == "fast":
+        out.append(f"past pressures: remembered by {terms(choice.memory.material)}, at no cost")
     if settings.boundary == "periodic":
-        out.append("padding")
+        out.append("padding of the transforms: not needed, the surface repeats")
     if window:
-        out.append("what lies too deep to be touched")
+        out.append("cells too deep to be touched: not computed")
     if mirrored:
-        out.append("three quarters of the surface (they are its mirror images)")
+        out.append("three quarters of the surface: not computed, they are mirror images of the fourth")
     absent = [name for name in FIELDS if name not in settings.fields]
     if absent:
-        out.append(f"{' and '.join(absent)} in the file")
-    if settings.times is not None:
-        out.append("fields between kept times in the file")
-    return ", ".join(out)
+        out.append(f"{' and '.join(absent)}: not kept")
+    if settings.times is not None and settings.fields:
+        out.append("fields between the kept times: not kept")
+    return "; ".join(out)
 
 
 def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
@@ -94,6 +97,59 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
     return note + " Use mirror = true or taper under [surface]."
+
+
+def body_note(
+    kernel: Kernel, settings: Settings, size: tuple[float, float], compliance: float, force: float, approach: float
+) -> str:
+    """What the base of a sheet does to this contact, and whether a half-space would have done; empty without a base.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Of the body.
+    settings : Settings
+        Boundary and tolerance.
+    size : tuple of float
+        Of the surface. [m]
+    compliance : float
+        Contact compliance at the end. [1/Pa]
+    force, approach : float
+        The largest. [N], [m]
+
+    Notes
+    -----
+    In free space the base raises the surface by no more than ``c(0) C F``, with the correction ``c(0)`` of the
+    kernel right under the load, :attr:`~roughvisc.mechanics.halfspace.sheet.Sheet.relief`.
+    """
+    if not isinstance(kernel, Sheet) or not (force > 0 and approach > 0):
+        return ""
+    if settings.boundary == "free":
+        more = kernel.relief * compliance * force / approach
+        if more < settings.tolerance:
+            return (
+                f"A half-space would have done: its approach is at most {_percent(more)} larger, which is less than "
+                "the tolerance."
+            )
+        larger = "much" if more > 1 else f"up to {_percent(more)}"  # the bound says little where it is wide
+        return f"The base matters: on a half-space the approach would be {larger} larger."
+    longest = max(size)
+    lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
+    note = f"The base holds back {_percent(lost)} of the longest wave, of {longest:.3g} m" + (
+        ": a half-space would have done." if lost < settings.tolerance else "."
+    )
+    if kernel.uniform_displacement > 0:
+        share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
+        note += (
+            " The approach holds the compression of the sheet itself, mean pressure times compliance times "
+            f"{kernel.uniform_displacement:.3g} m: up to {_percent(min(share, 1.0))} of it."
+        )
+    return note
+
+
+def _percent(share: float) -> str:
+    """A share to two digits, as 100 and not 1e+02."""
+    return f"{float(f'{100 * share:.2g}'):g} %"
 
 
 def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:

@@ -14,15 +14,11 @@ from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.mirror import quarter, unfold
-from roughvisc.study.simulation.neighbours import neighbours
+from roughvisc.study.simulation.neighbours import staircase
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.variables import STATUS_MEANINGS, STEPPED, of_step
-
-#: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
-#: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
-PERIMETER_CORRECTION = 0.088
 
 #: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
 #: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
@@ -364,7 +360,5 @@ def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
     periodic, mirrored = scene.halfspace.boundary == "periodic", scene.halfspace.mirrored
     goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
     # beyond a mirror a cell's neighbour is its image
-    seen = neighbours(free, periodic and not mirrored, before=goes_on and not mirrored, beyond=goes_on)
-    faces = sum(np.count_nonzero(contact & beside) for beside in seen)
-    # a face across x is dy long and lies in a strip dx wide, and the other way round
-    return PERIMETER_CORRECTION * scene.halfspace.cell_area * faces
+    outside = {"before": goes_on and not mirrored, "beyond": goes_on}
+    return staircase(contact, free, scene.halfspace.cell_area, periodic and not mirrored, **outside)

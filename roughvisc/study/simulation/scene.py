@@ -28,7 +28,7 @@ from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
 from roughvisc.study.statement.settings import Missing, Settings
-from roughvisc.topography.grid import spacing
+from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
@@ -219,13 +219,7 @@ def _foreseen(ground: Ground, program: Program, material: Material) -> float:
 
 
 def _checked(height: xr.DataArray) -> xr.DataArray:
-    if not isinstance(height, xr.DataArray) or height.dims != ("x", "y"):
-        found = getattr(height, "dims", type(height).__name__)
-        raise InputError(f"height is {found}: expected a DataArray with dimensions ('x', 'y')")
-    if 0 in height.shape:
-        raise InputError(f"height has {height.shape[0]} x {height.shape[1]} cells: expected at least one each way")
-    height = height.astype(float, copy=False)
-    spacing(height, "height")
+    height = checked(height, "height", least=1)
     if np.isinf(height.values).any():
         raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
     return height

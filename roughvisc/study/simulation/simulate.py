@@ -12,8 +12,8 @@ import xarray as xr
 from roughvisc.errors import ConvergenceError
 from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary
+from roughvisc.mechanics.halfspace.sheet import Base
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.march import march
@@ -22,12 +22,14 @@ from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
-from roughvisc.study.simulation.notes import accuracy_note, border_note, left_out, slope_note
+from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, left_out, slope_note
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
 from roughvisc.study.simulation.scene import Ground, follows, nominal_area, prepare
+from roughvisc.study.statement.body import body
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
+from roughvisc.topography.grid import checked
 
 log = logging.getLogger("roughvisc")
 
@@ -49,18 +51,21 @@ def simulate(
     edge: Edge = Settings.edge,
     memory: Memory = Settings.memory,
     grid_error: bool = Settings.grid_error,
+    thickness: float | None = None,
+    base: Base | None = None,
     kernel: Kernel = Settings.kernel,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
-    """Press a rigid profile on a linear viscoelastic half-space.
+    """Press a rigid profile on a linear viscoelastic half-space, or on a sheet on a rigid base.
 
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y)
-        Profile, peaks up, with cell-centre coordinates. The undeformed gap is ``max(height) - height``; an indenter's
-        counts from its apex, wherever that lies between the cells. [m]
+        Profile, peaks up, with cell-centre coordinates; or a Dataset that holds it as ``height``. A unit of length
+        that heights or coordinates state is converted; without one they are metres. The undeformed gap is
+        ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Of the half-space: one of roughvisc's, or any object with the two functions that
+        Of the body: one of roughvisc's, or any object with the two functions that
         :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
@@ -89,8 +94,13 @@ def simulate(
     grid_error : bool
         Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
         the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+    thickness : float, optional
+        Of a sheet of the material on a rigid base, in place of a half-space. With periodic boundaries and a Poisson
+        ratio below a half, the approach holds the compression of the sheet itself. [m]
+    base : {"bonded", "slipping"}, optional
+        Whether the sheet sticks to its base, as it does unless said otherwise, or slides on it without friction.
     kernel : Kernel
-        Of the body that is pressed, if it is no half-space: see :class:`roughvisc.mechanics.halfspace.kernel.Kernel`.
+        Of any other body: see :class:`roughvisc.mechanics.halfspace.kernel.Kernel`.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -131,7 +141,7 @@ def simulate(
         edge=edge,
         memory=memory,
         grid_error=grid_error,
-        kernel=kernel,
+        kernel=body(material, thickness, base, kernel),
     )
     return press(height, material, program, settings, progress=progress)
 
@@ -149,6 +159,7 @@ def press(
 
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
+    height = checked(height, "simulate", least=1)
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
     dataset = _press(height, material, program, with_needed, progress, keeper)
@@ -192,7 +203,8 @@ def _press(
     described = {
         "memory": choice.note,
         "series_error": choice.series_error,
-        "kernel": "" if settings.kernel == HALF_SPACE else repr(settings.kernel),
+        **settings.kernel.described(),
+        "body_note": _body_note(ground, scene, settings, dataset),
         "material_note": complete(material).note,
         "program_note": program.note,
         "accuracy_note": accuracy_note(scene, dataset),
@@ -249,6 +261,12 @@ def _slope_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:
     if note:
         log.warning("%s", note)
     return note
+
+
+def _body_note(ground: Ground, scene: Scene, settings: Settings, dataset: xr.Dataset) -> str:
+    (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
+    largest = (float(dataset[name].max()) for name in ("force", "approach"))
+    return body_note(settings.kernel, settings, (nx * dx, ny * dy), scene.final, *largest)
 
 
 def _border_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.study.statement.identity import case_key, surface_content
+from roughvisc.errors import ChangedError, InputError
+from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
-from roughvisc.study.statement.variation import expand, place
+from roughvisc.study.statement.variation import expand, place, with_files
+from roughvisc.topography.cards import read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,26 +43,33 @@ class Case:
         The study file that it came from.
     varied : mapping
         What a sweep set for this case: dotted key -> value in SI.
+    written : mapping
+        Those of them that are quantities with a unit, as they were written: dotted key -> text.
     """
 
     settings: Study
     origin: Path | None = None
     varied: Mapping[str, Any] = field(default_factory=dict)
+    written: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
         """Title of the study."""
         return self.settings.title
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Sixteen hexadecimal digits that stand for all that determines the numbers, and for nothing else."""
-        return case_key(self.settings)
+        return self._identity[0]
 
-    @cached_property
+    @property
     def surface_sha256(self) -> str:
         """SHA-256 of the scan's file; of a generated surface: of its recipe."""
-        return surface_content(self.settings.surface)[0]
+        return self._identity[1]
+
+    @cached_property
+    def _identity(self) -> tuple[str, str]:
+        return identity(self.settings)
 
     def height(self) -> xr.DataArray:
         """Heights of the surface as conditioned, peaks up. [m]
@@ -72,19 +78,39 @@ class Case:
         ------
         InputError
             If the scan cannot be read, or its conditioning or its recipe is impossible.
+        ChangedError
+            If its files are no longer those that the key stands for.
         """
+        _ = self._identity  # of the files as they are before they are read
         try:
-            return self.settings.surface.height()
+            height = self.settings.surface.height()
         except InputError as error:
+            if self._changed():
+                raise self._change() from error
             raise InputError(line(self.origin, "surface", str(error))) from error
+        if self._changed():
+            raise self._change()
+        return height
+
+    def _changed(self) -> bool:
+        """Whether the files are no longer those that the key stands for."""
+        try:
+            return identity(self.settings) != self._identity
+        except InputError:  # gone, or another file by now
+            return True
+
+    def _change(self) -> ChangedError:
+        named = getattr(self.settings.surface, "file", None) or "the second face"
+        problem = f"{named}: was changed after the study was read: expected the heights that the case's key stands for"
+        return ChangedError(line(self.origin, "surface", f"{problem}; run the study again for the new ones"))
 
     def material(self) -> Material:
         """The material."""
         return self.settings.material.build()
 
     def kernel(self) -> Kernel:
-        """What the surface of the body does under pressure: a half-space's."""
-        return HALF_SPACE
+        """What the surface of the body does under pressure: a half-space's, or a sheet's."""
+        return self.settings.material.kernel()
 
     def program(self) -> Program:
         """The loading program."""
@@ -103,6 +129,8 @@ class Case:
         stated = _stated(self.settings)
         if self.varied:
             stated["varied"] = dict(self.varied)
+        if self.written:
+            stated["written"] = dict(self.written)
         if self.origin is not None:
             stated["origin"] = str(self.origin.absolute())
         return json.dumps(stated)
@@ -114,10 +142,10 @@ class Case:
             data = json.loads(text)
             if not isinstance(data, dict):
                 raise InputError("found no JSON object")
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
-        origin, varied = data.pop("origin", None), data.pop("varied", {})
-        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied)
+        origin, varied, written = (data.pop(name, None) for name in ("origin", "varied", "written"))
+        return cls(_checked(data, None, "case"), Path(origin) if origin else None, varied or {}, written or {})
 
 
 def read_study(path: str | Path) -> Case:
@@ -148,6 +176,7 @@ def read_cases(path: str | Path) -> list[Case]:
     """All the cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
 
     A table ``[[sweep]]`` holds lists of one length, taken together entry by entry; several tables follow each other.
+    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of the files that match it.
     Without a sweep there is one case.
 
     Parameters
@@ -166,9 +195,14 @@ def read_cases(path: str | Path) -> list[Case]:
         As :func:`read_study` does, for any of the cases.
     """
     path = Path(path)
-    data = _toml(path)
-    sweep = data.pop("sweep", {})
-    changes = expand(sweep, lambda key, found: InputError(line(path, key, found)))
+    if not path.exists():
+        raise InputError(f"{path}: does not exist: expected a study file (TOML)")
+    data = read_toml(path, "valid TOML")
+
+    def refusal(key: str, found: str) -> InputError:
+        return InputError(line(path, key, found))
+
+    changes = expand(with_files(data.pop("sweep", {}), path.parent, refusal), refusal)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
     for number, change in enumerate(changes):
@@ -201,13 +235,14 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
         If a key does not exist or a value is refused.
     """
     data = json.loads(case.to_json())
-    data.pop("origin", None)
-    data.pop("varied", None)
+    for name in ("origin", "varied", "written"):
+        data.pop(name, None)
     try:
         changed = _varied(data, changes, case.origin, None)
     except Problems as error:
         raise InputError(report(case.origin, error.lines)) from error
-    return Case(changed.settings, changed.origin, {**case.varied, **changed.varied})
+    written = {key: text for key, text in case.written.items() if key not in changes}
+    return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
 
 
 def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, reading: Path | None) -> Case:
@@ -218,7 +253,9 @@ def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | 
             raise Problems([f"{key}: {error}"]) from error
     settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
     stated = _stated(settings)
-    return Case(settings, origin, {key: _at(stated, key, value) for key, value in changes.items()})
+    varied = {key: _at(stated, key, value) for key, value in changes.items()}
+    written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}
+    return Case(settings, origin, varied, written)
 
 
 def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> Study:
@@ -227,17 +264,6 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
         raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: does not exist: expected a study file (TOML)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no valid TOML: {error}") from error
 
 
 def _stated(settings: Study) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from roughvisc.errors import InputError
+from roughvisc.topography.readers import regular
 from roughvisc.units import quantity
 
 _HEADING = re.compile(r"\s*(?P<name>[^\[\(]*?)\s*(?:[\[\(]\s*(?P<unit>.*?)\s*[\]\)])?\s*")
@@ -78,13 +79,17 @@ def read_columns(
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Rows of cells with their line numbers, without blank lines and comments."""
     try:
+        regular(path)
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a CSV file: {error}") from error
     kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     separator = next((mark for mark in (";", "\t", ",") if kept and mark in kept[0][1]), ",")
     rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
-    return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+    try:
+        return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+    except csv.Error as error:  # a cell without end
+        raise InputError(f"{path}: cannot be read as a table: {error}") from error
 
 
 def _is_number(cell: str) -> bool:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
+from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
-NUMERICS_REVISION = 7
+NUMERICS_REVISION = 8
 
 #: Keys of ``[solve]`` that always count. Any other came later, and its usual value leaves a case's key as it was.
 _FROM_THE_START = {"boundary", "tolerance", "time_step", "method", "edge"}
@@ -34,11 +33,12 @@ _PROSE = {
 }
 
 
-def case_key(settings: Study) -> str:
-    """Digest of all that determines the numbers: sixteen hexadecimal digits.
+def identity(settings: Study) -> tuple[str, str]:
+    """Digest of all that determines the numbers, sixteen hexadecimal digits, and that of the surface's file or recipe.
 
-    The surface counts by the content of its file and not by its path, as do tables of a material; the program by
-    its segments and not by how they were written, and no title counts.
+    Both come from one reading of the file. The surface counts by the content of its file and not by its path, as do
+    tables of a material; the program by its segments and not by how they were written, and no title counts. Nor does
+    the library of the transforms, which changes the last digits: a result says what it was made with.
     """
     stated = settings.model_dump(
         mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
@@ -52,9 +52,10 @@ def case_key(settings: Study) -> str:
         for segment in settings.loading().segments
     ]
     stated["material"] = settings.material.content()
-    stated["surface"] = surface_content(settings.surface)
-    stated["numerics"] = [NUMERICS_REVISION, transform_library().split()[0]]
-    return _digest(stated)[:16]
+    surface = surface_content(settings.surface)
+    stated["surface"] = surface
+    stated["numerics"] = NUMERICS_REVISION
+    return _digest(stated)[:16], surface[0]
 
 
 def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
@@ -78,10 +79,7 @@ def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
     path = Path(stated.pop("file"))
     if path.suffix.lower() != ".toml":
         return _checksum(path), stated
-    try:
-        card = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no surface card in TOML: {error}") from error
+    card = read_toml(path, "surface card in TOML")
     stated["card"] = {key: value for key, value in card.items() if key not in _PROSE and key != "file"}
     if isinstance(card.get("file"), str):
         return _checksum(path.parent / card["file"]), stated

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.units import shown
 
 
 class Problems(InputError):
@@ -21,7 +22,7 @@ def in_sweep(problem: str, where: Sequence[int], changes: Sequence[Mapping[str, 
     """The problem, and the first case that has it where not all do."""
     if len(where) == len(changes):
         return problem
-    values = ", ".join(f"{key} = {value!r}" for key, value in changes[where[0]].items())
+    values = ", ".join(f"{key} = {shown(value)}" for key, value in changes[where[0]].items())
     return f"{problem} (case {where[0] + 1} of {len(changes)}: {values})"
 
 

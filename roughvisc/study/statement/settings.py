@@ -21,6 +21,10 @@ Edge = Literal["error", "accept"]
 Memory = Literal["auto", "direct"]
 TimeStep = float | Literal["auto"]
 
+#: Rounding leaves so much of the numbers that are held against a tolerance: a march to a finer one would not end.
+FINEST_TOLERANCE = 1e-12
+#: Instants that a run may keep.
+MOST_TIMES = 1_000_000
 #: What marks a setting that stands in a result's attributes, unless it is None.
 _TOLD = {"told": True}
 
@@ -91,8 +95,8 @@ def _refusal(name: str, found: Any, expected: str) -> InputError:
 
 
 def _tolerance(value: Any) -> float:
-    if not (isinstance(value, int | float) and 0 < value < 1):
-        raise _refusal("tolerance", value, "a number between 0 and 1")
+    if not (isinstance(value, int | float) and FINEST_TOLERANCE <= value < 1):
+        raise _refusal("tolerance", value, f"a number of at least {FINEST_TOLERANCE:g} and below 1")
     return float(value)
 
 
@@ -109,8 +113,8 @@ def _times(value: Any) -> int | tuple[float, ...] | None:
         return None
     wanted = "a positive count, a list, or None"
     if isinstance(value, int | np.integer):
-        if value < 1:
-            raise _refusal("times", int(value), wanted)
+        if not 1 <= value <= MOST_TIMES:
+            raise _refusal("times", int(value), f"{wanted}; at most {MOST_TIMES} times")
         return int(value)
     try:
         return tuple(np.unique(np.asarray(value, dtype=float)).tolist())

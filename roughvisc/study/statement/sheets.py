@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.topography.readers import regular
 from roughvisc.units import is_quantity, quantity
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[\(]\s*(?P<unit>[^\[\]\(\)]*?)\s*[\]\)]")
@@ -91,12 +92,16 @@ def _rows(path: Path) -> list[Row]:
     if separator == "," and len(blanks) > 1 and all(_NUMBER.fullmatch(cell) for cell in blanks):
         return [(i, line.split()) for i, line in kept]
     rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
-    return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+    try:
+        return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+    except csv.Error as error:  # a cell without end
+        raise InputError(f"{path}: cannot be read as a table: {error}") from error
 
 
 def _text(path: Path) -> str:
     """The text of a file in the encodings that Windows programs write."""
     try:
+        regular(path)
         raw = path.read_bytes()
         if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
             return raw.decode("utf-16")

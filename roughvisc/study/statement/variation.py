@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
+import os
 from collections.abc import Callable, Iterator, Mapping
+from glob import glob
+from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.units import shown
 
 Refusal = Callable[[str, str], InputError]
+
+#: More cases are taken for a slip: a sweep of them would not end.
+MOST_CASES = 100_000
 
 
 def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
@@ -39,10 +47,14 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
         keys = dict(_flat(sweep))
         for key, values in keys.items():
             if not isinstance(values, list) or not values:
-                raise refusal(f"sweep.{key}", f"found {values!r}: expected a list of values")
+                raise refusal(f"sweep.{key}", f"found {shown(values)}: expected a list of values")
+        count = math.prod(len(values) for values in keys.values())
+        if count > MOST_CASES:
+            lengths = " x ".join(str(len(values)) for values in keys.values())
+            raise refusal("sweep", f"found {lengths} = {count} cases: expected at most {MOST_CASES}")
         return [dict(zip(keys, chosen, strict=True)) for chosen in itertools.product(*keys.values())]
     if not isinstance(sweep, list) or not all(isinstance(table, Mapping) and table for table in sweep):
-        raise refusal("sweep", f"found {sweep!r}: expected a table of lists, or [[sweep]] tables")
+        raise refusal("sweep", f"found {shown(sweep)}: expected a table of lists, or [[sweep]] tables")
     return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)), refusal)]
 
 
@@ -52,6 +64,8 @@ def _zipped(number: int, table: Mapping[str, Any], refusal: Refusal) -> list[dic
         found = ", ".join(f"{length} for {key}" for key, length in lengths.items())
         raise refusal(f"sweep.{number}", f"found {found}: expected lists of one length, at least 1")
     runs = next(iter(lengths.values()), 1)
+    if runs > MOST_CASES:
+        raise refusal(f"sweep.{number}", f"found {runs} cases: expected at most {MOST_CASES}")
     return [{key: v[run] if isinstance(v, list) else v for key, v in table.items()} for run in range(runs)]
 
 
@@ -62,6 +76,46 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
             yield from _flat(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
+
+
+def with_files(sweep: Any, folder: Path, refusal: Refusal) -> Any:
+    """A sweep in which patterns of files stand for the files that match them, sorted by name.
+
+    Parameters
+    ----------
+    sweep : dict or list of dict
+        As :func:`expand` takes it. A key ``file``, such as ``surface.file``, may hold patterns such as
+        ``"scans/*.sur"``, alone or in its list.
+    folder : Path
+        That the patterns are relative to.
+    refusal : callable
+        Makes the error to raise from a dotted key and what is wrong with it.
+    """
+    if isinstance(sweep, list):
+        return [with_files(table, folder, refusal) for table in sweep]
+    if not isinstance(sweep, Mapping):
+        return sweep
+    return {
+        key: _matching(key, value, folder, refusal) if key.rpartition(".")[2] == "file" else value
+        for key, value in _flat(sweep)
+    }
+
+
+def _matching(key: str, value: Any, folder: Path, refusal: Refusal) -> Any:
+    """The value, with the files in place of each pattern; a file that is there by that very name is no pattern."""
+    stated = value if isinstance(value, list) else [value]
+    found: list[Any] = []
+    for one in stated:
+        if not isinstance(one, str) or not set("*?[") & set(one) or (folder / one).exists():
+            found.append(one)
+            continue
+        pattern = os.path.expanduser(one)
+        matches = sorted(name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file())
+        if not matches:
+            where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
+            raise refusal(f"sweep.{key}", f"found {one!r}, which matches no file{where}: expected one at least")
+        found += matches
+    return value if found == stated else found
 
 
 def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:

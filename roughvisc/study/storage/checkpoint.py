@@ -10,13 +10,12 @@ import logging
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
@@ -31,6 +30,8 @@ log = logging.getLogger("roughvisc")
 
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
+#: Between two libraries in the account of what a run was computed with.
+_THEN = "; then "
 _TYPES = {kind.__name__: kind for kind in (State, Pace, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
 
 
@@ -48,6 +49,8 @@ class Reached:
         Rows written, those of steps that are not kept too, and how many times the grid has grown.
     wall_time : float
         Spent so far. [s]
+    transforms : str
+        Libraries that it was computed with, one after the other.
     """
 
     state: State | None = None
@@ -55,6 +58,7 @@ class Reached:
     rows: int = 0
     growths: int = 0
     wall_time: float = 0.0
+    transforms: str = field(default_factory=transform_library)
 
     @property
     def time(self) -> float:
@@ -65,6 +69,11 @@ class Reached:
         """How far it has come with another step, what is bad of it folded in."""
         converged = self.converged and step.converged
         return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
+
+    def going_on_here(self) -> Reached:
+        """The same, to be gone on from with the transforms that are here."""
+        before = self.transforms.split(_THEN)
+        return replace(self, transforms=_THEN.join(dict.fromkeys([*before, transform_library()])))
 
     def kept(self) -> Reached:
         """How far it has come when the step is kept as a row."""
@@ -80,19 +89,13 @@ def save_checkpoint(path: Path, reached: Reached, key: str) -> None:
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
     stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
-    plain = {"key": key, "revision": NUMERICS_REVISION, "transforms": transform_library(), "reached": stated}
+    plain = {"key": key, "revision": NUMERICS_REVISION, "reached": stated}
     with whole_file(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
 
 def load_checkpoint(path: Path, key: str) -> Reached | None:
-    """How far the case of that key has come; None if the file is absent, damaged, or of something else.
-
-    Raises
-    ------
-    InputError
-        If the other transforms would give other numbers from here on.
-    """
+    """How far the case of that key has come; None if the file is absent, damaged, or of something else."""
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
@@ -107,12 +110,6 @@ def load_checkpoint(path: Path, key: str) -> Reached | None:
     if found != (key, NUMERICS_REVISION):
         log.warning("%s: belongs to another case or revision and is not used", path)
         return None
-    if plain["transforms"] != transform_library():
-        raise InputError(
-            f"{path}: was written with {plain['transforms']}, this is {transform_library()}, and the numbers would "
-            "differ in their last digits: expected the same versions; go on with those, or remove the folder to "
-            "start anew"
-        )
     return reached
 
 
@@ -160,6 +157,8 @@ class Keeper:
         so many accepted steps.
     stop : callable or None
         Asked after every accepted step.
+    same_bits : bool
+        Do not go on from what other transforms have computed.
     """
 
     def __init__(
@@ -171,6 +170,7 @@ class Keeper:
         seconds: float = 30.0,
         steps: int | None = None,
         stop: Callable[[], bool] | None = None,
+        same_bits: bool = False,
     ) -> None:
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows", check)
@@ -179,7 +179,7 @@ class Keeper:
         self._key = key
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
-        self._latest = self.saved
+        self._latest, self._same_bits = self.saved, same_bits
         self._pending, self._last_save = 0, time.monotonic()
 
     def resume(self) -> None:
@@ -188,9 +188,15 @@ class Keeper:
             leftover.unlink()
         found = [(reached, path) for path in self._paths if (reached := load_checkpoint(path, self._key)) is not None]
         for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
+            here = reached.going_on_here()
+            if here != reached and self._same_bits:
+                log.warning(
+                    "%s: was computed with %s: not used, this is %s", path, reached.transforms, transform_library()
+                )
+                continue
             if self.rows.keep_first(reached.rows):
                 log.info("%s: goes on from t = %.6g s", path, reached.time)
-                self.saved = self._latest = reached
+                self.saved = self._latest = here
                 if path == self._paths[0]:
                     self._paths.reverse()
                 return

@@ -55,12 +55,18 @@ def record_failure(folder: Path, case: Case, message: str, error: str, trace: st
 
 def recorded_failure(folder: Path, key: str) -> dict[str, Any] | None:
     """Record of a case that failed; None if there is none, or if another version failed, which proves nothing."""
+    record = stated_failure(folder, key)
+    current = record is not None and {name: record.get(name) for name in _version()} == _version()
+    return record if current else None
+
+
+def stated_failure(folder: Path, key: str) -> dict[str, Any] | None:
+    """Record of a case that failed, in whatever version; None if there is none that can be read."""
     try:
         record = json.loads(record_path(folder, key).read_text())
     except (OSError, ValueError):
         return None
-    current = isinstance(record, dict) and {name: record.get(name) for name in _version()} == _version()
-    return record if current else None
+    return record if isinstance(record, dict) and isinstance(record.get("case"), dict) else None
 
 
 def forget_failure(folder: Path, key: str) -> None:

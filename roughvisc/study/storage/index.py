@@ -1,31 +1,42 @@
 """The index of a folder of results: all of them but the fields, in one small file.
 
-It only saves time: it is made anew from the results where it is absent, damaged or older than they are.
+It only saves time: it is made anew from the results where it is absent, damaged or older than they are. Which sweep
+ran last cannot be made anew, and stands in a file of its own.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import logging
+import re
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.store import NETCDF, result_files, whole_file
+from roughvisc.study.storage.seal import seal, unsealed
+from roughvisc.study.storage.store import NETCDF, require_whole, result_files, whole_file
 from roughvisc.variables import VARIABLES
 
 log = logging.getLogger("roughvisc")
 
-INDEX = ".index.npz"
+INDEX, LATEST = ".index.npz", ".latest.json"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 2
+_LAYOUT = 3
+#: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
+_UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
+_UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
+#: Names of results are their keys.
+_KEY = re.compile(r"[0-9a-f]{16}")
 #: Histories over the kept times, and over the accepted steps, with the times themselves.
 _HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)))
 
@@ -76,10 +87,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Index:
-    """Entries by key, and the keys of the sweep that ran last in the folder, in its order."""
+    """Entries by key, and the keys of the sweep that ran last in the folder, in its order; None if not known."""
 
     entries: dict[str, Entry]
-    sweep: tuple[str, ...] = ()
+    sweep: tuple[str, ...] | None = ()
 
 
 def read_entry(path: Path) -> Entry:
@@ -94,6 +105,7 @@ def read_entry(path: Path) -> Entry:
 
     try:
         stamp = _stamp(path)
+        require_whole(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -102,14 +114,22 @@ def read_entry(path: Path) -> Entry:
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
         raise InputError(
-            f"{path}: is damaged, or no result of roughvisc ({error}): remove it, and run again"
+            f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
     absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
-    if absent or "case" not in attributes:
+    if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
     kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
     return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float))
+
+
+def _is_table(text: Any) -> bool:
+    """Whether a text is a table in JSON."""
+    try:
+        return isinstance(json.loads(text), dict)
+    except (TypeError, ValueError, RecursionError):
+        return False
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -135,9 +155,11 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
     if not folder.is_dir():
         raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
     stored = _load(folder / INDEX)
-    before = {entry.file: entry for entry in (*stored.entries.values(), *known)}
+    before = {entry.file: entry for entry in (*stored, *known)}
     entries: dict[str, Entry] = {}
     for path in result_files(folder):
+        if not _KEY.fullmatch(path.stem):  # made from a result, or by somebody else
+            continue
         try:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
@@ -147,8 +169,11 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
         except FileNotFoundError:  # gone meanwhile
             continue
         else:
-            entries[entry.key] = entry
-    return Index(entries, stored.sweep)
+            if entry.key == path.stem:
+                entries[entry.key] = entry
+            else:
+                log.warning("%s: holds the result of case %s: expected the one that its name says", path, entry.key)
+    return Index(entries, _latest(folder))
 
 
 def save_index(folder: Path, index: Index) -> None:
@@ -171,9 +196,14 @@ def save_index(folder: Path, index: Index) -> None:
         columns = [entry.histories[name] for entry in entries if name in entry.histories]
         if columns:
             arrays[name] = np.concatenate(columns)
-    text = json.dumps({"layout": _LAYOUT, "sweep": index.sweep, "entries": head})
+    text = json.dumps({"layout": _LAYOUT, "entries": head})
     with suppress(OSError, InputError), whole_file(folder / INDEX) as temporary:
         np.savez(temporary, head=np.frombuffer(text.encode(), np.uint8), **arrays)
+        seal(temporary)
+    if index.sweep is not None and index.sweep != _latest(folder):
+        keys = list(index.sweep)
+        with suppress(OSError, InputError), whole_file(folder / LATEST) as temporary:
+            temporary.write_text(json.dumps({"keys": keys, "checksum": _checksum(keys)}))
 
 
 class _Grids:
@@ -190,20 +220,36 @@ class _Grids:
         return number
 
 
-def _load(path: Path) -> Index:
-    """The stored index; an empty one where there is none that can be used."""
+def _latest(folder: Path) -> tuple[str, ...] | None:
+    """Keys of the sweep that ran last; none if none did, None if what says so is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        stated = json.loads((folder / LATEST).read_bytes())
+        keys = stated["keys"]
+        return tuple(keys) if stated["checksum"] == _checksum(keys) else None
+    except FileNotFoundError:
+        return ()
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return None
+
+
+def _checksum(keys: Sequence[str]) -> int:
+    return zlib.crc32(" ".join(keys).encode())
+
+
+def _load(path: Path) -> list[Entry]:
+    """Entries of the stored index; none where there is none that can be used."""
+    try:
+        content = unsealed(path)
+        if content is None:
+            return []
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         stored = json.loads(bytes(arrays["head"]))
-        if stored["layout"] != _LAYOUT:
-            return Index({})
-        entries = _entries(stored["entries"], arrays)
-        return Index({entry.key: entry for entry in entries}, tuple(stored["sweep"]))
-    except Exception as error:  # absent, cut short, of another version: whatever it is, the results are all there
+        return _entries(stored["entries"], arrays) if stored["layout"] == _LAYOUT else []
+    except _UNREADABLE as error:
         if not isinstance(error, FileNotFoundError):
             log.info("%s is made anew: %s", path, error)
-        return Index({})
+        return []
 
 
 def _entries(heads: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> list[Entry]:

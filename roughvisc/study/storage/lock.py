@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from roughvisc.errors import InUseError
+from roughvisc.errors import InputError, InUseError
 
 try:
     import fcntl
@@ -80,20 +80,24 @@ class Lock:
 
 
 @contextmanager
-def held(path: Path) -> Iterator[Lock]:
+def held(path: Path, patience: float = _PATIENCE) -> Iterator[Lock]:
     """Hold a lock.
 
     Parameters
     ----------
     path : path
         Its file, in a folder that exists. Every machine that shares the folder sees it.
+    patience : float
+        How long to wait for one that is held. [s]
 
     Raises
     ------
     InUseError
         If another run holds it.
+    InputError
+        If a link stands in its place: what that leads to is not touched.
     """
-    descriptor = _opened(path)
+    descriptor = _opened(path, patience)
     try:
         lock = Lock(path, descriptor)
     except OSError:  # a full disk
@@ -106,14 +110,16 @@ def held(path: Path) -> Iterator[Lock]:
         lock.release()
 
 
-def _opened(path: Path) -> int:
+def _opened(path: Path, patience: float) -> int:
     """Descriptor of the lock's file, locked."""
-    until = time.monotonic() + _PATIENCE
+    until = time.monotonic() + patience
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link: expected the lock of a run, or no file; remove it")
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
             alone = _locked(descriptor)
-            if os.path.exists(path) and os.path.samestat(os.fstat(descriptor), os.stat(path)):
+            if os.path.exists(path) and os.path.samestat(os.fstat(descriptor), os.lstat(path)):
                 holder = _holder(descriptor)
                 if alone is False and time.monotonic() < until:
                     time.sleep(0.05)
@@ -161,4 +167,5 @@ def _dead(path: Path, holder: dict[str, Any], alone: bool | None) -> bool:
     if alone and holder["host"] == socket.gethostname():
         return True  # it would have the system's lock
     with tempfile.TemporaryFile(dir=path.parent) as now:  # by the clock of the file server, not of this machine
-        return os.fstat(now.fileno()).st_mtime - path.stat().st_mtime > STALE
+        age = os.fstat(now.fileno()).st_mtime - path.stat().st_mtime
+    return abs(age) > STALE  # whoever holds it touches it: it is not of tomorrow either

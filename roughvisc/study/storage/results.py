@@ -15,7 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.schema.units import unit_of
-from roughvisc.study.storage.index import NETCDF, Entry, index_of, save_index
+from roughvisc.study.storage.index import LATEST, NETCDF, Entry, index_of, save_index
 from roughvisc.study.storage.store import no_results
 from roughvisc.variables import VARIABLES
 
@@ -70,7 +70,12 @@ def open_results(out, *, cases="last", ragged=False):
     folder = Path(out).absolute()
     index = index_of(folder)
     save_index(folder, index)
-    entries = _chosen(index.entries, index.sweep, cases)
+    if index.sweep is None and cases == "last":
+        raise InputError(
+            f"{folder / LATEST}: is damaged: expected the cases of the sweep that ran last; run it again, which "
+            "computes nothing that is finished, or ask for cases='all'"
+        )
+    entries = _chosen(index.entries, index.sweep or (), cases)
     if not entries:
         raise no_results(folder)
     parameters = parameters_of([entry.case for entry in entries])
@@ -122,7 +127,7 @@ def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]
     return {key: _column(found) for key, found in values.items()}
 
 
-_NOT_A_PARAMETER = ("title", "origin", "varied")
+_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
 
 
 def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
@@ -227,11 +232,16 @@ def _read(path: NDArray[Any], variable: str, frames: int, block_id: tuple[int, .
     """One block, from its file."""
     import netCDF4
 
-    with NETCDF, netCDF4.Dataset(path.item()) as file:
-        file.set_auto_mask(False)
-        start = block_id[1] * frames if frames else 0
-        found = file[variable][start : start + frames] if frames else file[variable][:]
-        return np.asarray(found)[np.newaxis]
+    start = block_id[1] * frames if frames else 0
+    try:
+        with NETCDF, netCDF4.Dataset(path.item()) as file:
+            file.set_auto_mask(False)
+            found = file[variable][start : start + frames] if frames else file[variable][:]
+    except (OSError, RuntimeError, LookupError) as error:
+        raise InputError(
+            f"{path.item()}: its {variable} cannot be read ({error}): the file is damaged; run its study again"
+        ) from error
+    return np.asarray(found)[np.newaxis]
 
 
 def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.DataTree:

@@ -6,6 +6,8 @@ CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them as t
 from __future__ import annotations
 
 import errno
+import json
+import logging
 import math
 import os
 import secrets
@@ -18,14 +20,18 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF  # netCDF-4 does not stand two threads
 
-from roughvisc.errors import InputError
+from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
-from roughvisc.variables import of_step
+from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
+from roughvisc.study.storage.seal import flaw, seal
+from roughvisc.units import shown
+from roughvisc.variables import VARIABLES, of_step
 
 if TYPE_CHECKING:
     import xarray as xr
+
+log = logging.getLogger("roughvisc")
 
 _MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) | {
     "stated_error",
@@ -98,16 +104,16 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
     Raises
     ------
-    InputError
+    FolderError
         If the folder cannot be made or written to.
     """
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
+        raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
     if not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path.parent}: may not be written to: expected a folder with write permission")
+        raise FolderError(f"{path.parent}: may not be written to: expected a folder with write permission")
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     try:
         yield temporary
@@ -178,6 +184,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
                 declared = [_declare(file, str(name), v, precision) for name, v in dataset.variables.items()]
                 for written, variable in zip(declared, dataset.variables.values(), strict=True):
                     _write(written, variable)
+            seal(temporary)
         except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             number = errno.ENOSPC if full else errno.EIO
@@ -277,8 +284,29 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     return plain
 
 
+def require_whole(path: Path) -> None:
+    """Refuse a result whose bytes are not those that were written."""
+    try:
+        found = flaw(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a result") from error
+    if found:
+        raise InputError(
+            f"{path}: is damaged: {found}: the run that it is the result of sets it aside and computes it anew"
+        )
+
+
+def set_aside(path: Path) -> None:
+    """Give a damaged result another name, by which nobody takes it for one."""
+    aside = path.with_name(f"{path.name}.damaged")
+    os.replace(path, aside)
+    log.warning("%s: is set aside as %s, and computed anew", path, aside.name)
+
+
 def open_result(path: str | Path) -> xr.Dataset:
-    """Open a result; its data are read when they are asked for.
+    """Open a result; its fields are read when they are asked for, in whatever thread or process.
+
+    Its bytes are held against the checksum that they were written with first, which takes some 0.3 s for 1 GB.
 
     Parameters
     ----------
@@ -302,14 +330,33 @@ def open_result(path: str | Path) -> xr.Dataset:
         raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
     if path.is_dir():
         raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
+    require_whole(path)
     try:
-        dataset = xr.open_dataset(path, engine="netcdf4", decode_timedelta=False)
+        dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
-    absent = [name for name in ("time", "force", "approach") if name not in dataset.variables]
-    if absent:
+    found = _foreign(dataset)
+    if found:
         dataset.close()
-        raise InputError(f"{path}: holds no {', '.join(absent)}: expected a result of roughvisc")
+        raise InputError(f"{path}: {found}: expected a result of roughvisc")
     return dataset
+
+
+def _foreign(dataset: xr.Dataset) -> str:
+    """What shows that a file is no result, whoever wrote it; empty if nothing."""
+    if absent := [name for name in ("time", "force", "approach") if name not in dataset.variables]:
+        return f"holds no {', '.join(absent)}"
+    for name, variable in dataset.variables.items():
+        if name in VARIABLES and variable.dtype.kind not in "fiub":
+            return f"holds {name} as {variable.dtype}"
+    if odd := [name for name in ("force", "approach") if dataset[name].dims != ("time",)]:
+        return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
+    if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
+        return f"has the tolerance {shown(dataset.attrs['tolerance'])}"
+    try:
+        stated = json.loads(dataset.attrs.get("case", "{}"))
+    except (TypeError, ValueError, RecursionError):
+        stated = None
+    return "" if isinstance(stated, dict) else "has an attribute case that is no case in JSON"

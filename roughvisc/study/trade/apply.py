@@ -44,7 +44,7 @@ def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:
     """
     path = Path(path).resolve()  # a link stays one
     try:
-        document = tomlkit.parse(path.read_text(encoding="utf-8"))
+        document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (TOMLKitError, UnicodeDecodeError) as error:
@@ -100,7 +100,8 @@ def _append(table: Any, key: str, value: Any) -> None:
     """A further key after the last one, not after the blank lines below it."""
     body = table.value.body if isinstance(table, Table) and isinstance(table.value, Container) else []
     keys = [n for n, (name, _) in enumerate(body) if name is not None]
-    if keys and keys[-1] + 1 < len(body):
+    # tomlkit has no public way; should this one go, the key comes below the blank lines
+    if keys and keys[-1] + 1 < len(body) and hasattr(table.value, "_insert_at"):
         table.value._insert_at(keys[-1] + 1, tomlkit.key(key), value)
     else:
         table.append(key, value)

@@ -21,13 +21,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.halfspace.sheet import Base, Sheet
 from roughvisc.mechanics.materials.models import (
     Material,
     PowerLaw,
@@ -248,6 +249,23 @@ def wave(cells: int) -> Rows:
     yield "pressure (L1)", float(np.max(error)) / mean, _TOLERANCE
 
 
+def sheet(cells: int) -> Rows:
+    """A sheet as thick as the contact comes to be wide; the base takes as much of the grid's error as of the rest."""
+    load = 4 / 3 / _ROUND / float(_ZENER.contact_compliance(4.0))
+    times = [0.0, 0.5, 1.0, 2.0, 4.0]
+    for base in get_args(Base):
+        exact = closed_forms.StepLoad(
+            closed_forms.OnSheet(closed_forms.Paraboloid(_ROUND), Sheet(1.0, _ZENER.poisson, base)), _ZENER, load
+        )
+        program = Program().load(load, over=0).hold(4.0)
+        ball = sphere(_ROUND, _SIZE, cells)
+        ds = _press(ball, _ZENER, program, times=times, thickness=1.0, base=base)
+        smallest = float(exact.radius(0.0))
+        yield f"approach, {base}", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+        radius = _radius_error(_SIZE / cells, smallest) + _TOLERANCE
+        yield f"contact radius, {base}", _relative(_radius(ds), exact.radius(ds.time)), radius
+
+
 def loaded_punch(cells: int) -> Rows:
     program = Program().load(2.0, over=1.0).hold(1.0).load(0.5, over=0.5).hold(1.0)
     times = [0.5, 1.0, 2.0, 2.5, 3.5]
@@ -304,6 +322,7 @@ CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
     "Ting": ("sphere, triangle of load, Zener (Ting)", unloading),
     "relaxation": ("sphere, load then fixed approach, Zener (element reduction)", relaxation),
     "full wave": ("wave in full contact, periodic, Zener", wave),
+    "sheet": ("sphere on a sheet, step load, Zener (Fredholm equation; Lee, Radok)", sheet),
     "punch": ("flat punch, loaded and unloaded, Zener", loaded_punch),
     "cycles": ("flat punch, cycles of approach, Zener", cycled_punch),
     "histories": ("sphere, measured creep: series against direct history", histories),

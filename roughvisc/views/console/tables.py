@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,9 @@ import xarray as xr
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
+from scipy import special
 
+from roughvisc.errors import printable
 from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
 
@@ -51,8 +54,8 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Approach at the end", readable(float(last["approach"]), "m")),
         (
             "Contact area at the end",
-            f"{readable(float(last['contact_area_corrected']), 'm2')} corrected for the grid, "
-            f"{readable(float(last['contact_area']), 'm2')} counted"
+            f"{readable(float(last['contact_area_corrected']), 'm^2')} corrected for the grid, "
+            f"{readable(float(last['contact_area']), 'm^2')} counted"
             f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
         ),
         *_accuracy([dataset], dataset.attrs.get("tolerance")),
@@ -61,7 +64,7 @@ def result_table(dataset: xr.Dataset) -> Group:
             for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
             if name in dataset
         ),
-        *([("Program", dataset.attrs["program_note"])] if "program_note" in dataset.attrs else []),
+        *((label, dataset.attrs[note]) for note, label in _NOTES.items() if note in dataset.attrs),
         ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
         ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
         ("Cost: wall time", readable(float(last["wall_time"]), "s")),
@@ -86,7 +89,8 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
     alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {reused} of them before")]
+    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing had to be computed"
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
     for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
     rows += _accuracy([entry.histories for entry in entries])
@@ -161,13 +165,15 @@ def print_validation(console: Console, found: Sequence[Comparison]) -> None:
             console.print(Text(line.rstrip()), soft_wrap=True)
 
 
+#: What a result and a plan say in words.
+_NOTES = {"body_note": "Body", "program_note": "Program"}
 #: What is modelled, shown once if it is the same in all cases.
 _MODELLED = {
     "boundary": "Boundary",
     "memory_model": "Memory of the material",
     "scheme": "Time",
-    "left_out": "Left out",
-    "program_note": "Program",
+    "left_out": "Savings",
+    **_NOTES,
 }
 #: Cases that a plan lists one by one.
 _LISTED = 20
@@ -187,14 +193,22 @@ def profile_table(profile: Profile) -> Group:
 
 
 def _contact(costs: xr.Dataset) -> str:
-    """How much of the grid comes into contact, as far as coarse grids can tell."""
-    largest = 100 * costs["contact_fraction"]
-    low, high = (float(f(largest)) for f in (np.nanmin, np.nanmax)) if largest.notnull().any() else (np.nan, np.nan)
-    if np.isnan(low):
+    """How much comes into contact: by theories for a surface that repeats, else as a coarse grid has it.
+
+    Under light loads the contact fraction is ``sqrt(8/pi)`` (Persson) to ``sqrt(2 pi)`` times the pressure over that of
+    full contact (A. W. Bush, R. D. Gibson, T. R. Thomas, Wear 35 (1975) 87); beyond, both saturate as his theory does.
+    """
+    whole = costs["nominal_pressure"] / costs["full_contact_pressure"]
+    if (costs["boundary"] == "periodic").all() and np.isfinite(whole).any():
+        found = 100 * special.erf(np.multiply.outer((math.sqrt(2), math.pi / math.sqrt(2)), whole.values))
+        by = "of the area (by the rms slope: theories of Persson, and of Bush, Gibson and Thomas)"
+    else:
+        found, by = 100 * costs["contact_fraction"].values, "of the grid, judged on a coarse one"
+    found = found[np.isfinite(found)]
+    if not found.size:
         return ""
-    texts = dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (low, high))
-    span = " to ".join(texts)
-    return f"about {span} % of the grid, judged on a coarse one"
+    span = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
+    return f"about {span} % {by}"
 
 
 def _warnings(costs: xr.Dataset) -> list[str]:
@@ -208,7 +222,7 @@ def _warnings(costs: xr.Dataset) -> list[str]:
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:
-    found = list(dict.fromkeys(str(value) for value in costs[name].values if value))
+    found = list(dict.fromkeys(str(value).rstrip(".") for value in costs[name].values if value))
     text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     if name == "boundary":
         text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"
@@ -237,7 +251,7 @@ def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
         row = costs.isel(case=i)
         cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
         if row["refusal"].item():
-            table.add_row(*cells, Text("refused"))
+            table.add_row(*cells, Text("cannot run"))
             continue
         counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
         sizes = [size(float(row[name])) for name in ("memory", "disk")]
@@ -337,5 +351,5 @@ def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for label, value in rows:
-        table.add_row(label, Text(str(value)))  # names in files may look like markup
-    return Group(Text(title or "untitled", style="bold"), table)
+        table.add_row(Text(label), Text(printable(str(value))))  # names in files may look like markup
+    return Group(Text(printable(title or "untitled"), style="bold"), table)

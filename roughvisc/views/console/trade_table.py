@@ -8,6 +8,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.errors import printable
 from roughvisc.study.trade.recommend import duration, front
 from roughvisc.views.console.tables import size
 
@@ -37,7 +38,7 @@ def trade_table(dataset: xr.Dataset) -> Group:
         spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
-    parts = [Text(dataset.attrs.get("title") or "untitled", style="bold"), table]
+    parts = [Text(printable(dataset.attrs.get("title") or "untitled"), style="bold"), table]
     text = "Errors in %, the worst over the kept times; * nothing is both faster and nearer in contact area."
     parts += [Text(text, style="italic"), Text()]
     parts += [

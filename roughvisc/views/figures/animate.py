@@ -32,14 +32,18 @@ from roughvisc.views.figures.fields import (
     draw_map,
     draw_outline,
     label_plane,
+    measured_part,
     outline_colour,
     plane_ratio,
     plane_unit,
     present,
+    value_scale,
 )
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 from roughvisc.views.observables import contact, history
 
+#: A map's side along y over that along x from which the map takes the whole height.
+_TALL = 1.2
 _HISTORIES = ("force", "approach", "contact_area_corrected")
 
 
@@ -73,7 +77,7 @@ def animate(
     rate : float
         Frames per second. [1/s]
     dpi : float
-        Resolution of the pictures of 7.6 x 4.2 inch. [1/inch]
+        Resolution of the pictures, which are 7.6 inch wide where histories move along. [1/inch]
 
     Returns
     -------
@@ -109,18 +113,17 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
     if field not in FIELDS:
         raise InputError(f"field is {field!r}: expected 'pressure', 'gap' or 'displacement'")
     require(dataset, field)
+    dataset = measured_part(dataset)
     chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
-    figure = new_figure(7.6, 4.2)
     histories = [name for name in _HISTORIES if name in dataset]
-    columns = figure.add_gridspec(1, 2 if histories else 1, width_ratios=[1.15, 1] if histories else [1])
-    upper, lower = columns[0].subgridspec(2, 1, height_ratios=[2, 1]).subplots()
-    right = list(columns[1].subgridspec(len(histories), 1).subplots(squeeze=False)[:, 0]) if histories else []
+    sectioned = "height" in dataset and ("gap" in dataset or "displacement" in dataset)
+    figure, on_map, cuts, right = _panels(plane_ratio(dataset), sectioned, len(histories))
     movers = [
-        _moving_map(figure, upper, dataset, field, chosen),
-        _moving_section(lower, dataset, chosen),
+        _moving_map(figure, on_map, dataset, field, chosen),
+        *(_moving_section(ax, dataset, chosen) for ax in cuts),
         *(_moving_history(ax, dataset, name, ax is right[-1]) for ax, name in zip(right, histories, strict=True)),
     ]
-    letter_panels((upper, lower, *right))
+    letter_panels((on_map, *cuts, *right))
     figure.align_ylabels(right)
     title = figure.suptitle("", fontsize=9)
 
@@ -135,13 +138,34 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
     return figure, pictures()
 
 
-def _highest(dataset: xr.Dataset, name: str, chosen: list[int]) -> float:
-    values = [float(present(dataset, name, frame).max()) for frame in chosen]
-    return max((value for value in values if np.isfinite(value)), default=0.0)
+def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes, list[Axes], list[Axes]]:
+    """Figure, panel of the map, of the section if there is one, and of the histories, as the map's proportions suit."""
+    if not histories:
+        figure = new_figure(4.4, 0.8 + 3.3 * float(np.clip(ratio, 0.3, 1.3)) + 1.4 * sectioned)
+        grid = figure.add_gridspec(1 + sectioned, 1, height_ratios=[3.3 * ratio, 1.4][: 1 + sectioned])
+        return figure, figure.add_subplot(grid[0]), [figure.add_subplot(grid[1])] if sectioned else [], []
+    figure = new_figure(7.6, 4.2 if ratio <= _TALL else 5.2)
+    if ratio > _TALL:  # the map takes a column, and the section stands above the histories
+        columns = figure.add_gridspec(1, 2, width_ratios=[1, 1.3])
+        on_map, rows = figure.add_subplot(columns[0]), histories + sectioned
+        right = list(columns[1].subgridspec(rows, 1).subplots(squeeze=False)[:, 0])
+        return figure, on_map, right[: rows - histories], right[rows - histories :]
+    columns = figure.add_gridspec(1, 2, width_ratios=[1.15, 1])
+    heights = [2 * float(np.clip(ratio / 0.7, 0.5, 1)), 1][: 1 + sectioned]
+    left = columns[0].subgridspec(1 + sectioned, 1, height_ratios=heights).subplots(squeeze=False)[:, 0]
+    return figure, left[0], list(left[1:]), list(columns[1].subgridspec(histories, 1).subplots(squeeze=False)[:, 0])
+
+
+def _highest(dataset: xr.Dataset, name: str, chosen: list[int]) -> tuple[float, bool]:
+    """End of the scale that holds all pictures but for a few high values in each [SI], and whether there are any."""
+    fields = (present(dataset, name, frame).values for frame in chosen)
+    found = [(value_scale(name, known)[1], known.max(initial=0.0)) for known in (v[np.isfinite(v)] for v in fields)]
+    end, highest = np.max(found, axis=0)
+    return float(end), bool(highest > end)
 
 
 def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
-    highest = _highest(dataset, field, chosen)
+    highest, beyond = _highest(dataset, field, chosen)
     unit, plane = unit_for(highest, VARIABLES[field].units), plane_unit(dataset)
     top = float(unit(highest)) or 1.0
     low = 1e-12 * top if field == "pressure" else 0.0
@@ -150,7 +174,8 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
     first = present(dataset, field, chosen[0])
     image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
     side = "right" if plane_ratio(dataset) > 0.4 else "top"
-    figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18).set_label(unit.label(VARIABLES[field].label))
+    look = {"pad": 0.02, "aspect": 18, "extend": "max" if beyond else "neither"}
+    figure.colorbar(image, ax=ax, location=side, **look).set_label(unit.label(VARIABLES[field].label))
     label_plane(ax, dataset, plane)
     outline = [None]
 
@@ -168,10 +193,6 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
 
 def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
-    if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
-        ax.set_axis_off()
-        ax.text(0.5, 0.5, "no height or gap kept: no section", transform=ax.transAxes, ha="center", color="0.4")
-        return lambda frame: None
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
     surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]

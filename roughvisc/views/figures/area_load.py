@@ -14,11 +14,25 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import CYCLE, new_figure, require, spans_decades, spread_axis, styled, unit_for
+from roughvisc.views.figures.axes import (
+    CYCLE,
+    new_figure,
+    require,
+    spans_decades,
+    spread_axis,
+    styled,
+    unit_for,
+    verbatim,
+)
 from roughvisc.views.figures.histories import leave_room, marker_of
 from roughvisc.views.observables import history
 
 _AREA = "contact_area_corrected"
+#: What the lines of low loads assume.
+_LOW_LOADS = (
+    "low loads: $A = \\sqrt{2\\pi}\\,F / (E^*\\,h^\\prime_{\\mathrm{rms}})$, for a Gaussian surface,\n"
+    "little contact, and an elastic material of the\nmodulus at the time named (Bush, Gibson, Thomas)"
+)
 #: Recipes of surfaces without roughness.
 _SMOOTH = ("sphere", "cone", "flat_punch", "wavy")
 
@@ -73,15 +87,17 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
         require(dataset, "time", "force", _AREA)
     steps = {label: history(dataset) for label, dataset in cases.items()}
     loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
-    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m2")
+    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m^2")
     figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12))
     ax = figure.add_subplot()
     for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
         colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
-        style = {"color": colour, "marker": marker_of(len(x)), "ms": 2.5}
-        ax.plot(x, y, label=label if len(cases) <= 12 else "_", **style)
+        nested = 2.2 - 1.2 * number / max(1, len(cases) - 1)  # a line shows on both sides of another on it
+        style = {"color": colour, "marker": marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
+        ax.plot(x, y, label=verbatim(label) if len(cases) <= 12 else "_", **style)
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
-    _draw_low_load_lines(ax, next(iter(cases.values())), moduli, across, up)
+    top = float(np.max(np.concatenate(loads)))
+    drawn = _draw_low_load_lines(ax, next(iter(cases.values())), moduli, top, across, up)
     if spans_decades(np.sort(np.concatenate(loads))):
         spread_axis(ax.xaxis, across(np.concatenate(loads)))
         spread_axis(ax.yaxis, up(np.concatenate(areas)))
@@ -91,6 +107,8 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     ax.set_xlabel(across.label(VARIABLES["force"].label))
     ax.set_ylabel(up.label(VARIABLES[_AREA].label))
     ax.grid(color="0.9", lw=0.5)
+    if drawn:
+        figure.supxlabel(_LOW_LOADS, fontsize=6.5, color="0.35")
     if len(ax.get_legend_handles_labels()[1]) > 1:
         figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(cases) < 6 else 2)
     return figure
@@ -117,15 +135,16 @@ def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     return {name: 1 / compliance for name, compliance in compliances.items() if compliance > 0}
 
 
-def _draw_low_load_lines(ax: Axes, dataset: xr.Dataset, moduli, across, up) -> None:
+def _draw_low_load_lines(ax: Axes, dataset: xr.Dataset, moduli, top: float, across, up) -> bool:
+    """Lines up to a load [N]; whether there is any to draw."""
     named = moduli if isinstance(moduli, Mapping) else {"": moduli}
     if not named:
-        return
+        return False
     require(dataset, "height")
     slope = rms_slope(dataset["height"], periodic=dataset.attrs.get("boundary") == "periodic")
-    top = float(dataset["force"].max())
     for (name, modulus), dash in zip(named.items(), ((4, 2), (1, 1.5), (6, 1, 1, 1)) * len(named), strict=False):
         loads = np.geomspace(1e-3 * top, top, 50)
         label = f"low loads, {name}" if name else "low loads"
         area = math.sqrt(2 * math.pi) * loads / (modulus * slope)
         ax.plot(across(loads), up(area), color="k", lw=0.9, ls=(0, dash), label=label)
+    return True

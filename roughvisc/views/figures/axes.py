@@ -18,7 +18,9 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
+from roughvisc.labels import expect_declared_units
+from roughvisc.units import Unit, unit_for
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
@@ -47,82 +49,6 @@ BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000")
 #: Cells where the profile is absent.
 ABSENT = "0.82"
-
-_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-_CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
-_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit to show values in: ``shown = values / factor``.
-
-    Parameters
-    ----------
-    factor : float
-        Size of the unit in SI.
-    symbol : str
-        How it is written; empty for a pure number.
-    """
-
-    factor: float
-    symbol: str
-
-    def __call__(self, values) -> np.ndarray:
-        """Values [SI] in this unit."""
-        return np.asarray(values, dtype=float) / self.factor
-
-    def label(self, name: str) -> str:
-        """Axis label: the name and, in brackets, the unit."""
-        return f"{name} [{self.symbol}]" if self.symbol else name
-
-    def text(self, value: float, digits: int = 3) -> str:
-        """One value [SI] with its unit, as read in running text."""
-        shown = float(value) / self.factor
-        if 1e3 <= abs(shown) < 1e6:  # not 5e+03
-            return f"{shown:.0f} {self.symbol}".rstrip()
-        return f"{shown:.{digits}g} {self.symbol}".rstrip()
-
-
-def unit_for(values, si: str) -> Unit:
-    """Unit with the engineering prefix that suits the largest of some values.
-
-    Parameters
-    ----------
-    values : array_like
-        Values of one axis; missing and infinite ones are ignored. [SI]
-    si : str
-        Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"m2"``, ``"N/m"``, ``"s"``, ``"1"``.
-
-    Returns
-    -------
-    Unit
-
-    Examples
-    --------
-    >>> unit_for([0, 2.5e-6], "m").symbol, unit_for([3e-8], "m2").symbol, unit_for([0.04, 2e6], "Pa").symbol
-    ('µm', 'mm²', 'MPa')
-    >>> unit_for([9000.0], "s")
-    Unit(factor=3600.0, symbol='h')
-    """
-    values = np.abs(np.asarray(values, dtype=float))
-    largest = float(np.max(values, initial=0.0, where=np.isfinite(values)))
-    if si in ("1", ""):
-        return Unit(1.0, "")
-    if si == "s":
-        for least, factor, symbol in _CLOCK:
-            if largest >= least:
-                return Unit(factor, symbol)
-    head, _, tail = si.partition("/")
-    name = head.rstrip("0123456789")
-    power = int(head[len(name) :] or 1)
-    least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
-    exponent = 0
-    if largest > 0:
-        exponent = 3 * math.floor(math.log10(largest / least * 1.0005) / (3 * power))  # 0.99999 N is not 1000 mN
-    exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
-    symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
-    return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
 
 
 def styled(draw):
@@ -277,6 +203,11 @@ def frame_at(times, time: float) -> int:
 # --------------------------------------------------------------------------------------------------------- data
 
 
+def verbatim(text: str) -> str:
+    """A text of the user as a figure shows it, letter by letter: dollars begin no formula."""
+    return printable(text).replace("$", r"\$")
+
+
 def require(dataset: xr.Dataset, *names: str) -> None:
     """Refuse a Dataset that is not one case's result, or lacks variables; say how to get them."""
     if not isinstance(dataset, xr.Dataset):
@@ -290,3 +221,4 @@ def require(dataset: xr.Dataset, *names: str) -> None:
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
     if "time" in dataset.sizes and dataset.sizes["time"] == 0:
         raise InputError("the result holds no time at all: nothing to draw")
+    expect_declared_units(dataset)

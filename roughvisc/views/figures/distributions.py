@@ -29,6 +29,8 @@ from roughvisc.views.figures.axes import (
 from roughvisc.views.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
 
 _MOST_LINES = 24
+#: Contact clusters below which their number and their areas are no distribution.
+_FEWEST_CLUSTERS = 3
 
 
 def _frames(dataset: xr.Dataset, times, count: int) -> list[int]:
@@ -122,9 +124,17 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
     ax.grid(color="0.9", lw=0.5)
 
 
+def has_clusters(dataset: xr.Dataset) -> bool:
+    """Whether the contact has several spots at one of a few times: of a single one there is nothing to count."""
+    shown = dataset.isel(time=telling_frames(dataset, 4))
+    return bool((clusters(shown)["cluster_count"] >= _FEWEST_CLUSTERS).any())
+
+
 @styled
 def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     """Number of contact clusters and their largest and mean area over time, and the distribution of their areas.
+
+    Where the contact never has more than two clusters the figure says so in place of the distribution.
 
     Parameters
     ----------
@@ -151,7 +161,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     most = max(int(found["cluster_count"].max()), 1)
     count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
-    unit = unit_for(found["cluster_area_largest"], "m2")
+    unit = unit_for(found["cluster_area_largest"], "m^2")
     area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
     area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
@@ -173,16 +183,20 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
     """How many clusters are at least that large: no bins to choose."""
     chosen = dataset.isel(time=frames)
     areas = cluster_areas(chosen)["cluster_area"].values
-    unit = unit_for(areas, "m2")
-    for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
-        row = unit(row[np.isfinite(row)])
-        if len(row):
-            ax.plot(row, np.arange(1, len(row) + 1), color=colour, drawstyle="steps-post", label=time_text(float(time)))
-            ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
-    if np.isfinite(areas).any():
+    most, unit = int(np.isfinite(areas).sum(axis=1).max()), unit_for(areas, "m^2")
+    if most < _FEWEST_CLUSTERS:
+        _no_contact(ax, ("no contact", "one cluster at most", "two clusters at most")[most])
+        ax.set_xticks([])
+    else:
+        for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
+            row = unit(row[np.isfinite(row)])
+            if len(row):
+                look = {"drawstyle": "steps-post", "label": time_text(float(time))}
+                ax.plot(row, np.arange(1, len(row) + 1), color=colour, **look)
+                ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
         ax.locator_params(axis="x", nbins=4)
         spread_axis(ax.xaxis, unit(areas))
-        spread_axis(ax.yaxis, [1, np.isfinite(areas).sum(axis=1).max()])
+        spread_axis(ax.yaxis, [1, most])
         if ax.get_yscale() == "log":
             ax.set_ylim(bottom=0.8)
         else:
@@ -190,7 +204,5 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
         lines = ax.get_legend_handles_labels()
         ax.figure.legend(*lines, loc="outside upper right", ncols=4, handlelength=1.0)
-    else:
-        _no_contact(ax)
     ax.set_xlabel(unit.label("Cluster area"))
     ax.set_ylabel("Clusters at least as large")

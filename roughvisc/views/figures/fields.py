@@ -8,7 +8,7 @@ import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, to_rgb
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
@@ -34,9 +34,11 @@ from roughvisc.views.observables import contact
 COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
 _MOST_MAPS = 24
 #: Colour of cells in contact on maps of the gap that have no outline; values from which some may lie beyond a scale.
-_TOUCHING, _MANY = VERMILION, 10_000
-#: Faces between contact and gap a cell, beyond which they are not outlined: cells in contact have a colour then.
-_RAGGED = 0.04
+_TOUCHING, _MANY = VERMILION, 1_000
+#: Part of a map that the outline of the contact may cover: beyond it cells in contact have a colour instead.
+_MOST_INK = 0.1
+#: Length of a map's longer side, about. [point]
+_LONG_SIDE = 126.0
 #: Share of the values within the colour scale; a few higher ones are drawn as its end.
 _SHOWN = 99.8
 #: A map's short over its long side below which ticks along the short one would lie on each other.
@@ -119,20 +121,26 @@ def label_plane(
 def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
     """Outline of the cells in contact; None where there is nothing to outline."""
     mask = touching.transpose("y", "x").values
-    if mask.all() or not mask.any() or min(mask.shape) < 2 or is_ragged(mask):
+    if mask.all() or not mask.any() or not can_be_outlined(mask):
         return None
     # a rim out of contact closes the outline at the border of the map
     x, y = (plane(_with_rim(touching[name].values)) for name in ("x", "y"))
-    width = 0.7 if touching.size < 2e4 else 0.3
-    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=width)
+    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=_line_width(mask))
     lines.set_gid("contact outline")
     return lines
 
 
-def is_ragged(mask: np.ndarray) -> bool:
-    """Whether so many faces lie between contact and gap that their outline would bury what is drawn."""
+def can_be_outlined(mask: np.ndarray) -> bool:
+    """Whether there is a gap on a map, and a line along all faces between contact and gap buries little of it."""
+    if mask.all() or min(mask.shape) < 2:
+        return False
     faces = sum(np.count_nonzero(np.diff(mask, axis=axis)) for axis in (0, 1))
-    return mask.size >= 2e4 and faces > _RAGGED * mask.size
+    return bool(faces * _line_width(mask) * max(mask.shape) / _LONG_SIDE <= _MOST_INK * mask.size)
+
+
+def _line_width(mask: np.ndarray) -> float:
+    """Of the outline. [point]"""
+    return 0.7 if mask.size < 2e4 else 0.3
 
 
 def _with_rim(centres: np.ndarray) -> np.ndarray:
@@ -222,34 +230,35 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
 
 def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
     shown = [present(dataset, name, frame) for frame in frames]
-    low, high, beyond = _scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
+    low, high, beyond = value_scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
     unit, plane = unit_for([high], VARIABLES[name].units), plane_unit(dataset)
     low, high = float(unit(low)), float(unit(high))
     limits = {"vmin": low, "vmax": high if high > low else low + 1.0}
     if name == "pressure":
         limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
-    images = []
-    for ax, field, frame in zip(axes.ravel(), shown, frames, strict=False):
-        images.append(image := draw_map(ax, field, unit, plane, **limits))
-        if "pressure" in dataset or "gap" in dataset:
-            touching = contact(dataset.isel(time=frame)).load()
-            outline = draw_outline(ax, touching, plane, outline_colour(name))
-            if name == "gap" and outline is None and touching.any():
-                image.set(cmap=colour_map(name).with_extremes(bad=ABSENT, under=_TOUCHING))
-                image.set_clim(1e-12 * limits["vmax"], limits["vmax"])  # so that no gap lies under the scale
+    images = [draw_map(ax, one, unit, plane, **limits) for ax, one in zip(axes.ravel(), shown, strict=False)]
+    known = "pressure" in dataset or "gap" in dataset
+    touching = [contact(dataset.isel(time=frame)).load() for frame in frames] if known else []
+    outlined = all(can_be_outlined(one.values) for one in touching)
+    for image, one in zip(images, touching, strict=False):
+        if outlined:
+            draw_outline(image.axes, one, plane, outline_colour(name))
+        elif name == "gap":
+            image.set(cmap=colour_map(name).with_extremes(bad=ABSENT, under=_TOUCHING))
+            image.set_clim(1e-12 * limits["vmax"], limits["vmax"])  # so that no gap lies under the scale
     extend = "max" if beyond else "neither"
     across = {"pad": 0.02, "aspect": max(15, 15 * len(axes)), "fraction": 0.06}
-    bar = figure.colorbar(image, ax=list(axes.ravel()), extend=extend, **across)
-    coloured = any(one.get_cmap().get_under()[:3].tolist() == list(to_rgb(_TOUCHING)) for one in images)
-    bar.set_label(unit.label(VARIABLES[name].label) + (", contact in orange" if coloured else ""))
+    bar = figure.colorbar(images[0], ax=list(axes.ravel()), extend=extend, **across)
+    note = "" if outlined or name != "gap" else "contact in orange\n"
+    bar.set_label(note + unit.label(VARIABLES[name].label))
     bar.locator = (
         MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
     )
     bar.outline.set_linewidth(0.6)
 
 
-def _scale(name: str, values: np.ndarray) -> tuple[float, float, bool]:
-    """Ends of the colour scale of a field over all frames, and whether values lie beyond. [SI]"""
+def value_scale(name: str, values: np.ndarray) -> tuple[float, float, bool]:
+    """Ends of the colour scale of some values of a field, and whether any lie beyond. [SI]"""
     low = float(values.min()) if name == "displacement" and values.size else 0.0
     telling = values if name == "displacement" else values[values > 0]
     if not telling.size:

@@ -103,7 +103,7 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     """Contact fraction on the right of the panel of the area, where the two are proportional."""
     if "contact_fraction" not in steps or "contact_area" not in steps:
         return
-    area = unit_for(steps["contact_area_corrected"], "m2")(steps["contact_area"])  # what the fraction is counted by
+    area = unit_for(steps["contact_area_corrected"], "m^2")(steps["contact_area"])  # what the fraction is counted by
     touching = area > 0
     if not touching.any():
         return

@@ -13,12 +13,23 @@ from roughvisc.views.figures.histories import failed_frames, leave_room, marker_
 from roughvisc.views.observables import history
 from roughvisc.views.observables.cycles import cycle_energy, has_cycles
 
+#: Part of its range by which the approach must have come back for a loop.
+_BACK = 0.01
+
+
+def has_loop(dataset: xr.Dataset) -> bool:
+    """Whether the approach comes back at all: force against approach encloses nothing otherwise."""
+    approach = history(dataset)["approach"].values
+    fallen = np.max(np.maximum.accumulate(approach) - approach, initial=0.0)
+    return bool(fallen > _BACK * np.ptp(approach))
+
 
 @styled
 def hysteresis(dataset: xr.Dataset) -> Figure:
     """Force against approach at every accepted step, the direction of time marked, and the work done in all.
 
-    Where the program has cycles, what is dissipated in the last one that closes is stated too.
+    Where the program has cycles, what is dissipated in the last one that closes is stated too; where the approach never
+    comes back, that there is no loop.
 
     Parameters
     ----------
@@ -49,6 +60,8 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     failed = failed_frames(steps)
     if failed.any():
         ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
+    if not has_loop(dataset):
+        ax.set_title("The approach does not come back: no loop", color="0.4")
     ax.set_xlabel(across.label(VARIABLES["approach"].label))
     ax.set_ylabel(up.label(VARIABLES["force"].label))
     leave_room(ax, y)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import off_plane
-from roughvisc.topography.grid import cell_edges, spacing
+from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
@@ -33,15 +33,8 @@ MISSING = "#e60000"
 _REACH = 5.0
 
 
-def _checked(height: xr.DataArray) -> xr.DataArray:
-    if isinstance(height, xr.Dataset):
-        if "height" not in height:
-            raise InputError("the Dataset holds no 'height'")
-        height = height["height"]
-    if not isinstance(height, xr.DataArray) or set(height.dims) != {"x", "y"}:
-        found = height.dims if isinstance(height, xr.DataArray) else type(height).__name__
-        raise InputError(f"expected heights with dimensions x and y, found {found}")
-    height = height.transpose("x", "y").load().rename("height")
+def _checked(height: xr.DataArray | xr.Dataset) -> xr.DataArray:
+    height = checked(height, "surface", least=1).rename("height")
     if not np.isfinite(height).any():
         raise InputError("the surface is all missing: nothing to draw")
     return height

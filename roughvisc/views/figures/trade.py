@@ -51,7 +51,7 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area_correc
     """Wall time against error of every setting, with the Pareto front: what no other setting beats in both.
 
     Errors that the reference cannot tell from zero lie in the grey band below; a setting whose error is exactly zero
-    is drawn at the bottom.
+    is drawn at the bottom. The front does not go through either: where such points lie was not measured.
 
     Parameters
     ----------
@@ -107,7 +107,8 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     floor = lowest / 3 if nothing else lowest
     bottom = floor / (3 if nothing else 1.8)
     height = np.maximum(wrong, floor)
-    best = np.flatnonzero(front(dataset, quantity))
+    measured = wrong > np.nan_to_num(unsure)  # what the reference can tell from zero
+    best = np.flatnonzero(front(dataset, quantity) & measured)
     best = best[np.argsort(spent[best], kind="stable")]
     ax.plot(spent[best], height[best], color="0.35", lw=1.0, zorder=1, label="Pareto front")
     families = dataset["family"].values

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import expect_declared_units
 
 
 def need(dataset: xr.Dataset, *names: str) -> None:
@@ -14,6 +15,7 @@ def need(dataset: xr.Dataset, *names: str) -> None:
         if name not in dataset:
             stored = ", ".join(str(known) for known in dataset.data_vars)
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
+    expect_declared_units(dataset)
 
 
 def frame_by_frame(function: Callable, *fields: xr.DataArray, outputs: int = 1, dtype: type = float):

@@ -16,7 +16,7 @@ from PIL import Image
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
-from roughvisc.views.figures.fields import colour_map, plane_ratio, plane_unit, present
+from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, present, value_scale
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 from roughvisc.views.observables import contact, history
 
@@ -41,6 +41,7 @@ class _Scale:
     unit: Unit
     low: float
     high: float
+    beyond: bool
 
 
 def data_uri(picture: bytes, kind: str = "image/png") -> str:
@@ -85,6 +86,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
     dict
         Of texts and numbers, ready for JSON.
     """
+    whole, dataset = dataset, measured_part(dataset)
     fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
     scales, maps, chosen, block = [], [], [], 1
     fullest = fullest_frame(dataset)
@@ -103,7 +105,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
         "kept": dataset.sizes["time"],
         "block": block,
         "ratio": plane_ratio(dataset),
-        "plane": _extent(dataset),
+        "plane": _extent(dataset) + ("" if dataset is whole else ", as measured, without its mirror images"),
         "fields": [_scale_text(scale) for scale in scales],
         "section": _sections(dataset, chosen),
         "charts": _charts(dataset, chosen),
@@ -117,10 +119,11 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
 
 def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
     shown = [present(dataset, name, frame) for frame in chosen]
-    highest = [float(one.max()) for one in shown if one.notnull().any()]
-    lowest = [float(one.min()) for one in shown if one.notnull().any()] if name == "displacement" else [0.0]
-    low, high = min(lowest, default=0.0), max(highest, default=0.0)
-    return _Scale(name, unit_for([low, high], VARIABLES[name].units), low, high if high > low else low + 1.0)
+    known = [one.values[np.isfinite(one.values)] for one in shown]
+    ends = [value_scale(name, values) for values in known]
+    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+    beyond = any(values.max(initial=low) > high for values in known)
+    return _Scale(name, unit_for([low, high], VARIABLES[name].units), low, high if high > low else low + 1.0, beyond)
 
 
 def _scale_text(scale: _Scale) -> dict[str, str]:
@@ -128,7 +131,7 @@ def _scale_text(scale: _Scale) -> dict[str, str]:
         "name": scale.name,
         "label": scale.unit.label(VARIABLES[scale.name].label),
         "low": f"{float(scale.unit(scale.low)):.3g}",
-        "high": f"{float(scale.unit(scale.high)):.3g}",
+        "high": f"{float(scale.unit(scale.high)):.3g}" + (" and more" if scale.beyond else ""),
     }
 
 
@@ -139,7 +142,7 @@ def _extent(dataset: xr.Dataset) -> str:
 
 
 def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
-    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, red of others."""
+    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, orange of others."""
     field = present(dataset, scale.name, frame)
     touching = contact(dataset.isel(time=frame)) if {"pressure", "gap"} & set(dataset) else field < -np.inf
     values = _in_blocks(field.transpose("y", "x").values, block)

@@ -22,9 +22,10 @@ from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
-from roughvisc.views.plot import FIGURES, area_against_load, fullest_frame, surface
+from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
-from roughvisc.views.sweep_figures.case_text import material_words, program_words, readable_setting, study_text
+from roughvisc.views.sweep_figures.case_names import case_words, names_of, varied_texts
+from roughvisc.views.sweep_figures.case_text import material_words, program_words, study_text
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 #: Size that all maps may have together. [bytes]
@@ -38,7 +39,7 @@ _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes in which a result speaks of its limits.
-_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note", "border_note")
+_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note", "border_note", "body_note")
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -105,15 +106,12 @@ def _failures(folder: Path) -> list[dict[str, str]]:
     for path in sorted(folder.glob("*.failed.json")):
         try:
             record = json.loads(path.read_text())
-            title = record.get("case", {}).get("title", "") + _varied(record.get("case", {}))
+            case = record.get("case", {})
+            title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
             found.append({"key": path.name.partition(".")[0], "title": title, "message": record["message"]})
         except (OSError, ValueError, KeyError, AttributeError):
             found.append({"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"})
     return found
-
-
-def _varied(case: dict[str, Any]) -> str:
-    return "".join(f", {key} = {readable_setting(key, value)}" for key, value in case.get("varied", {}).items())
 
 
 @contextmanager
@@ -142,11 +140,13 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         with _opened(source) as dataset:
             row = _row(dataset, source, number)
             rows.append(row)
+            if row["name"] in everything:
+                row["name"] += f" ({row['key'] or number + 1})"
             everything[row["name"]] = _histories(dataset)
             if number not in pictured:
                 continue
             row["view"] = len(views)
-            views.append({"title": row["name"], "key": row["key"], **frames_of(dataset, budget)})
+            views.append({"number": number + 1, "title": row["name"], "key": row["key"], **frames_of(dataset, budget)})
             studies.append(row["study"])
             if len(sources) <= _DRAWN:
                 figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
@@ -162,7 +162,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         version=metadata.version("roughvisc"),
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         rows=rows,
-        varied=list(dict.fromkeys(key for row in rows for key in row["varied"])),
+        varied=names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
         views=views,
         studies=studies,
@@ -201,15 +201,11 @@ def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:
 
 def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
     """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
-    found = []
-    for kind, (draw, needed, wanted) in FIGURES.items():
-        missing = not all(one in dataset for one in needed) or (wanted and not any(one in dataset for one in wanted))
-        if kind == "surface" or missing or (kind == "hysteresis" and dataset.sizes["time"] < 3):
-            continue
-        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if kind == "section" else {}
-        title = kind.capitalize() + (f": {name}" if name else "")
-        found.append({"title": title, "src": figure_uri(draw(dataset, **options))})
-    return found
+    of = f": {name}" if name else ""
+    return [
+        {"title": kind.capitalize() + of, "src": figure_uri(figure)}
+        for kind, figure in figures_of(dataset, leave="surface")
+    ]
 
 
 # ------------------------------------------------------------------------------------------------------- table
@@ -219,22 +215,23 @@ def _row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     """One case in the table, and what reproduces it."""
     case = json.loads(dataset.attrs.get("case", "{}"))
     title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
-    varied = {key: readable_setting(key, value) for key, value in case.get("varied", {}).items()}
+    words = case_words(case)
     last = dataset.isel(time=-1)
     status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
     bad = int((status == NOT_CONVERGED).sum())
     return {
         "title": title,
-        "name": title + _varied(case) if varied or case else str(dataset.attrs.get("title", title)),
+        "name": words or title,
+        "words": words,
         "file": Path(source).name if isinstance(source, Path) else "",
         "key": str(dataset.attrs.get("case_key", "")),
-        "varied": varied,
+        "varied": varied_texts(case),
         "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
         "times": dataset.sizes["time"],
         "force": _largest(dataset, "force", "N"),
         "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
         "approach": _last(last, "approach", "m"),
-        "area": _last(last, "contact_area_corrected", "m2"),
+        "area": _last(last, "contact_area_corrected", "m^2"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
         "stated_error": _worst(dataset, "stated_error"),
         "time_error": _worst(dataset, "time_error"),
@@ -352,5 +349,5 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
         plane = plane_unit(dataset)
         x, y = plane(dataset["x"].values[places[:, 0]]), plane(dataset["y"].values[places[:, 1]])
         axes[1].plot(x, y, ".", color="#d55e00", ms=1.5, mew=0)
-        axes[1].set_title(f"as pressed: {filled} points filled in (red)")
+        axes[1].set_title(f"as pressed: {filled} points filled in (orange)")
     return figure

@@ -1,35 +1,36 @@
-"""Histories of all cases of a sweep in one panel, coloured by what was varied."""
+"""Histories of all cases of a sweep coloured by what was varied."""
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from roughvisc.views.figures.axes import TimeAxis, new_figure, styled
+from roughvisc.views.figures.axes import TimeAxis, Unit, new_figure, styled
 from roughvisc.views.observables import history
-from roughvisc.views.sweep_figures.cases import Parameter, cases_of, label_of, quantity_unit
+from roughvisc.views.sweep_figures.cases import Parameter, cases_of, combined, label_of, named_texts, quantity_unit
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
 
-#: Line styles of a second parameter; of one with more values nothing tells the lines apart.
-_DASHES = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
+_MOST_PANELS = 9
 
 
 @styled
 def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
     """A history of every case over time, coloured by what was varied; a dot for each kept time, where these are few.
 
-    Up to eight values have a legend, more a colour bar. A second parameter of up to four values has line styles.
+    Up to eight values have a legend, more a colour bar. Other parameters make panels, up to nine.
 
     Parameters
     ----------
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree the times may differ.
     quantity : str, optional
-        A history of every case, such as ``"approach"``; by default the contact area, corrected where all have it.
+        A history of every case, such as ``"approach"``; by default the contact area, corrected where all have it, or
+        the contact fraction where the surfaces differ in size.
     by : str, optional
         Dotted key of the parameter that colours the lines; by default the one with the most numbers.
 
@@ -47,33 +48,66 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     cases.need(quantity)
     ordered = sorted(cases.parameters, key=lambda one: (not one.numeric, -len(one.levels)))
     first = cases.parameter(by) if by else ordered[0] if ordered else _numbered(len(cases.members))
-    second = next((one for one in ordered if one is not first and len(one.levels) <= len(_DASHES)), None)
+    facets = _facets([one for one in ordered if one is not first], len(cases.members))
     colouring = Colouring(first)
     lines = [_line(member, quantity) for member in cases.members]
     times = np.unique(np.concatenate([line["time"].values for line in lines]))
     axis = TimeAxis.of(times)
     unit = quantity_unit(cases, quantity, np.concatenate([line.values for line in lines]))
-    handles = colouring.handles() + _styles(second)
-    figure = new_figure(4.6, 3.1 + 0.07 * len(handles))
-    ax = figure.add_subplot()
-    places = first.places
-    dashes = second.places if second is not None else np.zeros(len(places), dtype=int)
-    for member, line, level, dash in zip(cases.members, lines, places, dashes, strict=True):
-        style = {"color": colouring.colour(int(level)), "lw": 1.2 if len(cases.members) <= 30 else 0.8}
-        ax.plot(axis.unit(line["time"]), unit(line), ls=_DASHES[dash], **style)
-        if len(cases.members) <= 8 and member.sizes["time"] <= 40 and second is None:
-            ax.plot(axis.unit(member["time"]), unit(member[quantity]), "o", ms=2.5, color=style["color"])
-    axis.apply(ax, times)
-    _limits(ax)
-    ax.set_ylabel(label_of(cases, quantity, unit))
-    ax.grid(color="0.9", lw=0.5)
+    count = len(facets.levels)
+    columns = min(count, 2 if count in (2, 4) else 3)
+    rows = -(-count // columns)
+    handles = colouring.handles()
+    figure = new_figure(4.6 if count == 1 else 1.0 + 2.4 * columns, (3.1 if rows == 1 else 0.6 + 1.9 * rows) + 0.2)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for level, ax in enumerate(panels[:count]):
+        chosen = np.flatnonzero(facets.places == level)
+        _draw_panel(ax, axis, unit, colouring, [(lines[i], cases.members[i], int(first.places[i])) for i in chosen])
+        if count > 1:
+            ax.set_title(textwrap.fill(named_texts(facets)[level], 36))
+    _limits(list(panels[:count]))
+    for ax in panels[:count]:
+        axis.apply(ax, times, most=7 if count == 1 else 4)
+        ax.set_ylabel(label_of(cases, quantity, unit))
+        ax.grid(color="0.9", lw=0.5)
+    _outer_labels(panels, count, columns)
     if handles:
-        columns = 4 if max(len(handle.get_label()) for handle in handles) < 14 else 1
-        legend = figure.legend(handles=handles, loc="outside upper center", ncols=columns, handlelength=1.8)
-        names = [one.name for one in (first, second) if one is not None]
-        legend.set_title(", ".join(names) if colouring.few else names[-1], prop={"size": 7.5})
-    colouring.draw_bar(figure, ax)
+        entries = 4 if max(len(handle.get_label()) for handle in handles) < 14 else 1 if count == 1 else 2
+        legend = figure.legend(handles=handles, loc="outside upper center", ncols=entries, handlelength=1.8)
+        legend.set_title(first.name, prop={"size": 7.5})
+    colouring.draw_bar(figure, list(panels[:count]))
     return figure
+
+
+def _facets(others: list[Parameter], cases: int) -> Parameter:
+    """What makes panels: every combination of the other parameters; of too many, their values one by one, or none."""
+    for one in ([combined(others)] if others else []) + others:
+        if len(one.levels) <= _MOST_PANELS:
+            return one
+    return Parameter("", np.zeros(cases), "", "")
+
+
+def _draw_panel(ax: Axes, axis: TimeAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> None:
+    """Lines of some cases, the later ones thinner, so that none hides another that it lies on."""
+    few = len({level for _, _, level in drawn}) <= 8
+    for number, (line, member, level) in enumerate(sorted(drawn, key=lambda one: one[2])):
+        width = 2.3 - 1.3 * number / max(1, len(drawn) - 1) if few and len(drawn) > 1 else 1.0
+        colour = colouring.colour(level)
+        ax.plot(axis.unit(line["time"]), unit(line), color=colour, lw=width)
+        if few and len(drawn) <= 8 and member.sizes["time"] <= 40 and line.name in member:
+            ax.plot(axis.unit(member["time"]), unit(member[line.name]), "o", ms=1.5 + width, color=colour)
+
+
+def _outer_labels(panels: np.ndarray, count: int, columns: int) -> None:
+    """Labels at the left and below the lowest panel of each column alone; places without a panel stay empty."""
+    for number, ax in enumerate(panels):
+        ax.set_visible(number < count)
+        if number % columns:
+            ax.set_ylabel("")
+        lowest = number + columns >= count
+        ax.tick_params(labelbottom=lowest)
+        if not lowest:
+            ax.set_xlabel("")
 
 
 def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
@@ -87,16 +121,10 @@ def _numbered(count: int) -> Parameter:
     return Parameter("case", np.arange(1, count + 1), "", "Case")
 
 
-def _styles(parameter: Parameter | None) -> list[Line2D]:
-    if parameter is None:
-        return []
-    texts = parameter.texts()
-    return [Line2D([], [], color="0.3", ls=dash, label=text) for dash, text in zip(_DASHES, texts, strict=False)]
-
-
-def _limits(ax) -> None:
-    """Linear from zero, or logarithmic where all that is drawn is positive and spans two decades."""
-    shown = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.lines])
+def _limits(panels: list[Axes]) -> None:
+    """Linear from zero, or logarithmic where all that is drawn is positive and spans two decades; for all alike."""
+    ax = panels[0]  # the others share its axis
+    shown = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for one in panels for line in one.lines])
     shown = shown[np.isfinite(shown)]
     low, high = (shown.min(), shown.max()) if shown.size else (0.0, 1.0)
     logarithmic = bool(low > 0 and high >= 100 * low)

@@ -10,6 +10,9 @@ from typing import Any
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views.figures.axes import Unit, unit_for
 
+#: What an infinite number stands for; the thickness alone may be one.
+ENDLESS = "half-space"
+
 
 def study_text(case: Mapping[str, Any]) -> str:
     """Study file (TOML, SI units) that states a case.
@@ -29,7 +32,7 @@ def study_text(case: Mapping[str, Any]) -> str:
     shear_modulus = 1000000.0
     <BLANKLINE>
     """
-    tables = {key: value for key, value in case.items() if key not in ("origin", "varied")}
+    tables = {key: value for key, value in case.items() if key not in ("origin", "varied", "written")}
     text = "".join(f"{key} = {_value(value)}\n" for key, value in tables.items() if not _is_table(value))
     for name, value in tables.items():
         for entry in value if isinstance(value, list) else [value]:
@@ -76,10 +79,12 @@ def readable_setting(key: str, value: Any) -> str:
     --------
     >>> readable_setting("program.0.load", 0.02), readable_setting("solve.tolerance", 0.001)
     ('20 mN', '0.001')
+    >>> readable_setting("material.thickness", 5e-4), readable_setting("material.thickness", math.inf)
+    ('500 µm', 'half-space')
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value if isinstance(value, str) else json.dumps(value)
-    return setting_unit([value], unit_of(key)).text(value, 4)
+    return ENDLESS if value == math.inf else setting_unit([value], unit_of(key)).text(value, 4)
 
 
 def material_words(material: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -15,8 +15,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import Unit, unit_for
-from roughvisc.views.sweep_figures.case_text import readable_setting, setting_unit
+from roughvisc.views.figures.axes import Unit, unit_for, verbatim
+from roughvisc.views.sweep_figures.case_names import names_of
+from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, setting_unit
 
 _NO_PARAMETERS = ("case", "case_key")
 
@@ -44,10 +45,16 @@ class Parameter:
 
     @property
     def numeric(self) -> bool:
-        """Whether it lies on an axis of numbers: every value is one, and no seed."""
-        return (
-            not self.key.endswith("seed") and self.values.dtype.kind in "iuf" and bool(np.isfinite(self.values).all())
-        )
+        """Whether it lies on an axis of numbers: every value is one, and no seed; the largest may be infinite."""
+        if self.key.endswith("seed") or self.values.dtype.kind not in "iuf":
+            return False
+        known = self.values > -np.inf  # a missing one is not
+        return bool(known.all() and np.isfinite(self.values).any())
+
+    @property
+    def endless(self) -> bool:
+        """Whether its largest value is infinite, as the thickness of a half-space among sheets."""
+        return self.numeric and bool(np.isinf(self.values).any())
 
     @property
     def levels(self) -> np.ndarray:
@@ -75,8 +82,9 @@ class Parameter:
     def texts(self) -> list[str]:
         """Every level as a reader wants it: numbers with their unit, files without their folders."""
         if self.numeric:
-            return [self.unit.text(value, 4) for value in self.levels]
-        return [textwrap.shorten(text, 60, placeholder="…") for text in _category_texts(self.levels.tolist(), self.key)]
+            return [ENDLESS if np.isinf(value) else self.unit.text(value, 4) for value in self.levels]
+        texts = _category_texts(self.levels.tolist(), self.key)
+        return [verbatim(textwrap.shorten(text, 60, placeholder="…")) for text in texts]
 
 
 def _index(levels: list, value: Any) -> int:
@@ -137,8 +145,17 @@ class Cases:
         raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
 
     @property
+    def alike_in_size(self) -> bool:
+        """Whether all surfaces are of one size, as far as the results tell."""
+        told = [(m["contact_area"], m["contact_fraction"]) for m in self.members if "contact_fraction" in m]
+        sizes = np.array([float(area.max() / part.max()) for area, part in told if float(part.max()) > 0])
+        return not sizes.size or bool(np.ptp(sizes) <= 1e-6 * sizes.max())
+
+    @property
     def area(self) -> str:
-        """Name of the contact area that every case has: the corrected one, or the counted one."""
+        """Name of the contact area that every case has: the fraction where sizes differ, else corrected or counted."""
+        if not self.alike_in_size and all("contact_fraction" in member for member in self.members):
+            return "contact_fraction"
         corrected = all("contact_area_corrected" in member for member in self.members)
         return "contact_area_corrected" if corrected else "contact_area"
 
@@ -221,23 +238,24 @@ def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Param
         alike = any(p == len(one.levels) == len(o.levels) for p, o in zip(pairs, kept, strict=True))
         if len(one.levels) > 1 and not alike:
             kept.append(one)
-    names = _names([one.key for one in kept])
+    names = names_of([one.key for one in kept])
     for one in kept:
         yield Parameter(one.key, one.values, one.si, names[one.key])
 
 
-def _names(keys: Sequence[str]) -> Mapping[str, str]:
-    """What keys are called: their last word; what stands before it too where two would be called alike."""
-    last = {key: _last_word(key) for key in keys}
-    alike = [name for name in last.values() if list(last.values()).count(name) > 1]
-    names = {key: f"{name} ({key.rpartition('.')[0]})" if name in alike else name for key, name in last.items()}
-    return {key: (name[:1].upper() + name[1:]).replace("_", " ") for key, name in names.items()}
+def combined(others: list[Parameter]) -> Parameter:
+    """One parameter that stands for several: every combination a category."""
+    if len(others) == 1:
+        return others[0]
+    texts = [np.array(named_texts(one))[one.places] for one in others]
+    values = np.array([", ".join(parts) for parts in zip(*texts, strict=True)])
+    return Parameter("", values, "", ", ".join(one.name for one in others))
 
 
-def _last_word(key: str) -> str:
-    """Last part of a dotted key; a number with what it counts."""
-    parts = key.split(".")
-    return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
+def named_texts(parameter: Parameter) -> list[str]:
+    """Levels as texts that say what they are: numbers with the name of the parameter."""
+    word = parameter.values.dtype.kind in "OU"
+    return parameter.texts() if word else [f"{parameter.name} {text}" for text in parameter.texts()]
 
 
 def quantity_unit(cases: Cases, quantity: str, values) -> Unit:

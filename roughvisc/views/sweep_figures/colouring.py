@@ -50,12 +50,17 @@ class Colouring:
         """Whether every level has its own entry in a legend."""
         return len(self.parameter.levels) <= NAMED
 
+    @property
+    def _graded(self) -> bool:
+        """Whether a colour bar has an axis of numbers."""
+        return self.parameter.numeric and not self.parameter.endless
+
     def colour(self, level: int):
         """Colour of the level of this number."""
         count = len(self.parameter.levels)
         if not self.parameter.numeric and count <= len(CYCLE):
             return CYCLE[level]
-        if self.few or not self.parameter.numeric:
+        if self.few or not self._graded:
             return line_colours(count)(level)
         return line_colours(256)(self._norm()(self.parameter.unit(self.parameter.levels[level])))
 
@@ -75,7 +80,7 @@ class Colouring:
         if self.few:
             return
         count = len(self.parameter.levels)
-        if self.parameter.numeric:
+        if self._graded:
             shades = ScalarMappable(self._norm(), line_colours(256))
         else:
             shades = ScalarMappable(BoundaryNorm(np.arange(count + 1) - 0.5, count), line_colours(count))
@@ -83,7 +88,7 @@ class Colouring:
         bar.set_label(self.parameter.label)
         bar.outline.set_linewidth(0.6)
         bar.minorticks_off()
-        if not self.parameter.numeric:
+        if not self._graded:
             step = -(-count // _BAR_NAMED)
             bar.set_ticks(np.arange(0, count, step), labels=self.parameter.texts()[::step])
         else:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import textwrap
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -10,16 +12,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import open_result, whole_file
+from roughvisc.views.figures.axes import verbatim
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+from roughvisc.views.sweep_figures.case_names import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
-from roughvisc.views.sweep_figures.sweeps import sweep
-
-#: Quantities drawn against what was varied, the first of each row that all cases hold.
-_QUANTITIES = (("contact_area_corrected", "contact_area"), ("approach",), ("force",))
+from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of
 
 
 def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
@@ -35,19 +37,33 @@ def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
         return None
 
 
+#: What files are called after other than the quantity.
+_FILES = {"contact_area_corrected": "area", "contact_area": "area", "contact_fraction": "area"}
+
+
+def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
+    """Name for the files and words for the title of each result that states its case; other files are left out."""
+    cases = {}
+    for path in paths:
+        with suppress(InputError, ValueError), open_result(path) as dataset:
+            cases[str(path)] = json.loads(dataset.attrs["case"]) if "case" in dataset.attrs else {}
+    stems = file_stems({Path(path).stem: case for path, case in cases.items()})
+    return {Path(path): (stems[Path(path).stem], case_words(case)) for path, case in cases.items()}
+
+
 def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str, Figure]]:
     """Name, title and figure of all that results of several cases allow, one at a time.
 
     What the program prescribes alike in all cases, or a parameter says already, is left out.
     """
     cases = cases_of(results)
-    held = [next((name for name in names if _holds(cases, name)), None) for names in _QUANTITIES]
-    for name in filter(None, held):
+    loading = "force" if cases.alike_in_size else "nominal_pressure"
+    held = [name for name in (cases.area, "approach", loading) if _holds(cases, name)]
+    for name in held:
         if cases.parameters and not _known_before(cases, name):
-            title = f"{_word(name)} against what was varied"
-            yield _word(name).split()[-1].lower(), title, sweep(results, name)
-    first = next(filter(None, held), None)
-    if first:
+            yield _FILES.get(name, name), f"{_word(name)} against what was varied", sweep(results, name)
+    if held:
+        first = held[0]
         yield "histories", f"{_word(first)} over time, a line a case", histories_of_cases(results, first)
 
 
@@ -60,8 +76,9 @@ def _holds(cases: Cases, name: str) -> bool:
 
 
 def _known_before(cases: Cases, name: str) -> bool:
-    """Whether the last values are alike, or those of a parameter."""
-    last = np.array([float(member[name][-1]) for member in cases.members])
+    """Whether the values that would be drawn are alike, or those of a parameter."""
+    frames = telling_frames_of(cases, name)
+    last = np.array([float(m[name][frame]) for m, frame in zip(cases.members, frames, strict=True)])
     scale = 1e-6 * np.nanmax(np.abs(last), initial=0.0)
     stated = [one.values for one in cases.parameters if one.numeric]
     return any(np.allclose(last, values, rtol=0, atol=scale) for values in (last[0], *stated))
@@ -71,6 +88,8 @@ def save_sweep_figures(
     results: xr.Dataset | xr.DataTree, folder: Any, *, suffix: str = ".png", dpi: float = 200.0
 ) -> list[Path]:
     """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``.
+
+    Where the surfaces differ in size, areas are fractions of theirs, and forces nominal pressures.
 
     Parameters
     ----------
@@ -97,8 +116,19 @@ def save_sweep_figures(
     return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]
 
 
-def write_figure(figure: Figure, path: Path, dpi: float = 200.0) -> Path:
+def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
     """Write a figure to a file of the kind that its suffix names, whole or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What to write.
+    path : Path
+        Where to.
+    dpi : float
+        Resolution of pictures made of pixels.
+    title : str
+        What stands above it, such as which case it shows; the picture is so much higher.
 
     Raises
     ------
@@ -108,6 +138,20 @@ def write_figure(figure: Figure, path: Path, dpi: float = 200.0) -> Path:
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
+    box = _with_title(figure, title) if title else None
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=dpi)
+        figure.savefig(temporary, format=kind, dpi=dpi, bbox_inches=box)
     return path
+
+
+def _with_title(figure: Figure, title: str) -> Bbox:
+    """Write a title above a figure, whose own contents stay where they are; the area of both. [inch]"""
+    figure.draw_without_rendering()  # lays it out
+    figure.set_layout_engine("none")
+    for legend in figure.legends:  # else it would stand at the top of what is saved
+        legend.set_bbox_to_anchor((0, 0, 1, 1), transform=figure.transFigure)
+    width, height = figure.get_size_inches()
+    whole = title.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")  # lines end at commas
+    lines = textwrap.wrap(whole, int(13 * width))
+    figure.text(0.5, 1 + 0.03 / height, "\n".join(map(verbatim, lines)), ha="center", va="bottom", fontsize=9)
+    return Bbox.from_extents(0, 0, width, height + 0.08 + 0.16 * len(lines))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import matplotlib
@@ -13,6 +14,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.views.figures.axes import ABSENT, letter_panels, new_figure
+from roughvisc.views.sweep_figures.case_text import ENDLESS
 from roughvisc.views.sweep_figures.cases import Cases, Parameter, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import even_in_log, readable_ticks
 
@@ -57,8 +59,16 @@ def draw_maps(
 
 
 def positions(parameter: Parameter) -> np.ndarray:
-    """Where the levels of a parameter lie on its axis."""
-    return parameter.unit(parameter.levels) if parameter.numeric else np.arange(len(parameter.levels), dtype=float)
+    """Where the levels of a parameter lie on its axis; an infinite one a step beyond the others."""
+    if not parameter.numeric:
+        return np.arange(len(parameter.levels), dtype=float)
+    places = parameter.unit(parameter.levels)
+    if parameter.endless:
+        last, before = places[-2], places[-3] if len(places) > 2 else places[-2] / 2
+        places[-1] = last * last / before if before > 0 else math.inf
+        if not even_in_log(places):
+            places[-1] = 2 * last - before
+    return places
 
 
 def _borders_between(parameter: Parameter) -> np.ndarray:
@@ -83,9 +93,11 @@ def set_parameter_axis(axis: Axis, parameter: Parameter) -> None:
     set_limits(borders[0], borders[-1])
     if parameter.numeric:
         scaled = np.log(places) if logarithmic else places
-        if count <= 6 and np.diff(scaled).min() > 0.11 * np.ptp(scaled):
-            axis.set_major_locator(FixedLocator(places))
-            axis.set_major_formatter(lambda value, _: f"{value:.4g}")
+        if parameter.endless or (count <= 6 and np.diff(scaled).min() > 0.11 * np.ptp(scaled)):
+            beyond = places[-1] if parameter.endless else math.inf
+            step = -(-count // 6)
+            axis.set_major_locator(FixedLocator(places[(count - 1) % step :: step]))
+            axis.set_major_formatter(lambda value, _: ENDLESS if value == beyond else f"{value:.4g}")
             axis.set_minor_locator(FixedLocator([]))
             axis.set_minor_formatter(NullFormatter())
         else:

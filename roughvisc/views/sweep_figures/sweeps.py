@@ -21,13 +21,15 @@ from roughvisc.views.figures.axes import (
     styled,
     time_text,
 )
-from roughvisc.views.sweep_figures.cases import Cases, Parameter, cases_of, label_of, quantity_unit
+from roughvisc.views.sweep_figures.cases import Cases, Parameter, cases_of, combined, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
 from roughvisc.views.sweep_figures.maps import draw_maps, positions, set_parameter_axis
 
 #: Parameters with so many values or more make a map by default.
 _MAP_FROM = 4
 _MOST_PANELS = 6
+#: Times at which cases are compared.
+_MOST_TIMES = 200
 
 
 @styled
@@ -53,7 +55,8 @@ def sweep(
         all have it.
     times : float or sequence of float, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
-        by default up to four, a line each; else by default the last. Where several were, a panel each. [s]
+        by default up to four, a line each; else by default the last, or where the cases differ most if they differ
+        by less than half of that at the end, which the title then says. Where several were varied, a panel each. [s]
     along : str, or two of them, optional
         Dotted key of the parameter across; of a map, those across and up. By default the parameter with the most
         numbers.
@@ -82,6 +85,8 @@ def sweep(
     frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
     values = np.array([[float(m[quantity][f]) for m, f in zip(cases.members, row, strict=True)] for row in frames])
     titles = [_title(cases, row) for row in frames]
+    if times is None and len(frames) == 1 and not _all_last(cases, frames[0]):
+        titles = [f"{titles[0]}, where the cases differ most"]
     if as_map:
         return draw_maps(cases, across[:2], quantity, values, titles)
     if len(cases.parameters) == 1:
@@ -121,19 +126,38 @@ def _frames(cases: Cases, quantity: str, times: float | Sequence[float] | None, 
         return [[frame_at(clock, float(time)) for clock in clocks] for time in asked]
     shared = all(np.array_equal(clock, clocks[0]) for clock in clocks)
     if not (one and shared):
-        return [[len(clock) - 1 for clock in clocks]]
+        return [telling_frames_of(cases, quantity)]
     telling = [i for i in range(len(clocks[0])) if any(abs(float(m[quantity][i])) > 0 for m in cases.members)]
     telling = telling or [len(clocks[0]) - 1]
     return [[telling[i]] * len(clocks) for i in spread_frames(clocks[0][telling], 4)]
 
 
 def _title(cases: Cases, frames: list[int]) -> str:
-    """The time, if it is the same in all cases."""
+    """The time, or about which time it is if it is not the same in all cases."""
     found = {float(member["time"][frame]) for member, frame in zip(cases.members, frames, strict=True)}
     if len(found) == 1:
         return time_text(found.pop())
-    ends = all(frame == member.sizes["time"] - 1 for member, frame in zip(cases.members, frames, strict=True))
-    return "at the end" if ends else f"t ≈ {time_text(float(np.median(list(found))))[4:]}"
+    return "at the end" if _all_last(cases, frames) else f"t ≈ {time_text(float(np.median(list(found))))[4:]}"
+
+
+def _all_last(cases: Cases, frames: list[int]) -> bool:
+    return all(frame == member.sizes["time"] - 1 for member, frame in zip(cases.members, frames, strict=True))
+
+
+def telling_frames_of(cases: Cases, quantity: str) -> list[int]:
+    """Frame of each case at the end; where the cases differ less than half as much there, where they differ most."""
+    clocks = [member["time"].values for member in cases.members]
+    last = [len(clock) - 1 for clock in clocks]
+    common = np.unique(np.concatenate(clocks))
+    common = common[(common >= max(c[0] for c in clocks)) & (common <= min(c[-1] for c in clocks))]
+    if not common.size or len({clock[-1] for clock in clocks}) > 1:
+        return last
+    common = common[spread_frames(common, _MOST_TIMES)]
+    values = [np.interp(common, clock, m[quantity]) for clock, m in zip(clocks, cases.members, strict=True)]
+    spread = np.nan_to_num(np.ptp(values, axis=0))
+    if spread[-1] >= 0.5 * spread.max():
+        return last
+    return [frame_at(clock, common[spread.argmax()]) for clock in clocks]
 
 
 def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
@@ -164,7 +188,7 @@ def _families(
     cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
 ) -> Figure:
     """Several parameters: a panel for each time, in it a line for each combination of the others."""
-    family = _combined([one for one in cases.parameters if one.key != across.key])
+    family = combined([one for one in cases.parameters if one.key != across.key])
     colouring = Colouring(family)
     figure = new_figure(1.2 + 3.0 * len(values), 3.2 + 0.14 * len(colouring.handles()) / (1 + len(values)))
     axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
@@ -175,7 +199,9 @@ def _families(
         crossed |= bool(failed.any())
         for level in range(len(family.levels)):
             members = np.flatnonzero(family.places == level)
-            _draw_line(ax, across, members, unit(row[members]), failed[members], color=colouring.colour(level))
+            nested = 1 - 0.55 * level / max(1, len(family.levels) - 1)  # so that none hides another that it lies on
+            style = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
+            _draw_line(ax, across, members, unit(row[members]), failed[members], **style)
         _finish(ax, cases, across, quantity, values)
         ax.set_title(title, loc="right")
         ax.label_outer(remove_inner_ticks=False)
@@ -195,30 +221,19 @@ def _families(
 _CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged")
 
 
-def _combined(others: list[Parameter]) -> Parameter:
-    """One parameter that stands for several: every combination a category."""
-    if len(others) == 1:
-        return others[0]
-    texts = [np.array(_named_texts(one))[one.places] for one in others]
-    values = np.array([", ".join(parts) for parts in zip(*texts, strict=True)])
-    return Parameter("", values, "", ", ".join(one.name for one in others))
-
-
-def _named_texts(parameter: Parameter) -> list[str]:
-    """Levels as texts that say what they are: numbers with the name of the parameter."""
-    word = parameter.values.dtype.kind in "OU"
-    return parameter.texts() if word else [f"{parameter.name} {text}" for text in parameter.texts()]
-
-
 def _draw_line(
     ax: Axes, across: Parameter, members: np.ndarray, shown: np.ndarray, failed: np.ndarray, **style
 ) -> None:
-    """A line over the parameter; points of categories are not joined."""
+    """A line over the parameter; points of categories are not joined, nor that of an infinite value."""
     place = positions(across)[across.places[members]]
     order = np.argsort(place, kind="stable")
     few = len(members) <= 40
     style |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
-    ax.plot(place[order], shown[order], ms=3.5 if across.numeric else 5, **style)
+    x, y = place[order], shown[order]
+    if across.endless:
+        last = int(np.isfinite(across.values[members]).sum())
+        x, y = np.insert(x, last, np.nan), np.insert(y, last, np.nan)
+    ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | style)
     if failed.any():
         ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
 

@@ -98,3 +98,24 @@ def test_displacement_single__is_the_displacement_over_the_largest_influence(bou
     assert found.dtype == np.float32
     np.testing.assert_allclose(found * halfspace.largest_influence, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
     assert np.array_equal(halfspace.displacement(pressure), exact), "they share their working memory"
+
+
+@pytest.mark.parametrize("shape", [(7, 5), (8, 6), (1, 9)])
+def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
+    """Johnson, Contact Mechanics, eq. (3.25) at the centre; a cell in a corner and its images lie side by side."""
+    a, b = 1.3, 0.7
+
+    def at_centre(a, b):
+        return 2 / np.pi * (a * np.arcsinh(b / a) + b * np.arcsinh(a / b))
+
+    assert HalfSpace(shape, (a, b)).self_influence == pytest.approx(at_centre(a, b), rel=1e-12)
+    # seen from the centre of one of four: quarters of the rectangles of one and of three cells along each axis
+    four = sum(at_centre(i * a, j * b) for i in (1, 3) for j in (1, 3)) / 4
+    assert HalfSpace(shape, (a, b), mirrored=True).self_influence == pytest.approx(four, rel=1e-12)
+
+
+def test_self_influence__with_periodic_boundaries_is_the_mean_of_the_symbol():
+    found = HalfSpace((7, 6), (1.3, 0.7), "periodic").self_influence
+    qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((7, 6), (1.3, 0.7), strict=True))
+    q = np.hypot(qx[:, None], qy).ravel()[1:]
+    assert found == pytest.approx((2 / q).sum() / 42, rel=1e-12)

@@ -103,3 +103,14 @@ def test_mirrored_reach__is_that_of_the_window_with_its_images(spacing, shape):
     quick = np.concatenate([rows for _, rows in Reach(window, spacing, HALF_SPACE, single=True).rows(1e-300 * corner)])
     np.testing.assert_allclose(1e300 * quick, expected[21:, 27:], rtol=0, atol=1e-6 * expected.max())
     assert np.sum(corner * mean_influence(window, spacing, HALF_SPACE)) == pytest.approx(np.mean(expected), rel=1e-12)
+
+
+def test_window__that_would_begin_or_end_at_the_border_is_the_domain():
+    """One point after the other lies lowest: the sides of the window are the same, where it lies is not."""
+    shape = (131, 151)
+    for centre in range(131):
+        window = window_around(paraboloid(shape, (centre, 75)), 1)
+        if not window.whole:
+            assert 0 < window.first[0] < window.first[0] + window.shape[0] < 131
+    sides = {window_around(paraboloid(shape, (centre, 75)), 1).whole for centre in (0, 65, 130)}
+    assert sides == {True, False}

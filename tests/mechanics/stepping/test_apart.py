@@ -16,6 +16,7 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import apart
 from roughvisc.mechanics.stepping import march as marching
 from roughvisc.mechanics.stepping.apart import _first_crossing, closing_time
+from roughvisc.mechanics.stepping.attempt import rest
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 
@@ -210,3 +211,11 @@ def test_turns_of_a_cycle__bound_the_search():
     found = closing_time(scene, state, segment, 500.0, lambda time: 0.0 if time > lifted else 1.0)
     assert found == pytest.approx(lifted + peak - half, abs=1e-5)
     assert apart.closing_time(scene, state, segment, 500.0, lambda _: 1.0) == 500.0
+
+
+@pytest.mark.parametrize(("part", "apart_till"), [(1e-7, 0.0), (1e-4, 1e-4)], ids=["at_once", "later"])
+def test_surfaces_that_touch_within_a_millionth_of_the_way__are_in_contact_now(part, apart_till):
+    program = rv.Program().approach(1.0, over=1.0)
+    scene = sphere(program)
+    found = closing_time(scene, rest(scene), program.segments[0], 1.0, lambda _: part)
+    assert found == pytest.approx(apart_till, rel=1e-4, abs=0.0)

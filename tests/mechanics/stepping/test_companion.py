@@ -7,10 +7,11 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping import attempt
+from roughvisc.mechanics.stepping import attempt, companion
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
 from roughvisc.study.simulation.rows import keeps_its_word, stated
 
 TOLERANCE, SHARPER = 1e-2, 30
@@ -162,6 +163,36 @@ def test_going_on_from_any_state__states_the_same():
         assert len(resumed) == len(whole) - cut - 1
         for one, other in zip(resumed, whole[cut + 1 :], strict=True):
             same(one, other)
+
+
+def test_work_error__of_a_direct_history_covers_the_true_one():
+    program, times = PROGRAMS["triangle"], (0.3, 0.7, 1.0, 1.4, 2.0)
+    scene = sphere(MATERIALS["zener"], program, times=times, tolerance=3e-2)
+    found = kept(replace(scene, memory=History(MATERIALS["zener"])))
+    exact = kept(replace(scene, tolerance=1e-3))
+    true, said = np.array([(abs(step.work - exact[t].work), step.uncertainty.work) for t, step in found.items()]).T
+    assert np.all(said >= 0.8 * true)
+    assert np.all(said <= 3e-2 * exact[2.0].work)
+
+
+def test_area_in_doubt__is_counted_cell_by_cell():
+    """In contact where both differ by no less than is there; out of it where the companion touches, or might have."""
+    program = rv.Program().load(1.0, over=1.0)
+    halfspace, nothing = HalfSpace((3, 4), (1.0, 1.0)), np.zeros((3, 4))
+    material = MATERIALS["zener"]
+    gap = np.array([[0.0] * 4, [0.0] * 4, [0.1, 0.1, 0.3, 0.1]])
+    present = np.array([[True] * 4, [True] * 4, [True, True, True, False]])
+    scene = Scene(halfspace, gap, material, Modes(material), program, present=present)
+    # the first two rows are in contact, but for the last cell of the second one
+    fine = np.array([[4.0, 4.0, 4.0, 4.0], [4.0, 4.0, 4.0, 0.0], [0.0] * 4])
+    coarse = np.array([[4.0, 3.0, 0.0, 7.9], [8.1, 4.0, 0.0, 0.5], [0.0] * 4])
+    level, moved = 0.05, np.array([[0.0] * 4, [0.0] * 4, [0.02, 0.06, 0.2, 0.06]])
+    state = State(Instant(1.0, fine, 1.0, level, nothing), nothing, None)
+    step = Step(state.now, nothing, None, level, "load", True, 0.0, 0.0, Uncertainty(), True, scene, state)
+    found = companion._undecided(scene, step, Instant(1.0, coarse, 1.0, level + 0.01), 0.01 - moved)
+    # in contact, doubtful: nothing is left (0, 2) and (1, 2), more than twice as much (1, 0)
+    # out of it: the companion touches (1, 3); as near as both differ (2, 1), not so (2, 0) and (2, 2); absent (2, 3)
+    assert found == (3, 2)
 
 
 def test_elastic__has_no_companion_and_nothing_unknown():

@@ -1,5 +1,6 @@
 """Stored and dissipated energy: inner products carried along against dense ones, cycles against the closed form."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -124,6 +125,21 @@ def test_first_step_after_an_event__is_exact_while_it_resolves_what_relaxes():
     fields, lengths = pressures(2), (0.2, 0.29)  # the shortest time is 0.3 s
     found, same = (carried(SOLID, fields, lengths, "linear", fresh=fresh) for fresh in (True, False))
     assert (found.stored, found.dissipated, found.unresolved) == (same.stored, same.dissipated, 0.0)
+
+
+@pytest.mark.parametrize("length", [0.29, 0.45, 1.1], ids=["resolved", "relaxed", "relaxed_far"])
+def test_first_step_after_an_event__leaves_open_a_quarter_of_what_two_ways_of_counting_differ_by(length):
+    """A ramp from rest in one step. The element of 0.3 s relaxes within it if it is longer, that of 2 s does not."""
+    rest, pressure = pressures(1)
+    found = carried(SOLID, [rest, pressure], (length,), "linear", fresh=True)
+    _, exact = quadrature(SOLID, (length,), lambda _, time: pressure * time / length, dense())
+    after = 1 - 0.3 / length * (1 - np.exp(-length / 0.3))  # of the quick element, where the pressure is one
+    square = AREA * pressure.ravel() @ dense() @ pressure.ravel()
+    counted = 0.35 * (0.5 * after - 0.5 * after**2) * square  # the mean pressure's work on it, less what it stores
+    alone = quadrature(replace(SOLID, compliances=(1.0, 0.0)), (length,), lambda _, t: pressure * t / length, dense())
+    other = counted - alone[1] if length > 0.3 else 0.0
+    assert found.dissipated == pytest.approx(exact + other, rel=1e-10)
+    assert found.unresolved == pytest.approx(0.25 * abs(other), rel=1e-8)
 
 
 def test_step_that_stands_for_a_jump__works_as_a_held_load():

@@ -1,5 +1,6 @@
 """One case to one file: what the file says of itself, and what happens when something goes wrong."""
 
+import importlib.metadata
 import json
 import logging
 
@@ -10,7 +11,8 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.run import result_folder, run
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result
 
@@ -42,6 +44,15 @@ def test_run__keeps_a_file_that_is_whole_in_itself(study):
     xr.testing.assert_equal(
         run(again, study.parent / "other", progress=False).drop_vars("wall_time"), ds.drop_vars("wall_time")
     )
+
+
+def test_finished_case__is_reused_by_another_commit(study, monkeypatch, solved_on):
+    run(study, progress=False)
+    solved = len(solved_on)
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "0.1.dev999+gabcdef0")
+    assert rv.__version__ == "0.1.dev999+gabcdef0"
+    run(study, progress=False)
+    assert len(solved_on) == solved > 0
 
 
 def test_run__equals_simulate(study):

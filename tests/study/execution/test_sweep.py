@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import numpy as np
@@ -17,23 +16,22 @@ import psutil
 import pytest
 import xarray as xr
 from rich.console import Console
-from support import BALL
+from support import BALL, LONG, assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.errors import InputError, InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
+from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence, Watch
-from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage.failures import record_path
-from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.table import CASES
 
-LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
-#: Takes some seconds a case, in steps of milliseconds.
-LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
 RUN = [sys.executable, "-m", "roughvisc.cli", "run"]
 
 pytestmark = pytest.mark.filterwarnings(
@@ -43,68 +41,27 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 
-@pytest.fixture
-def study(tmp_path):
-    """Writes a study into a folder of its own and reads its cases."""
+@contextlib.contextmanager
+def in_this_process(processes):
+    """A cluster whose workers are threads, so that they see what a test has changed."""
+    from distributed import Client, LocalCluster
 
-    def write(text=BALL + LOADS, name="ball"):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(text)
-        return read_cases(path)
-
-    return write
-
-
-@pytest.fixture(scope="module")
-def by_hand(tmp_path_factory):
-    """Scheduler and two workers, each started by hand as a process of its own; gives the scheduler's file."""
-    folder = tmp_path_factory.mktemp("cluster")
-    file = folder / "scheduler.json"
-    environment = os.environ | {
-        "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
-        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
-    }
-    dask = [sys.executable, "-m", "dask"]
-    commands = [
-        [*dask, "scheduler", "--scheduler-file", file, "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
-        *[[*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"]] * 2,
-    ]
-    log = (folder / "log").open("w")
-    started = [
-        subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
-        for command in commands
-    ]
-    until = time.monotonic() + 60
-    while not file.exists() and time.monotonic() < until:
-        time.sleep(0.05)
-    with connect(file=file) as client:
-        client.wait_for_workers(2, timeout=60)
-    yield file
-    for process in reversed(started):
-        process.terminate()
-    for process in started:
-        process.wait(30)
-    log.close()
-
-
-def numbers(folder):
-    """Every variable but the wall time of every result in a folder."""
-    found = {}
-    for path in sorted(folder.glob("*.nc")):
-        with open_result(path) as ds:
-            found[path.name] = ds.drop_vars("wall_time").load()
-    return found
-
-
-def assert_same(one, other):
-    assert one.keys() == other.keys()
-    for name, ds in one.items():
-        xr.testing.assert_equal(ds, other[name])
+    with (
+        LocalCluster(
+            n_workers=processes, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
 
 
 def leftovers(folder):
     """What is in a folder besides results, records, log and index."""
-    return [p.name for p in folder.iterdir() if p.suffix != ".nc" and p.name not in ("sweep.log", INDEX, "inputs")]
+    return [
+        p.name
+        for p in folder.iterdir()
+        if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, LATEST, "inputs")
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -172,51 +129,7 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     address = json.loads(by_hand.read_text())["address"]
     done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "4, 4 of them before" in done.stdout
-
-
-def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
-    cases = study(LONG + LOADS)
-    wanted = {}
-    with connect(file=by_hand) as client:
-        killed = kill_working(client, times=1)
-        ds = sweep(cases[:2], tmp_path / "killed", client, progress=False)
-        killed.join()
-        assert killed.victims
-        wanted = sweep(cases[:2], tmp_path / "calm", client, progress=False)
-    assert ds.sizes["case"] == 2
-    xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
-
-
-def test_sweep__records_a_case_whose_worker_dies_twice(study, tmp_path, by_hand):
-    (case,) = study(LONG)
-    with connect(file=by_hand) as client:
-        killed = kill_working(client, times=2)
-        with pytest.raises(RoughviscError, match=r"none of 1 cases .* died 2 times"):
-            sweep([case], tmp_path / "out", client, progress=False)
-        killed.join()
-        client.wait_for_workers(2, timeout=60)
-
-
-def kill_working(client, times):
-    """A thread that kills so many workers in the midst of a case."""
-
-    def kill():
-        until = time.monotonic() + 60
-        while len(killer.victims) < times and time.monotonic() < until:
-            busy = [worker for worker, keys in client.processing().items() if keys]
-            for worker in busy[:1]:
-                pid = client.run(os.getpid, workers=[worker], on_error="ignore").get(worker)
-                time.sleep(0.5)
-                if pid and pid not in killer.victims and client.processing().get(worker):
-                    os.kill(pid, signal.SIGKILL)
-                    killer.victims.append(pid)
-            time.sleep(0.1)
-
-    killer = threading.Thread(target=kill, daemon=True)
-    killer.victims = []
-    killer.start()
-    return killer
+    assert "4, all before: nothing had to be computed" in done.stdout
 
 
 def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):
@@ -286,7 +199,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     assert leftovers(tmp_path / "out") == [], "the records go when the cases are done"
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device", "x.nc"), InUseError("in use")])
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error", "x.nc"), InUseError("in use"), MemoryError()])
 def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
     cases = study()
 
@@ -296,8 +209,49 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     monkeypatch.setattr(task_module, "run_case", hindered)
     outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
     assert {o.kind for o in outcomes.values()} == {"hindered"}
+    assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatch, capfd, workers):
+    """The second case finds no space: those after it are not begun, and the same command goes on."""
+    cases, bring = study(), run_module.run_case
+
+    def full(case, folder, **settings):
+        (tmp_path / f"begun-{len(list(tmp_path.glob('begun*')))}").touch()
+        if len(list(tmp_path.glob("begun*"))) == 2:
+            raise OSError(28, "No space left on device; make room", "x.nc")
+        return bring(case, folder, **settings)
+
+    if workers:  # the processes of a local cluster are forked from one that has not seen this
+        monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
+    monkeypatch.setattr(task_module, "run_case", full)
+    with pytest.raises(DiskFullError, match=r"^x\.nc: No space left .*make room \(1 of 4 cases are finished\)$"):
+        run_cases(cases, tmp_path / "out", watch=Silence(), workers=workers)
+    begun = len(list(tmp_path.glob("begun*")))
+    assert begun == 2 if workers == 0 else begun < 4
+    assert not list((tmp_path / "out").glob("*.failed.json"))
+    assert "No space left" in (tmp_path / "out" / "sweep.log").read_text()
+    monkeypatch.undo()
+    assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "sweep.log").symlink_to("/dev/full")
+    assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
+    assert capfd.readouterr().err == ""
+
+
+def test_run__a_folder_that_may_no_longer_be_written_to_keeps_the_checkpoint(study, tmp_path, monkeypatch):
+    (case,) = study(BALL)
+    write = run_module.write_result
+    monkeypatch.setattr(run_module, "write_result", lambda ds, path, **how: write(ds, "/proc/none/x.nc", **how))
+    outcomes = run_cases([case], tmp_path / "out", watch=Silence(), workers=0)
+    assert outcomes[case.key].kind == "hindered"
+    assert "/proc/none: cannot be made" in outcomes[case.key].message
 
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
@@ -533,13 +487,11 @@ def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
 
 def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     synthetic(tmp_path, loads=1, seeds=1, times=3)
-    (tmp_path / f"{0:08x}{0:08x}.nc").rename(tmp_path / "a.nc")
-    synthetic(tmp_path, loads=1, seeds=1, times=5)
-    (tmp_path / "a.nc").rename(tmp_path / "other.nc")
-    with open_result(tmp_path / "other.nc") as ds:
+    with open_result(tmp_path / f"{0:08x}{0:08x}.nc") as ds:
         ds = ds.load()
     ds.attrs["case_key"] = "f" * 16
-    write_result(ds, tmp_path / "other.nc")
+    write_result(ds, tmp_path / f"{'f' * 16}.nc")
+    synthetic(tmp_path, loads=1, seeds=1, times=5)
     with pytest.raises(InputError, match=r"no common times \(5 and 3\): open them with ragged=True"):
         rv.open_results(tmp_path)
     tree = rv.open_results(tmp_path, ragged=True)
@@ -547,6 +499,42 @@ def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
     assert tree["f" * 16].sizes["time"] == 3
     assert tree[f"{0:08x}{0:08x}"].ds.pressure.values.shape == (5, 8, 6)
     assert float(tree["f" * 16]["program.0.load"]) == 0.5
+
+
+def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    key = f"{3:08x}{2:08x}"
+    with open_result(folder / f"{key}.nc") as ds:
+        derived = ds.load()
+    derived["force"][:] = 77.0
+    for name in ("000-mean.nc", f"{'f' * 16}.nc", "zz.nc"):
+        write_result(derived, folder / name)
+    (folder / INDEX).unlink()
+    ds = rv.open_results(folder)
+    assert ds.sizes["case"] == 60
+    assert float(ds.force.max()) == 5.0
+    assert f"{'f' * 16}.nc: holds the result of case {key}" in caplog.text
+
+
+def test_open_results__no_bit_of_the_index_changes_what_a_sweep_returns(study, tmp_path):
+    out, cases = tmp_path / "out", study()
+    sweep(cases, out, workers=0, progress=False)
+    assert sweep(cases[:2], out, workers=0, progress=False).sizes["case"] == 2
+    rng = np.random.default_rng(5)
+    for name in (INDEX, LATEST):
+        whole = np.fromfile(out / name, np.uint8)
+        for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
+            damaged = whole.copy()
+            damaged[at] ^= 1 << rng.integers(8)
+            damaged.tofile(out / name)
+            with contextlib.suppress(InputError) if name == LATEST else contextlib.nullcontext():
+                assert list(rv.open_results(out).case_key) == [case.key for case in cases[:2]], at
+        whole.tofile(out / name)
+    (out / LATEST).write_text("[]")
+    with pytest.raises(InputError, match=rf"{LATEST}: is damaged: expected the cases of the sweep that ran last"):
+        rv.open_results(out)
+    assert rv.open_results(out, cases="all").sizes["case"] == 4
 
 
 def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):

@@ -9,7 +9,7 @@ from rich.console import Console
 import roughvisc as rv
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.statement.identity import case_key
+from roughvisc.study.statement.identity import identity
 from roughvisc.views.console.tables import plan_tables, result_table
 
 RUBBER = rv.elastic(shear_modulus=1e6)
@@ -89,7 +89,7 @@ def test_key__is_as_it_was_without_pressures(tmp_path):
     assert segments == [["load", 0.0, 4e-4, 0.0, math.inf]]
     study.write_text(STUDY)
     assert read_study(study).key == rv.vary(read_study(study), {"program.0.pressure": 2e4}).key
-    assert read_study(study).key != case_key(case.settings)
+    assert read_study(study).key != identity(case.settings)[0]
 
 
 def test_result__tells_it(tmp_path):

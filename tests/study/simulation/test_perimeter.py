@@ -7,7 +7,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation.rows import PERIMETER_CORRECTION, _staircase
+from roughvisc.study.simulation.neighbours import PERIMETER_CORRECTION
+from roughvisc.study.simulation.rows import _staircase
 from roughvisc.study.simulation.scene import Ground
 
 UNIT = rv.elastic(0.25)

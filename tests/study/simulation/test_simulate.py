@@ -175,8 +175,8 @@ def with_value(value):
         (lambda: simulate(height=with_value(np.nan)), r"missing at 1 of 1054 points, the first at cell \(3, 4\)"),
         (lambda: simulate(height=with_value(np.inf)), "infinite values"),
         (lambda: simulate(height=BALL * np.nan), "missing everywhere"),
-        (lambda: simulate(height=BALL.values), r"height is ndarray: expected a DataArray"),
-        (lambda: simulate(height=BALL.T), r"height is \('y', 'x'\)"),
+        (lambda: simulate(height=BALL.values), "simulate: found ndarray: expected an xarray.DataArray"),
+        (lambda: simulate(height=BALL.assign_attrs(units="K")), "simulate: the height has the unit 'K'"),
         (lambda: simulate(height=BALL[[0, 1, 5]]), "expected a uniform, ascending grid"),
         (lambda: simulate(boundary="open"), "boundary is 'open'"),
         (lambda: simulate(tolerance=0), "tolerance is 0"),
@@ -347,7 +347,7 @@ def test_freed_memory__is_used_again(tmp_path):
         "def run():\n"
         "    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "    rv.simulate(rough, rv.zener(1.0, 1.0, 1.0), rv.Program().load(0.2, over=0).hold(1.0),\n"
-        "                boundary='periodic', time_step=0.1, times=[1.0], fields=(), progress=False)\n"
+        "                boundary='periodic', time_step=0.25, times=[1.0], fields=(), progress=False)\n"
         "    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
         "run()\n"
         "print(run())\n"
@@ -357,6 +357,6 @@ def test_freed_memory__is_used_again(tmp_path):
         how: int(subprocess.run([sys.executable, script, how], check=True, capture_output=True, env=environment).stdout)
         for how in ("with", "without")
     }
-    if faults["without"] < 20000:
+    if faults["without"] < 8000:
         pytest.skip("this C library keeps freed memory by itself")
     assert faults["with"] < 0.2 * faults["without"]

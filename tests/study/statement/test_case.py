@@ -132,6 +132,29 @@ def with_material(table):
 CREEP = materials.from_creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7))
 
 
+def test_read_cases__takes_a_pattern_for_the_files_that_match_it(study, tmp_path):
+    for name in ("b.csv", "a.csv", "c.txt", "d[1].csv", "deep/e.csv"):
+        (tmp_path / "creep" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "creep" / name).write_text(f"0, 1\n1, {2 + len(name)}")
+    (tmp_path / "creep" / "folder.csv").mkdir()
+    text = with_material('model = "tabulated"\nfile = "creep/a.csv"')
+
+    def files(sweep):
+        return [case.varied["material.file"] for case in read_cases(study(text + sweep))]
+
+    every = ["creep/a.csv", "creep/b.csv", "creep/d[1].csv"]
+    assert files('\n[sweep]\nmaterial.file = "creep/*.csv"') == every
+    assert files('\n[[sweep]]\n"material.file" = "creep/*.csv"\nmaterial.noise = [0.1, 0.2, 0.3]') == every
+    assert files('\n[sweep]\n"material.file" = ["creep/c.txt", "creep/[ab].csv"]') == ["creep/c.txt", *every[:2]]
+    assert files('\n[sweep]\n"material.file" = ["creep/d[1].csv"]') == every[2:], "a name as it stands is no pattern"
+    assert files('\n[sweep]\n"material.file" = "**/e.csv"') == ["creep/deep/e.csv"]
+    assert files(f'\n[sweep]\n"material.file" = "{tmp_path}/creep/*.txt"') == [str(tmp_path / "creep" / "c.txt")]
+    found = refusal(study(text + '\n[sweep]\n"material.file" = "creep/*.sur"'))
+    assert found == (
+        f"sweep.material.file: found 'creep/*.sur', which matches no file in {tmp_path}: expected one at least"
+    )
+
+
 @pytest.mark.parametrize(
     ("rows", "keys"),
     [
@@ -433,10 +456,10 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | keep.times: found 6 s: expected times up to the end of the program, 5.05 s
 
 [surface]  =>  [keep]\ntimes = 0\n[surface]
-| keep.times: found 0: expected a whole number at least 1
+| keep.times: found 0: expected a whole number at least 1 and up to 1e+06
 
 [surface]  =>  [solve]\ntolerance = 0\n[surface]
-| solve.tolerance: found 0: expected a number above 0 and below 1
+| solve.tolerance: found 0: expected a number at least 1e-12 and below 1
 
 [surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
 | solve.time_step: found 'automatic': expected 'auto', or a time in s above 0

@@ -41,7 +41,8 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
     assert {one.name: getattr(Settings(), one.name) for one in fields(Settings)} == USUAL
     signature = inspect.signature(rv.simulate).parameters
     given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
-    assert given == USUAL | {"progress": True}
+    # of the thickness and what the sheet lies on comes the kernel
+    assert given == USUAL | {"thickness": None, "base": None, "progress": True}
     solve, keep = SolveSection(), KeepSection()
     assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
     assert (keep.fields, keep.times) == (USUAL["fields"], "all")
@@ -68,13 +69,13 @@ def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
         ({"missing": None}, "missing is None: expected 'refuse' or 'absent'"),
         ({"edge": "wrap"}, "edge is 'wrap': expected 'error' or 'accept'"),
         ({"memory": "none"}, "memory is 'none': expected 'auto' or 'direct'"),
-        ({"tolerance": 1}, "tolerance is 1: expected a number between 0 and 1"),
-        ({"tolerance": "1e-3"}, "tolerance is '1e-3': expected a number between 0 and 1"),
-        ({"tolerance": float("nan")}, "tolerance is nan: expected a number between 0 and 1"),
+        ({"tolerance": 1}, "tolerance is 1: expected a number of at least 1e-12 and below 1"),
+        ({"tolerance": "1e-3"}, "tolerance is '1e-3': expected a number of at least 1e-12 and below 1"),
+        ({"tolerance": float("nan")}, "tolerance is nan: expected a number of at least 1e-12 and below 1"),
         ({"time_step": 0}, "time_step is 0: expected 'auto' or a positive number [s]"),
         ({"time_step": float("inf")}, "time_step is inf: expected 'auto' or a positive number [s]"),
         ({"time_step": "10 ms"}, "time_step is '10 ms': expected 'auto' or a positive number [s]"),
-        ({"times": 0}, "times is 0: expected a positive count, a list, or None"),
+        ({"times": 0}, "times is 0: expected a positive count, a list, or None; at most 1000000 times"),
         ({"times": "all"}, "times is 'all': expected a positive count, a list, or None"),
         ({"times": [0.1, "soon"]}, "times is [0.1, 'soon']: expected a positive count, a list, or None"),
         ({"fields": None}, "fields is None: expected some of pressure, gap, displacement"),

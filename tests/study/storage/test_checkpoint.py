@@ -13,24 +13,26 @@ import threading
 import time
 from contextlib import nullcontext
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
-import roughvisc as rv
 from roughvisc.errors import InUseError
+from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.run import run, run_case
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage import records
-from roughvisc.study.storage.checkpoint import Reached, load_checkpoint, save_checkpoint
+from roughvisc.study.storage.checkpoint import Keeper, Reached, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import open_result
@@ -160,10 +162,11 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name):
+@pytest.mark.parametrize("cuts", ["few", pytest.param("more", marks=pytest.mark.long)])
+def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name, cuts):
     case, expected, steps = whole(CASES[name])
     assert steps > 10
-    for cut in (1, 2, steps // 3, steps // 2, steps - 1, steps):
+    for cut in {"few": (1, steps // 2, steps - 1, steps), "more": (2, steps // 3)}[cuts]:
         folder = tmp_path / str(cut)
         unfinished = stopped(case, folder, cut)
         assert names(folder) == [unfinished.name], "no result yet, nor a lock"
@@ -189,11 +192,15 @@ def test_growing__grows_before_and_after_the_cut(whole, tmp_path, text):
 
 
 def test_direct__keeps_every_pressure(whole, tmp_path):
+    """Those of 32 instants are gathered into one block; the jump of the program has two instants and is one row."""
     case, _, steps = whole(DIRECT)
-    folder = stopped(case, tmp_path, steps // 2)
+    folder = stopped(case, tmp_path, steps - 5)
+    instants = steps - 5 + 1
     memory = load_checkpoint(folder / "checkpoint.0", case.key).state.memory
     assert isinstance(memory, HistoryState)
-    assert any(len(block.pressures) > 1 for block in memory.blocks) or steps < 64
+    assert [len(block.pressures) for block in memory.blocks] == [32] + [1] * (instants - 32)
+    assert len(memory.times) == instants
+    assert np.count_nonzero(np.diff(memory.times) == 0) == 1
 
 
 def test_checkpoint__holds_the_state_exactly(tmp_path):
@@ -226,6 +233,48 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
 
 # ----------------------------------------------------------------------------------------------------------------
 # what a crash leaves
+
+
+def after_steps(count):
+    """How far a run has come after so many steps of a second."""
+    nothing = np.zeros((3, 2))
+    return [Reached(State(Instant(float(n), nothing, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
+
+
+def test_rows__count_with_and_without_fields():
+    reached = Reached(rows=4, converged=False)
+    assert (reached.noted().rows, reached.noted().converged) == (5, False)
+    assert (reached.kept().rows, reached.kept().converged) == (5, True)
+
+
+def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
+    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=1e9, steps=3)
+    saved = []
+    for reached in after_steps(7):
+        keeper.passed(reached)
+        saved.append(keeper.saved.time)
+    keeper.close()
+    assert saved == [0, 0, 3, 3, 3, 6, 6]
+
+
+def test_keeper__takes_no_more_than_a_twentieth_of_the_time(tmp_path, monkeypatch):
+    """A step takes 10 s and a checkpoint 4 s. The first is written after 30 s, the next ones after 80 s each."""
+    clock, write = [0.0], checkpoint_module.save_checkpoint
+    monkeypatch.setattr(checkpoint_module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+
+    def slowly(*given):
+        clock[0] += 4.0
+        write(*given)
+
+    monkeypatch.setattr(checkpoint_module, "save_checkpoint", slowly)
+    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=30.0)
+    saved = []
+    for reached in after_steps(20):
+        clock[0] += 10.0
+        keeper.passed(reached)
+        saved.append(keeper.saved.time)
+    keeper.close()
+    assert sorted(set(saved)) == [0, 3, 11, 19]
 
 
 def test_damaged_checkpoint__is_found_out_wherever_it_is_damaged(whole, tmp_path):
@@ -441,16 +490,40 @@ def test_other_revision__begins_again(whole, tmp_path, monkeypatch):
     assert stop.asked == steps
 
 
-def test_other_transforms__are_refused_and_the_checkpoint_stays(whole, tmp_path, monkeypatch):
+def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, caplog):
+    """The tolerance is kept by either; whoever asks for bits has them."""
     case, expected, steps = whole(MODES)
     stopped(case, tmp_path, steps // 2)
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint_module, "transform_library", lambda: "another engine")
-        with pytest.raises(rv.InputError, match=r"was written with scipy\.fft .*, this is another engine"):
-            run_case(case, tmp_path)
+    here = transform_library()
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
+    there = transform_library()
+    assert here.split()[0] == "scipy.fft" != there.split()[0], "the test extra has both"
     stop = Stop()
-    assert values(run_case(case, tmp_path, stop=stop)) == expected
+    path = run_case(case, tmp_path, stop=stop)
     assert stop.asked == steps - steps // 2
+    assert not caplog.records
+    with open_result(path) as mixed:
+        assert mixed.attrs["transforms"] == f"{here}; then {there}"
+        force = mixed.pressure.sum(("x", "y")).values
+    assert run_case(case, tmp_path, stop=stop) == path
+    assert stop.asked == steps - steps // 2, "it is finished"
+    (record,) = caplog.records
+    assert f"1 with {here}; then {there}, where this process has {there}: equal within" in record.getMessage()
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
+    assert values(run_case(case, tmp_path, same_bits=True)) == expected
+    with open_result(path) as same:
+        assert same.attrs["transforms"] == here
+        np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
+
+
+def test_other_transforms__begin_again_where_bits_are_asked_for(whole, tmp_path, monkeypatch):
+    case, _, steps = whole(MODES)
+    stopped(case, tmp_path, steps // 2)
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
+    stop = Stop()
+    with open_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
+        assert ds.attrs["transforms"] == transform_library()
+    assert stop.asked == steps
 
 
 def test_two_runs_at_once__the_second_says_so(whole, tmp_path):

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.colors import to_hex
 from PIL import Image
 from rich.console import Console
-from support import ROUGH, STUDY, case_of, measured
+from support import ROUGH, STUDY, case_of, measured, numbers_told
 
 import roughvisc as rv
 from roughvisc.study.statement.case import read_study
@@ -197,6 +197,15 @@ def test_apply__adds_what_is_not_there(tmp_path):
     assert text.count("#") == COMMENTED.count("#") - 1
 
 
+def test_apply__without_what_tomlkit_keeps_to_itself(tmp_path, monkeypatch):
+    monkeypatch.delattr("tomlkit.container.Container._insert_at")
+    path = write(tmp_path, COMMENTED.replace('time_step = "5 ms"     # by hand\n', ""))
+    applied(path, 6)
+    solve = read_study(path).settings.solve
+    assert (solve.method, solve.time_step) == ("seed", 0.02)
+    assert path.read_text().count("#") == COMMENTED.count("#") - 1
+
+
 def test_apply__makes_the_tables_that_are_missing(tmp_path):
     path = write(tmp_path, "")
     applied(path, 4)
@@ -334,6 +343,20 @@ def test_figure__has_a_marker_for_each_family_and_the_front_as_a_line():
     assert len({marker for marker, _ in looks}) == len(looks)
     assert {text.get_text() for text in ax.texts} >= {"1e-1", "1e-2, 96×90", "20 ms"}
     assert ax.get_ylabel() == "Error of contact area [%]"
+
+
+def test_figure__front_goes_through_measured_errors_only():
+    (ax,) = rv.plot.trade(made_up(unsure=0.001), [AREA]).axes
+    front = next(line for line in ax.lines if line.get_label() == "Pareto front")
+    assert front.get_xydata().tolist() == [[0.5, 0.6], [4.0, 0.4]], "0.08 % is less than the reference knows"
+
+
+def test_figure__labels_are_the_settings():
+    ds = made_up()
+    settings = np.where(np.isfinite(ds.time_step), ds.time_step, ds.tolerance)
+    coarser = ds.coarsening.values != 1
+    cells = [*ds.cells_x.values[coarser], *ds.cells_y.values[coarser]]
+    assert numbers_told(rv.plot.trade(ds, [AREA])) == pytest.approx(sorted([*settings, *map(float, cells)]))
 
 
 def test_figure__keeps_its_labels_apart():

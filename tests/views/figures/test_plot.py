@@ -91,28 +91,6 @@ def test_figures__refuse_many_cases_and_other_things(draw):
 # ------------------------------------------------------------------------------------------------- units, times
 
 
-@pytest.mark.parametrize(
-    ("values", "si", "text"),
-    [
-        ([3e-9], "m", "3 nm"),
-        ([-2e-6, 1e-9], "m", "2 µm"),
-        ([0.9999999], "N", "1 N"),
-        ([999.0], "N", "999 N"),
-        ([4e5], "N/m", "400 kN/m"),
-        ([0.05e-6], "m2", "0.05 mm²"),
-        ([2e-12], "m2", "2 µm²"),
-        ([7200.0], "s", "2 h"),
-        ([3000.0], "s", "3000 s"),
-        ([3 * 86400.0], "s", "3 d"),
-        ([2e-5], "J", "20 µJ"),
-        ([0.0, np.nan], "Pa", "0 Pa"),
-        ([0.25], "1", "0.25"),
-    ],
-)
-def test_unit_for__reads_well(values, si, text):
-    assert axes.unit_for(values, si).text(np.nanmax(np.abs(values))) == text
-
-
 def test_time_axis__chosen_by_the_data():
     assert not axes.TimeAxis.of(np.linspace(0, 5, 500)).logarithmic
     assert axes.TimeAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
@@ -446,9 +424,9 @@ def test_surface__takes_a_result_and_refuses_what_is_no_surface():
     assert [text.get_text() for ax in flat.axes for text in ax.texts] == ["flat: one height", "too small or too flat"]
     with pytest.raises(InputError, match="all missing"):
         plot.surface(np.nan * ds["height"])
-    with pytest.raises(InputError, match="dimensions x and y"):
+    with pytest.raises(InputError, match="expected heights over"):
         plot.surface(ds["force"])
-    with pytest.raises(InputError, match="holds no 'height'"):
+    with pytest.raises(InputError, match="expected one that holds"):
         plot.surface(ds[["force"]])
 
 
@@ -490,7 +468,8 @@ def test_surface__of_points_that_determine_no_plane():
 def test_save_figures__writes_what_the_result_allows(tmp_path):
     ds = made.hertz_creep(shape=(21, 16))
     written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)
-    assert [path.name for path in written] == [f"sphere-{name}.png" for name in plot.FIGURES]
+    told = [name for name in plot.FIGURES if name not in ("clusters", "hysteresis")]
+    assert [path.name for path in written] == [f"sphere-{name}.png" for name in told], "one spot, and no way back"
     assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == sorted(path.name for path in written)
     for path in written:
         with Image.open(path) as picture:
@@ -499,6 +478,41 @@ def test_save_figures__writes_what_the_result_allows(tmp_path):
     assert [path.name for path in few] == ["few-history.pdf"]
     with pytest.raises(InputError, match="allows no figure"):
         plot.save_figures(ds[["residual"]], tmp_path, "none")
+
+
+def test_figures_of__clusters_and_loops_where_there_are_some():
+    drawn = {name: [kind for kind, _ in plot.figures_of(SAMPLES[name](), leave="maps")] for name in ("rough", "cycle")}
+    assert "clusters" in drawn["rough"]
+    assert "hysteresis" not in drawn["rough"]
+    assert "hysteresis" in drawn["cycle"]
+    assert "clusters" not in drawn["cycle"]
+    assert "maps" not in drawn["rough"] + drawn["cycle"]
+    ball = made.hertz_creep((21, 16), 5)
+    assert [text.get_text() for text in plot.contact_clusters(ball).axes[2].texts] == ["one cluster at most"]
+    assert plot.hysteresis(ball).axes[0].get_title() == "The approach does not come back: no loop"
+    assert plot.hysteresis(SAMPLES["cycle"]()).axes[0].get_title() == ""
+
+
+def test_maps__contact_too_ragged_for_an_outline_has_a_colour_in_every_frame():
+    smooth, ragged = made.rough_creep(), made.rough_creep()
+    ragged["pressure"][-1] = ragged["pressure"][-1].where(ragged["x"] % 2.5e-5 < 1.25e-5, 0.0)
+    for ds, words in ((smooth, "Gap [µm]"), (ragged, "contact in orange\nGap [µm]")):
+        figure = plot.maps(ds, times=[0.0, -1])
+        assert words in labels(figure)
+        gaps = [image for image in images(figure) if image.get_gid() == "gap"]
+        assert [bool(image.axes.collections) for image in gaps] == [words == "Gap [µm]"] * 2
+
+
+def test_animate__of_a_mirrored_surface_shows_what_was_measured():
+    ds = made.rough_creep((22, 16)).assign_attrs(history="read a.x3p\nmirrored along x and y")
+    assert first_picture(ds).axes[0].images[0].get_array().shape == (8, 11)
+
+
+def test_area_against_load__says_what_the_lines_of_low_loads_assume():
+    ds = made.rough_creep(absent=False)
+    said = plot.area_against_load(ds, contact_modulus=1e6).get_supxlabel()
+    assert all(word in said for word in ("Gaussian", "little contact", "elastic"))
+    assert plot.area_against_load(ds, contact_modulus={}).get_supxlabel() == ""
 
 
 @pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame, made.open_contact])
@@ -532,8 +546,7 @@ def test_animate__without_histories_or_heights(tmp_path):
     bare = made.rough_creep()[["pressure"]]
     figure, pictures = animation._moving(bare, None, 2)
     assert list(pictures) == [0, 11]
-    assert len(figure.axes) == 3
-    assert figure.axes[1].texts[0].get_text() == "no height or gap kept: no section"
+    assert len(figure.axes) == 2, "the map and its scale"
 
 
 def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):

@@ -130,7 +130,7 @@ def test_clusters__number_and_areas():
     assert found["cluster_count"].values.tolist() == [2, 1, 0]
     np.testing.assert_allclose(found["cluster_area_mean"], [12e-12, 48e-12, np.nan])
     np.testing.assert_allclose(found["cluster_area_largest"], [18e-12, 48e-12, np.nan])
-    assert found["cluster_area_mean"].attrs["units"] == "m2"
+    assert found["cluster_area_mean"].attrs["units"] == "m^2"
     areas = observables.cluster_areas(ds)["cluster_area"]
     assert areas.dims == ("time", "cluster")
     np.testing.assert_allclose(areas, [[18e-12, 6e-12], [48e-12, np.nan], [np.nan, np.nan]])

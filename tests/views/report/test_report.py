@@ -100,7 +100,9 @@ def test_page__says_what_was_run_and_how_accurate_it_is(page):
     ):
         assert words in text
     assert "contact reached the border" in text
-    assert "Too far, program.0.load = 9 N" in text
+    assert "Too far: Load 9 N" in text
+    assert '<th title="program.0.load">Load</th>' in text
+    assert [view["title"] for view in views(text)] == ["Load 1 mN", "Load 2 mN", "Load 10 mN"], "what tells them apart"
 
 
 def test_page__shows_the_surface_before_and_after_conditioning(page):
@@ -178,6 +180,21 @@ def test_fifty_cases__stay_below_ten_megabytes(tmp_path, monkeypatch, count):
     assert min(len(view["frames"]) for view in views(text)) >= 3
 
 
+def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
+    loads = ["1 mN", "2 mN"]
+    for number, load in enumerate(loads):
+        varied = {"program.0.load": 1e-3 * (1 + number), **{f"material.terms.{i}.time": float(i) for i in range(4)}}
+        dataset = made.one_frame()
+        dataset.attrs |= {"case": json.dumps({"title": "A", "varied": varied, "written": {"program.0.load": load}})}
+        write_result(dataset, tmp_path / f"{number:016x}.nc")
+    text = report(tmp_path).read_text()
+    cells = re.findall(r'<td class="varied">(.*?)</td>', text)
+    assert [cell[:10] for cell in cells] == [f"Load {load}," for load in loads]
+    assert cells[0].endswith("time (material.terms.3) 3")
+    assert "<th>What was varied</th>" in text
+    assert 'title="program.0.load"' not in text
+
+
 def test_datasets__without_a_study_say_so(tmp_path):
     out = report(made.rough_creep(), tmp_path / "one.html")
     assert "does not record the whole computation" in out.read_text()
@@ -234,3 +251,15 @@ def test_browser__would_tell_of_an_error(page, tmp_path):
     ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert "nothing is not defined" in done.stderr
+
+
+def test_frames__of_a_mirrored_surface_show_what_was_measured():
+    whole = made.rough_creep((22, 16))
+    mirrored = whole.assign_attrs(history="read a.x3p\nmirrored along x and y")
+    sizes = []
+    for ds in (whole, mirrored):
+        view = frames_of(ds, 10**6)
+        with Image.open(io.BytesIO(base64.b64decode(view["frames"][0]["maps"][0].partition(",")[2]))) as picture:
+            sizes.append(picture.size)
+    assert sizes == [(22, 16), (11, 8)]
+    assert view["plane"].endswith("as measured, without its mirror images")

@@ -46,7 +46,7 @@ def stacked(parameters, area=lambda values: 1e-6):
     }
     on_case = {key: ("case", np.array(values)) for key, values in parameters.items()}
     ds = xr.Dataset(data, {"time": times, "case_key": ("case", [f"{i:016x}" for i in range(len(rows))]), **on_case})
-    return ds.assign(contact_area=ds.contact_area.assign_attrs(units="m2", long_name="real contact area"))
+    return ds.assign(contact_area=ds.contact_area.assign_attrs(units="m^2", long_name="real contact area"))
 
 
 def by_load(values):
@@ -60,6 +60,8 @@ SWEEPS = {
     "two": product(program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES),
     "grid": product(program__0__load=DECADES, material__kelvin_viscosity=VISCOSITIES),
     "materials": product(program__0__load=LOADS, material=MATERIALS),
+    "sheets": product(material__thickness=[1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, np.inf]),
+    "many sheets": product(material__thickness=[*np.geomspace(1e-5, 1e-2, 13), np.inf], program__0__load=LOADS[:2]),
     "files": product(surface__file=[f"scans/steel_{i}.x3p" for i in range(12)]),
     "three": product(surface__seed=[1, 2, 3], program__0__load=LOADS, surface__hurst=[0.6, 0.8]),
 }
@@ -104,6 +106,38 @@ def test_sweep__has_logarithmic_axes_where_values_span_decades():
     assert ax.get_xscale() == ax.get_yscale() == "log"
     (ax,) = plot.sweep(stacked(product(program__0__load=[-1.0, 1.0, 1000.0]))).axes
     assert ax.get_xscale() == "linear"
+
+
+@pytest.mark.parametrize(
+    ("finite", "scale", "places"),
+    [
+        ([0.2, 0.4, 0.8, 1.6], "log", [0.2, 0.4, 0.8, 1.6, 3.2]),
+        ([1.0, 2.0, 3.0], "linear", [1, 2, 3, 4]),
+        ([3.0], "linear", [3, 4.5]),
+    ],
+)
+def test_sweep__has_the_half_space_a_step_beyond_the_sheets(finite, scale, places):
+    thickness = [1e-3 * value for value in finite]
+    ds = stacked(product(material__thickness=[np.inf, *thickness]), lambda v: min(v["material.thickness"], 5e-3) * 1e-3)
+    figure = plot.sweep(ds)
+    (ax,) = figure.axes
+    figure.draw_without_rendering()
+    assert ax.get_xlabel() == "Thickness [mm]"
+    assert ax.get_xscale() == scale
+    assert [label.get_text() for label in ax.get_xticklabels()] == [*(f"{value:g}" for value in finite), "half-space"]
+    x, y = lines(ax)["t = 10 s"].get_data()
+    np.testing.assert_allclose(x, [*places[:-1], np.nan, places[-1]])
+    np.testing.assert_allclose(y, [*finite, np.nan, 5.0])  # mm2; not joined to the last
+
+
+def test_map_and_colours__name_the_half_space():
+    ds = stacked(SWEEPS["many sheets"], by_load)
+    figure = plot.histories_of_cases(ds, by="material.thickness")
+    assert figure.axes[-1].get_yticklabels()[-1].get_text() == "half-space"
+    ax = plot.sweep(ds, kind="map", along=["material.thickness", "program.0.load"]).axes[0]
+    assert ax.get_xscale() == "log"
+    assert ax.get_xlim()[1] == pytest.approx(1e-2 * 10 ** (3 / 12 * 1.5) * 1e6)  # half a step beyond the half-space; um
+    assert readable_setting("material.thickness", np.inf) == "half-space"
 
 
 @pytest.mark.parametrize(
@@ -238,14 +272,44 @@ def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
     assert figure.axes[1].get_ylabel() == "Load [mN]"
 
 
-def test_histories_of_cases__a_second_parameter_has_line_styles():
-    ds = stacked(SWEEPS["materials"], by_load)
-    figure = plot.histories_of_cases(ds)
-    assert len(figure.legends[0].get_texts()) == 5
-    styles = [line.get_linestyle() for line in figure.axes[0].lines]
-    assert styles == ["-", "--"] * 3
-    by_material = plot.histories_of_cases(ds, by="material")
-    assert len({line.get_color() for line in by_material.axes[0].lines}) == 2
+def test_histories_of_cases__a_second_parameter_makes_panels():
+    figure = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "40 mN"]
+    assert [ax.get_title()[:7] for ax in figure.axes] == ["elastic", "zener, "]
+    for ax in figure.axes:
+        widths = [line.get_linewidth() for line in ax.lines if line.get_linestyle() != "None"]
+        assert widths == sorted(set(widths), reverse=True), "a line shows on both sides of another that lies on it"
+    by_material = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load), by="material")
+    assert [ax.get_title() for ax in by_material.axes] == ["Load 10 mN", "Load 20 mN", "Load 40 mN"]
+    crowd = product(program__0__load=LOADS, surface__seed=list(range(4)), solve__tolerance=[1e-2, 1e-3, 1e-4])
+    assert len(plot.histories_of_cases(stacked(crowd)).axes) == 3, "of twelve combinations the tolerances alone"
+
+
+def test_sweep__is_drawn_where_the_cases_differ():
+    ds = stacked(SWEEPS["two"], by_load)
+    apart = xr.DataArray([0.1, 1.0, 0.6, 0.2], dims="time") * ds["material.kelvin_viscosity"] ** 0.1
+    figure = plot.sweep(ds.assign(approach=apart.transpose("case", "time") * 1e-6), "approach")
+    assert figure.axes[0].get_title(loc="right") == "t = 100 ms, where the cases differ most"
+    shown = np.concatenate([line.get_ydata() for line in figure.axes[0].lines])
+    np.testing.assert_allclose(sorted(set(shown.round(6))), np.round(np.array(VISCOSITIES) ** 0.1, 6))
+    assert plot.sweep(ds, "contact_area").axes[0].get_title(loc="right") == "t = 10 s", "where they differ at the end"
+    assert [name for name, _, _ in sweep_figures(ds.assign(contact_area=ds.contact_area * [0, 1, 1, 0]))] == [
+        "area",
+        "histories",
+    ], "though the areas are all alike at the end"
+
+
+def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
+    ds = stacked(product(surface__file=["a.sur", "b.sur"], material__poisson=[0.3, 0.4]), lambda row: 1e-6)
+    size = xr.DataArray([1e-5, 1e-5, 4e-6, 4e-6], dims="case")
+    part, pressure = (ds.contact_area / size).assign_attrs(units="1"), (ds.force / size).assign_attrs(units="Pa")
+    ds = ds.assign(contact_fraction=part, nominal_pressure=pressure)
+    figures = {name: figure for name, _, figure in sweep_figures(ds)}
+    assert list(figures) == ["area", "nominal_pressure", "histories"]
+    for name in ("area", "histories"):
+        assert figures[name].axes[0].get_ylabel() == "Contact fraction [%]"
+    alike = ds.assign(contact_fraction=ds.contact_area / 1e-5)
+    assert plot.sweep(alike).axes[0].get_ylabel().startswith("Contact area, counted [")
 
 
 def test_histories_of_cases__that_nothing_tells_apart_are_numbered():
@@ -325,7 +389,9 @@ def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures)
     done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path)])
     assert done.exit_code == 0
     assert done.output.count("sweep-") == 3
-    assert len(list(tmp_path.glob("*-history.png"))) == 6
+    names = {path.name for path in tmp_path.glob("*-history.png")}
+    assert len(names) == 6
+    assert "load_5mN-hold_0.2s-history.png" in names
     assert (tmp_path / "sweep-area.png").stat().st_size > 5000
 
 

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.statement.schema.entries import Text, a_list
 from roughvisc.study.statement.schema.material import AnyMaterial
+from roughvisc.study.statement.schema.meanings import with_meanings
 from roughvisc.study.statement.schema.program import AnySegment
 from roughvisc.study.statement.schema.section import Section, refuse
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
@@ -66,7 +67,9 @@ def study_schema() -> dict[str, Any]:
     --------
     >>> sorted(study_schema()["properties"])
     ['keep', 'material', 'program', 'solve', 'surface', 'sweep', 'title']
+    >>> study_schema()["$defs"]["SolveSection"]["properties"]["edge"]["description"].partition(";")[0]
+    'whether contact may reach the border in free space: the scan is then a punch of that outline'
     """
     schema = StudyFile.model_json_schema()
     schema["title"] = "roughvisc study"
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **with_meanings(schema)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
@@ -12,13 +13,16 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationInfo, WrapValidator, create_model, model_validator
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.temperature import shifted
+from roughvisc.study.statement.body import BASE, body
 from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, optional, shown
 from roughvisc.study.statement.schema.section import Section, nearest, refuse
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.study.statement.schema.temperature import shift_factor
+from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
 
 MODULUS = measured("Pa", above=0)
 COMPLIANCE = measured("1/Pa", least=0)
@@ -160,6 +164,15 @@ class MaterialSection(Section):
         )
         return material if self.shift == 1 else shifted(material, self.shift)
 
+    def kernel(self) -> Kernel:
+        """What its surface does under pressure: a half-space's, or a sheet's."""
+        return body(self.build(), **self.sheet)
+
+    @property
+    def sheet(self) -> dict[str, Any]:
+        """Thickness [m] and base as stated, None where they are not."""
+        return {key: getattr(self, key) for key in THICKNESS}
+
     def content(self) -> dict[str, Any]:
         """All that determines the material, the same however it was stated."""
         kinds = MODELS[self.model][1]
@@ -172,11 +185,21 @@ class MaterialSection(Section):
             stated.setdefault("poisson", 0.5)
         if self.shift != 1:  # however it was stated
             stated["shift_factor"] = self.shift
+        if self.sheet["thickness"] not in (None, math.inf):
+            stated |= self.sheet | {"base": self.sheet["base"] or BASE}
         return stated
 
     @model_validator(mode="after")
     def _builds(self) -> MaterialSection:
         self.build()
+        try:
+            self.kernel()
+        except InputError as error:
+            raise refuse("base" if self.sheet["thickness"] is None else "thickness", str(error)) from error
+        for name in MODELS[self.model][1]:
+            part = getattr(self, name)
+            if isinstance(part, MaterialSection) and part.sheet["thickness"] is not None:
+                raise refuse(name, "found a thickness: expected none, as the bodies of a pair are half-spaces")
         return self
 
 
@@ -195,7 +218,7 @@ def _section(name: str) -> type[MaterialSection]:
         fields["file"] = (optional(FilePath), None)
         keys = {column.unit_key for column in columns.values()} - {"", *kinds}
         fields |= {key: (optional(Text), None) for key in sorted(keys)}
-    fields |= {key: (optional(kind), None) for key, kind in TEMPERATURE.items()}
+    fields |= {key: (optional(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS}.items()}
     return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
 
 

@@ -83,7 +83,7 @@ class LoadWave(Section):
     mean: LOAD
     amplitude: LOAD
     period: PERIOD
-    cycles: measured("1", above=0)
+    cycles: measured("1", above=0, most=1e6)
 
 
 class ApproachWave(Section):
@@ -92,7 +92,7 @@ class ApproachWave(Section):
     mean: APPROACH
     amplitude: APPROACH
     period: PERIOD
-    cycles: measured("1", above=0)
+    cycles: measured("1", above=0, most=1e6)
 
 
 class PressureWave(Section):
@@ -101,7 +101,7 @@ class PressureWave(Section):
     mean: PRESSURE
     amplitude: PRESSURE
     period: PERIOD
-    cycles: measured("1", above=0)
+    cycles: measured("1", above=0, most=1e6)
 
 
 class _Cycle(SegmentSection):

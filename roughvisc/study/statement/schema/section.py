@@ -18,7 +18,7 @@ _OURS = "problem"
 class Section(BaseModel):
     """A table of a study file: frozen, no unknown keys, messages that say what was found and what was expected."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
 
     @model_validator(mode="wrap")
     @classmethod

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, checked, choice, measured, shown, whole, word_or
 from roughvisc.study.statement.schema.section import Section, nearest
-from roughvisc.study.statement.settings import WORDS, Settings
+from roughvisc.study.statement.settings import FINEST_TOLERANCE, MOST_TIMES, WORDS, Settings
 from roughvisc.variables import FIELDS
 
 _INSTANT = measured("s", least=0)
@@ -20,7 +20,7 @@ def _times(value: Any) -> Any:
     if value == "all":
         return value
     if isinstance(value, int) and not isinstance(value, bool):
-        return checked(whole(1), value)
+        return checked(whole(1, MOST_TIMES), value)
     instants = a_list(value, _TIMES_WANTED)
     if not instants:
         raise InputError(f"found an empty list: expected {_TIMES_WANTED}")
@@ -40,7 +40,7 @@ class SolveSection(Section):
     """How it is computed."""
 
     boundary: choice(*WORDS["boundary"]) = Settings.boundary
-    tolerance: measured("1", above=0, below=1) = Settings.tolerance
+    tolerance: measured("1", least=FINEST_TOLERANCE, below=1) = Settings.tolerance
     time_step: word_or("auto", measured("s", above=0), "'auto', or a time in s above 0") = Settings.time_step
     method: choice(*WORDS["method"]) = Settings.method
     edge: choice(*WORDS["edge"]) = Settings.edge

@@ -135,7 +135,7 @@ def _picker(whole: type[Section], of_file: type[FromFile], made: dict[str, Any])
         if "file" in data:
             return of_file.model_validate(data, context=info.context)
         recipe = data["generate"]
-        if recipe not in made:
+        if not isinstance(recipe, str) or recipe not in made:
             raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, made)}")
         return made[recipe].model_validate(data, context=info.context)
 

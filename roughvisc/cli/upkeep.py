@@ -1,0 +1,56 @@
+"""Commands on a folder of results: ``verify`` and ``clean``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from roughvisc.cli.group import Failure, complain, counted
+from roughvisc.errors import printable
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+def verify(results: Path) -> None:
+    """Read results again, and say which are damaged.
+
+    Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of
+    their study sets damaged results aside and computes them anew. The exit status is 1 if any is damaged.
+
+    \b
+    Example:
+      roughvisc verify results/ground_steel-study
+    """
+    from roughvisc.study.storage.verify import verify as verified
+
+    found = verified(results)
+    bad = [one for one in found if one.flaw]
+    bare = sum(not one.sealed for one in found if not one.flaw)
+    for one in bad:
+        complain(f"{one.path}: is damaged: {one.flaw}")
+    whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} whole"
+    click.echo(whole + (f", {bare} of them without a checksum" if bare else ""))
+    if bad:
+        raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to have the results computed anew", 1)
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
+def clean(results: Path, everything: bool) -> None:
+    """Remove what killed runs have left in a folder.
+
+    Those are torn files, locks of dead runs, and checkpoints of cases that are finished. Results stay, and so does
+    what an unfinished case would go on from, unless --all is given. A case that a run is at work on is left alone.
+
+    \b
+    Example:
+      roughvisc clean results/ground_steel-study
+    """
+    from roughvisc.study.storage.tidy import tidy
+
+    removed = tidy(results, everything=everything)
+    for path in removed:
+        click.echo(printable(f"removed {path.name}"))
+    click.echo(f"{counted(len(removed), 'leftover')} removed")

@@ -1,0 +1,1 @@
+"""A profile that slides at constant speed on a viscoelastic body, in its steady state. Arrays only."""

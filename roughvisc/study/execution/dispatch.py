@@ -1,0 +1,270 @@
+"""Cases on the workers of a Dask client: one future each, submitted anew where its worker was lost."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import logging
+import secrets
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from distributed import CancelledError, Client, KilledWorker, as_completed
+
+from roughvisc import errors
+from roughvisc.errors import DiskFullError, RoughviscError
+from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.study.execution.baggage import INPUTS, pack
+from roughvisc.study.execution.book import Book
+from roughvisc.study.execution.task import Outcome, Progress, Report, on_worker, stop_sweep
+from roughvisc.study.execution.watch import Silence, watcher
+from roughvisc.study.statement.case import Case
+
+log = logging.getLogger("roughvisc")
+
+#: A case is given up for now when its worker was lost so often while it computed it, and it came no further.
+_LOSSES = 2
+#: Coming further is to pass the furthest point so far by this part of the program.
+_FURTHER = 0.01
+#: Whatever is known of a case, it is submitted no more often than this.
+_SUBMISSIONS = 20
+#: A worker that was lost may hold the lock of its case for so long. [s]
+_LINGERING = 90.0
+#: Seconds that running cases get to reach the end of their step when a sweep is interrupted.
+_PATIENCE = 120.0
+#: Without any worker for so long, the user is told; and so often it is looked. [s]
+_ALONE_AFTER, _LOOK_EVERY = 30.0, 5.0
+
+
+@dataclass
+class _Course:
+    """What is known of a case on its way.
+
+    Attributes
+    ----------
+    submissions : int
+        How often it was submitted.
+    begun : int
+        How often a worker began with it.
+    tries : int
+        The same, since it last came further.
+    furthest : float
+        Part of the program that was computed at most.
+    worker : str
+        Address of the worker that began with it last.
+    refused : float or None
+        When it was first found locked by a worker that was lost. [s]
+    """
+
+    submissions: int = 0
+    begun: int = 0
+    tries: int = 0
+    furthest: float = 0.0
+    worker: str = ""
+    refused: float | None = None
+
+    def heard(self, report: Report) -> None:
+        """A worker reports."""
+        if not report["end"]:
+            self.begun, self.tries, self.worker = self.begun + 1, self.tries + 1, report["worker"]
+        elif (reached := report["now"] / report["end"]) > self.furthest + _FURTHER:
+            self.furthest, self.tries = reached, 1
+
+    def is_lingering(self) -> bool:
+        """Whether the worker that was lost may be what locks the case."""
+        self.refused = self.refused or time.monotonic()
+        return self.begun > 1 and time.monotonic() - self.refused < _LINGERING
+
+
+@dataclass
+class _Dispatch:
+    """Cases on their way to their ends."""
+
+    client: Client
+    book: Book
+    texts: Mapping[str, str]
+    arguments: tuple[Any, ...]
+    name: str
+    finished: Any
+    courses: dict[str, _Course]
+    futures: dict[Any, str] = field(default_factory=dict)
+
+    def submit(self, key: str) -> None:
+        course = self.courses[key]
+        course.submissions += 1
+        name = f"{self.name}-{key}-{course.submissions}"
+        future = self.client.submit(on_worker, self.texts[key], key, *self.arguments, key=name, pure=False)
+        self.futures[future] = key
+        self.finished.add(future)
+
+    def heard(self, event: tuple[float, Report]) -> None:
+        report = event[1]
+        self.courses[report["key"]].heard(report)
+        self.book.watch.reached(report["key"], report["now"], report["end"])
+
+    def take(self, going_on: bool) -> None:
+        """Take up what has ended; submit anew, if the sweep goes on, what a lost worker has left behind."""
+        for future, result in self.finished.next_batch(block=False):
+            key = self.futures.pop(future)
+            outcome = _outcome(key, result, self.courses[key])
+            if outcome.kind != "interrupted":
+                self.book.ended(outcome)
+            elif going_on:
+                log.info("%s: goes on on another worker", key)
+                self.submit(key)
+
+
+def distribute(
+    texts: Mapping[str, str], book: Book, client: Client, threads: int | None, link: str, same_bits: bool
+) -> None:
+    """Bring cases to their ends on the workers of a client.
+
+    Parameters
+    ----------
+    texts : dict
+        Key -> case as JSON.
+    book : Book
+        Keeps account; its folder is that of the results.
+    client : distributed.Client
+        Of the workers.
+    threads : int or None
+        Of the transforms; None: as many as a worker has.
+    link : str
+        Address of Dask's dashboard, if there is one.
+    same_bits : bool
+        As in :func:`roughvisc.study.execution.run.run_case`.
+
+    Raises
+    ------
+    RoughviscError
+        If the scheduler was lost.
+    KeyboardInterrupt, SystemExit
+        If interrupted; the running cases have written a checkpoint by then, if their workers are there.
+    """
+    name = f"roughvisc-{secrets.token_hex(4)}"
+    finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
+    courses = {key: _Course() for key in texts}
+    transforms = transform_library() if same_bits else ""
+    cases = _Dispatch(client, book, texts, (str(book.folder), name, threads, transforms), name, finished, courses)
+    client.subscribe_topic(name, cases.heard)
+    try:
+        book.begin(link)
+        for key in texts:
+            cases.submit(key)
+        try:
+            _go_on(cases)
+        except (KeyboardInterrupt, SystemExit, DiskFullError):  # dask-jobqueue makes a Ctrl-C a SystemExit
+            book.watch.stopping()
+            _stop(cases)
+            raise
+    finally:
+        with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be gone
+            client.unsubscribe_topic(name)
+
+
+def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, same_bits: bool) -> Path:
+    """Bring one case to its file on a worker, and give the file's path.
+
+    Raises
+    ------
+    RoughviscError
+        As :func:`roughvisc.study.execution.run.run_case`; what else went wrong there is one, too.
+    """
+    watch = _Heard(progress) if callable(progress) else watcher(progress)
+    book = Book(folder, {case.key: case}, {}, watch, [])
+    try:
+        distribute({case.key: pack(case, folder / INPUTS)}, book, client, None, client.dashboard_link, same_bits)
+    finally:
+        watch.close()
+    outcome = book.outcomes[case.key]
+    if outcome.entry is None:
+        kind = getattr(errors, outcome.error, RoughviscError)
+        raise kind(outcome.message)
+    return folder / outcome.entry.file
+
+
+class _Heard(Silence):
+    """Passes the times reached on to a function."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+
+    def reached(self, key: str, now: float, end: float) -> None:
+        if end:
+            self._progress(now, end)
+
+
+def _go_on(cases: _Dispatch) -> None:
+    """Take up what ends, until nothing is left; say it if no worker is."""
+    looked = seen = time.monotonic()
+    said = False
+    while cases.futures:
+        cases.take(going_on=True)
+        cases.book.watch.tick()
+        time.sleep(0.1)
+        if time.monotonic() - looked < _LOOK_EVERY:
+            continue
+        looked = time.monotonic()
+        if _workers(cases.client):
+            seen, said = looked, False
+        elif looked - seen >= _ALONE_AFTER and not said:
+            said = True
+            cases.book.tell(
+                f"the cluster has had no worker for {looked - seen:.0f} s ({len(cases.futures)} cases to go): start "
+                "workers (dask worker), or see whether their jobs still queue (squeue); the cases go on as soon as "
+                "one is there. Ctrl-C ends the sweep: what was computed is kept, and the same command goes on"
+            )
+
+
+def _stop(cases: _Dispatch) -> None:
+    """Have the running cases stop at the end of their step, and wait for those whose workers are there."""
+    client = cases.client
+
+    def tell() -> None:
+        with suppress(OSError, RuntimeError, ValueError):  # a worker that does not answer holds up nothing
+            client.run(stop_sweep, cases.name, on_error="ignore")
+
+    threading.Thread(target=tell, daemon=True).start()
+    until = time.monotonic() + _PATIENCE
+    with suppress(RoughviscError):  # the scheduler is gone, and they with it; or the disk is full for another one too
+        while time.monotonic() < until:
+            cases.take(going_on=False)
+            there = _workers(client)
+            if not any(cases.courses[key].worker in there for key in cases.futures.values()):
+                break
+            cases.book.watch.tick()
+            time.sleep(0.1)
+    client.cancel(list(cases.futures))
+
+
+def _workers(client: Client) -> set[str]:
+    """Addresses of the workers that the scheduler knows."""
+    return set(client.scheduler_info()["workers"])
+
+
+def _outcome(key: str, result: Any, course: _Course) -> Outcome:
+    """What a future came to; ``interrupted`` is a case that another worker should go on with."""
+    if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
+        result = result[1]
+    again = course.submissions < _SUBMISSIONS
+    if isinstance(result, Outcome):
+        lingers = result.error == "InUseError" and course.is_lingering()
+        return Outcome(key, "interrupted") if lingers else result
+    if isinstance(result, KilledWorker):
+        if course.tries < _LOSSES and again:  # it merely queued there, or had come further
+            return Outcome(key, "interrupted")
+        return Outcome(
+            key,
+            "hindered",
+            f"the worker that computed it was lost {course.tries} times, the last at {result.last_worker.address}: "
+            "killed, out of memory (roughvisc plan says how much a case needs), or out of its time; the same command "
+            "goes on from the last checkpoint",
+            "KilledWorker",
+        )
+    if isinstance(result, CancelledError | concurrent.futures.CancelledError):
+        raise RoughviscError("the scheduler was lost: what was finished is kept, and the same command goes on")
+    return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)

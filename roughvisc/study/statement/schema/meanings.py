@@ -1,0 +1,64 @@
+"""What each key of a study file means: ``keys.toml`` beside this file, for the schema and for its page."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from roughvisc.study.statement.schema.program import KINDS, RECORDINGS
+from roughvisc.study.statement.schema.surface import RECIPES
+
+_STEPS = ("surface: steps of a face", "surface: steps of the profile")
+_RECIPES = {name: (f"generate: {name}", "generate: any", *_STEPS) for name in RECIPES}
+#: class of a table of a study -> tables of ``keys.toml`` that say what its keys mean, the first that does counts; the
+#: class of a material has the name of its model.
+_TABLES = {
+    "FileSurface": ("surface: a file", *_STEPS),
+    "SecondFile": ("surface.second", "surface: a file", *_STEPS),
+    **_RECIPES,
+    **{f"second_{name}": ("surface.second", *tables) for name, tables in _RECIPES.items()},
+    **{one.__name__: (f"program: {kind}",) for kind, sections in KINDS.items() for one in sections.values()},
+    **{f"{control.capitalize()}Wave": ("program.cycle",) for control in RECORDINGS},
+    "Crop": ("surface.crop",),
+    "SolveSection": ("solve",),
+    "KeepSection": ("keep",),
+}
+
+
+@cache
+def meanings() -> dict[str, dict[str, Any]]:
+    """Table -> key -> meaning and example."""
+    return tomllib.loads(files(__package__).joinpath("keys.toml").read_text(encoding="utf-8"))
+
+
+def meaning(tables: Sequence[str], key: str) -> list[str]:
+    """Meaning and example of a key in the first of some tables that has it.
+
+    Raises
+    ------
+    KeyError
+        If none has.
+    """
+    for table in tables:
+        if key in meanings().get(table, {}):
+            return list(meanings()[table][key])
+    raise KeyError(f"keys.toml: [{tables[0]!r}] has no {key}: expected its meaning and an example")
+
+
+def with_meanings(schema: dict[str, Any]) -> dict[str, Any]:
+    """A JSON schema whose descriptions say what a key means, before what is expected of it."""
+    _describe(schema["properties"], ("study",))
+    for name, section in schema["$defs"].items():
+        of_material = (f"material: {name}", "material: any", "material: temperature", "material: thickness")
+        _describe(section["properties"], _TABLES.get(name, of_material))
+    return schema
+
+
+def _describe(properties: dict[str, Any], tables: Sequence[str]) -> None:
+    for key, one in properties.items():
+        about = re.sub(r"[$\\]", "", meaning(tables, key)[0])  # formulas as plain letters
+        one["description"] = f"{about}; {one['description']}" if "description" in one else about

@@ -1,0 +1,58 @@
+"""NetCDF files as xarray Datasets in any thread: no file stays open, and none is touched outside netCDF's lock.
+
+xarray's own engine reads under that lock, but opens and closes files outside it, and netCDF-4 does not stand that.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray, BackendEntrypoint
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
+from xarray.core import indexing
+
+
+class ResultBackend(BackendEntrypoint):
+    """Fields over x and y are read when they are asked for, all else at once."""
+
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
+        """As xarray's engine ``netcdf4`` opens it, durations as plain numbers."""
+        path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
+            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+        decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
+        return decoded.drop_vars(drop_variables or (), errors="ignore")
+
+
+def _variable(path: str, stored: netCDF4.Variable) -> xr.Variable:
+    attributes = {name: stored.getncattr(name) for name in stored.ncattrs()}
+    lazily = stored.dimensions[-2:] == ("x", "y")
+    data = indexing.LazilyIndexedArray(_Field(path, stored)) if lazily else np.asarray(stored[...])
+    filters = stored.filters() or {}
+    encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
+    chunks = stored.chunking()
+    encoding |= {"contiguous": True} if chunks == "contiguous" else {"chunksizes": tuple(chunks or ())}
+    return xr.Variable(stored.dimensions, data, attributes, encoding)
+
+
+class _Field(BackendArray):
+    """A variable whose file is opened each time: it pickles, and may be read in threads and processes."""
+
+    def __init__(self, path: str, stored: netCDF4.Variable) -> None:
+        self.path, self.name = path, stored.name
+        self.shape, self.dtype = stored.shape, stored.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        with NETCDF, netCDF4.Dataset(self.path) as file:
+            file.set_auto_maskandscale(False)
+            return np.asarray(file[self.name][key])

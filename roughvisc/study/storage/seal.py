@@ -1,0 +1,105 @@
+"""Seals: length and checksum of a file's content, behind its last byte.
+
+Readers of HDF5 and of zip files take no notice of what follows their content. So a seal needs no other file, travels
+with every copy, and covers all bytes: values, attributes, and the structures by which a library finds them.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from functools import lru_cache
+from pathlib import Path
+from typing import IO
+
+# At 256 x 256 x 50 frames, two fields, 59 MB: written in 75 ms, sealed in 15 ms, looked at in 15 ms. SHA-256 would take
+# 37 ms each. A checksum a chunk (fletcher32) would take 30 ms each, and leave out attributes, small variables and the
+# index of the chunks, where a wrong bit turns values into zeros that no checksum knows of.
+_SEAL = struct.Struct("<8sQII")  # mark, length and checksum of the content, checksum of these
+_MARK = b"rvseal1\n"
+_AT_ONCE = 1 << 20
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+#: Version of an HDF5 superblock -> where it states the end of the content.
+_END_STATED = {0: 40, 1: 44, 2: 28, 3: 28}
+
+
+def seal(path: Path) -> None:
+    """Put a seal behind the content of a file that is written."""
+    with open(path, "rb+") as stream:
+        length = os.fstat(stream.fileno()).st_size
+        head = _SEAL.pack(_MARK, length, _checksum(stream, length), 0)[:-4]
+        stream.seek(length)
+        stream.write(head + zlib.crc32(head).to_bytes(4, "little"))
+
+
+def unsealed(path: Path) -> bytes | None:
+    """Content of a small sealed file; None if it is not as it was written."""
+    content = path.read_bytes()
+    sealed = _read_seal(content[-_SEAL.size :])
+    content = content[: -_SEAL.size]
+    return content if sealed == (len(content), zlib.crc32(content)) else None
+
+
+def flaw(path: Path, *, again: bool = False) -> str:
+    """What is wrong with the bytes of a file of HDF5; empty if nothing, or if the file has no seal.
+
+    Files of earlier versions have none, and one that another program has changed has lost it.
+
+    Parameters
+    ----------
+    path : path
+        A file that exists.
+    again : bool
+        Read it even if this process has done so and it looks unchanged since.
+    """
+    if again:
+        _flaw.cache_clear()
+    found = path.stat()
+    return _flaw(path.absolute(), (found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns))
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file ends with a seal, whatever that says."""
+    with open(path, "rb") as stream:
+        stream.seek(max(os.fstat(stream.fileno()).st_size - _SEAL.size, 0))
+        return _read_seal(stream.read(_SEAL.size)) is not None
+
+
+@lru_cache(maxsize=4096)
+def _flaw(path: Path, stamp: tuple[int, ...]) -> str:
+    with open(path, "rb") as stream:
+        size = os.fstat(stream.fileno()).st_size
+        stated = _stated_end(stream.read(52))
+        stream.seek(max(size - _SEAL.size, 0))
+        sealed = _read_seal(stream.read(_SEAL.size))
+        if sealed is None:
+            return "" if stated is None or size <= stated else "its last bytes are not those that were written"
+        length, checksum = sealed
+        if length != size - _SEAL.size:
+            return f"it holds {size - _SEAL.size} bytes where {length} were written"
+        stream.seek(0)
+        return "" if _checksum(stream, length) == checksum else "its bytes are not those that were written"
+
+
+def _stated_end(head: bytes) -> int | None:
+    """Where the content of an HDF5 file ends, as its first bytes say; None if they do not."""
+    if len(head) < 52 or not head.startswith(_HDF5) or (at := _END_STATED.get(head[8])) is None:
+        return None
+    return int.from_bytes(head[at : at + 8], "little")
+
+
+def _read_seal(found: bytes) -> tuple[int, int] | None:
+    """Length and checksum that a seal states; None if these bytes are none."""
+    if len(found) < _SEAL.size or zlib.crc32(found[:-4]) != int.from_bytes(found[-4:], "little"):
+        return None
+    mark, length, checksum, _ = _SEAL.unpack(found)
+    return (length, checksum) if mark == _MARK else None
+
+
+def _checksum(stream: IO[bytes], length: int) -> int:
+    checksum = 0
+    while length and (part := stream.read(min(length, _AT_ONCE))):
+        checksum = zlib.crc32(part, checksum)
+        length -= len(part)
+    return checksum

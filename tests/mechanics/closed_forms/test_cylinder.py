@@ -1,0 +1,55 @@
+"""The sliding cylinder: its limits, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.mechanics.closed_forms import sliding_cylinder
+
+RADIUS, LOAD, TIME = 1e-2, 100.0, 1e-3
+RUBBER = rv.zener(1e6, 0.5e6, 0.5e6 * TIME, poisson=0.4)
+AT_ONCE, IN_THE_END = 0.3e-6, 0.9e-6
+
+
+@pytest.mark.parametrize(("speed", "compliance"), [(1e-5, IN_THE_END), (1e6, AT_ONCE)], ids=["slow", "fast"])
+def test_ends_of_the_speed_axis__are_those_of_hertz(speed, compliance):
+    found = sliding_cylinder(RADIUS, RUBBER, LOAD, speed)
+    assert found.load == pytest.approx(LOAD, rel=1e-12)
+    assert found.half_width == pytest.approx(math.sqrt(4 * RADIUS * LOAD * compliance / math.pi), rel=1e-5)
+
+
+def test_slow_sliding__loses_the_first_order_in_the_speed():
+    """With q = C p + C1 V tau p' in place of the memory the moment of p about the axis is C1 V tau W / C."""
+    for speed in (1e-5, 1e-4):
+        exact = (IN_THE_END - AT_ONCE) / IN_THE_END * speed * TIME / RADIUS
+        assert sliding_cylinder(RADIUS, RUBBER, LOAD, speed).friction_coefficient == pytest.approx(exact, rel=1e-3)
+
+
+def test_friction__has_one_maximum_where_the_contact_is_as_long_as_the_memory():
+    speeds = np.geomspace(1e-3, 1e3, 40)
+    found = [sliding_cylinder(RADIUS, RUBBER, LOAD, speed) for speed in speeds]
+    friction = np.array([one.friction_coefficient for one in found])
+    most = int(friction.argmax())
+    assert (np.diff(friction[: most + 1]) > 0).all()
+    assert (np.diff(friction[most:]) < 0).all()
+    assert 0.3 < speeds[most] * TIME / found[most].half_width < 3
+    assert (np.diff([one.half_width for one in found]) < 0).all()
+    assert all(one.offset > 0 for one in found), "the contact is ahead of the axis"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"radius": 0.0}, r"radius is 0\.0"),
+        ({"load": -1.0}, r"load is -1\.0"),
+        ({"speed": math.inf}, "speed is inf"),
+        ({"material": rv.maxwell(1e6, 1e3)}, "expected a solid of one retardation time"),
+        ({"material": rv.elastic(1e6)}, "expected a solid of one retardation time"),
+        ({"material": rv.kelvin_voigt(1e6, 1e3)}, "compliant at once"),
+    ],
+)
+def test_sliding_cylinder__refuses(settings, message):
+    with pytest.raises(rv.InputError, match=message):
+        sliding_cylinder(**{"radius": RADIUS, "material": RUBBER, "load": LOAD, "speed": 1.0, **settings})

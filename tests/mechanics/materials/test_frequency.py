@@ -1,0 +1,74 @@
+"""Complex compliance: against the relaxation spectrum, a numerical Fourier integral, and the series of a table."""
+
+import mpmath
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.frequency import complex_compliance
+
+FREQUENCIES = np.array([-30.0, -1.0, 0.01, 0.7, 100.0])
+
+
+@pytest.mark.parametrize("poisson", [0.5, 0.3])
+def test_series__is_the_inverse_of_its_complex_modulus(poisson):
+    """G* = G_e + sum G_k i w theta_k / (1 + i w theta_k) is what dynamic tests measure."""
+    material = rv.from_relaxation(1e6, [4e6, 2e6], [0.02, 3.0], poisson)
+    w = 1j * FREQUENCIES
+    modulus = 1e6 + 4e6 * w * 0.02 / (1 + w * 0.02) + 2e6 * w * 3.0 / (1 + w * 3.0)
+    np.testing.assert_allclose(complex_compliance(material, FREQUENCIES), (1 - poisson) / 2 / modulus, rtol=1e-10)
+    assert complex_compliance(material, 0.0) == pytest.approx((1 - poisson) / 2 / 1e6)
+
+
+def test_fluid__flows_without_end_at_zero_frequency():
+    w = np.array([0.0, 2.0])
+    found = complex_compliance(rv.maxwell(2.0, 3.0), w)
+    assert np.isinf(found[0])
+    assert found[1] == pytest.approx(0.25 * (1 / 2 + 1 / (3j * 2)))
+
+
+def test_power_law__is_the_transform_of_its_creep():
+    """C*(w) = i w int_0^inf C(t) exp(-i w t) dt, with the path turned to where the integrand dies."""
+    material, w = rv.PowerLaw(0.5, 2.0, 0.3, time_scale=0.1, poisson=0.4), 1.7
+    creep = mpmath.quad(lambda s: (mpmath.mpf(s) / (mpmath.mpc(0, w) * 0.1)) ** 0.3 * mpmath.exp(-s), [0, 1, 50])
+    expected = 0.3 * (0.5 + 2.0 * complex(creep))
+    np.testing.assert_allclose(complex_compliance(material, [w, -w]), [expected, np.conj(expected)], rtol=1e-9)
+    assert np.isinf(complex_compliance(material, 0.0))
+
+
+def test_table_and_own_material__come_near_the_series_that_they_sample():
+    exact = rv.zener(1.0, 0.5, 0.5)
+    t = np.geomspace(1e-6, 1e6, 1200)
+    table = rv.Tabulated(tuple(t), tuple(exact.creep_compliance(t)))
+    w = np.array([0.0, 0.1, 1.0, 20.0])
+    np.testing.assert_allclose(complex_compliance(table, w), complex_compliance(exact, w), rtol=2e-3)
+
+    class Own:
+        def contact_compliance(self, t):
+            return exact.contact_compliance(t)
+
+        def contact_integral(self, t):
+            return exact.contact_integral(t)
+
+    np.testing.assert_allclose(complex_compliance(Own(), w), complex_compliance(exact, w), rtol=2e-3)
+
+
+def test_pair__adds_both():
+    a, b = rv.PowerLaw(0.5, 2.0, 0.3), rv.zener(1.0, 1.0, 1.0)
+    np.testing.assert_allclose(
+        complex_compliance(rv.pair(a, b), FREQUENCIES),
+        complex_compliance(a, FREQUENCIES) + complex_compliance(b, FREQUENCIES),
+    )
+
+
+def test_shift__multiplies_the_frequency():
+    for material in (rv.zener(1.0, 1.0, 1.0), rv.PowerLaw(0.5, 2.0, 0.3)):
+        shifted = complex_compliance(rv.shifted(material, 7.0), FREQUENCIES)
+        np.testing.assert_allclose(shifted, complex_compliance(material, 7.0 * FREQUENCIES), rtol=1e-12)
+
+
+def test_zero_frequency_alone__of_a_table_is_refused():
+    table = rv.Tabulated((0.1, 1.0), (1.0, 1.1))
+    with pytest.raises(InputError, match="frequency is zero throughout"):
+        complex_compliance(table, 0.0)

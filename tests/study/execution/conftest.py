@@ -1,0 +1,56 @@
+"""Studies in folders of their own, and a cluster that was started by hand."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+from support import BALL, LOADS
+
+from roughvisc.study.execution.cluster import connect
+from roughvisc.study.statement.case import read_cases
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study into a folder of its own and reads its cases."""
+
+    def write(text=BALL + LOADS, name="ball"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        return read_cases(path)
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def by_hand(tmp_path_factory):
+    """Scheduler and two workers, each started by hand as a process of its own; gives the scheduler's file."""
+    folder = tmp_path_factory.mktemp("cluster")
+    file = folder / "scheduler.json"
+    environment = os.environ | {
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
+    }
+    dask = [sys.executable, "-m", "dask"]
+    commands = [
+        [*dask, "scheduler", "--scheduler-file", file, "--host", "127.0.0.1", "--port", "0", "--no-dashboard"],
+        *[[*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"]] * 2,
+    ]
+    log = (folder / "log").open("w")
+    started = [
+        subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log, start_new_session=True)
+        for command in commands
+    ]
+    until = time.monotonic() + 60
+    while not file.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    with connect(file=file) as client:
+        client.wait_for_workers(2, timeout=60)
+    yield file
+    for process in reversed(started):
+        process.terminate()
+    for process in started:
+        process.wait(30)
+    log.close()

@@ -1,0 +1,127 @@
+"""A case's key, the checksum in its result and the heights that were pressed are those of the same bytes."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL
+
+from roughvisc.errors import ChangedError, InputError, RoughviscError
+from roughvisc.study.execution import run as run_module
+from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.single import run
+from roughvisc.study.execution.sweep import run_cases, sweep
+from roughvisc.study.execution.watch import Silence
+from roughvisc.study.statement.case import Case, read_cases, read_study
+from roughvisc.study.storage.failures import record_path
+from roughvisc.topography import readers
+from roughvisc.topography.scans import open_scan
+
+SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'
+STUDY = BALL[: BALL.index("generate")] + SCAN + BALL[BALL.index("level") :]
+TWO_LOADS = STUDY + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
+
+
+def bump(path, height):
+    """A paraboloid, higher or lower."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 12), np.linspace(-1, 1, 9), indexing="ij")
+    np.save(path, -height * (x**2 + y**2))
+    return path
+
+
+@pytest.fixture
+def scan(tmp_path):
+    return bump(tmp_path / "scan.npy", 1e-5)
+
+
+@pytest.fixture
+def study(tmp_path, scan):
+    path = tmp_path / "bump.toml"
+    path.write_text(TWO_LOADS)
+    return path
+
+
+def after_the_first(monkeypatch, change):
+    """Changes something when the first case has been computed."""
+    press, pressed = run_module.press, []
+
+    def pressing(*args, **settings):
+        ds = press(*args, **settings)
+        if not pressed:
+            change()
+        pressed.append(1)
+        return ds
+
+    monkeypatch.setattr(run_module, "press", pressing)
+    return pressed
+
+
+def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan, tmp_path, monkeypatch):
+    before = hashlib.sha256(scan.read_bytes()).hexdigest()
+    cases = read_cases(study)
+    pressed = after_the_first(monkeypatch, lambda: bump(scan, 2e-5))
+    outcomes = list(run_cases(cases, tmp_path / "out", watch=Silence(), workers=0).values())
+    assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
+    assert len(pressed) == 1
+    assert f"{scan}: was changed after the study was read" in outcomes[1].message
+    assert outcomes[0].entry.attributes["surface_sha256"] == before, "of what was pressed, not of what lies there now"
+    assert [path.name for path in (tmp_path / "out").glob("*.nc")] == [f"{cases[0].key}.nc"]
+    assert not record_path(tmp_path / "out", cases[1].key).exists()
+    again = sweep(study, tmp_path / "out", workers=0, progress=False)
+    assert set(again.case_key.values).isdisjoint(case.key for case in cases)
+    xr.testing.assert_equal(
+        again.drop_vars("wall_time"), sweep(study, tmp_path / "fresh", workers=0, progress=False).drop_vars("wall_time")
+    )
+
+
+def test_sweep__a_scan_that_is_gone_for_a_while_fails_no_case(study, scan, tmp_path, monkeypatch):
+    cases = read_cases(study)
+    content = scan.read_bytes()
+    after_the_first(monkeypatch, lambda: scan.write_bytes(content[: len(content) // 2]))
+    outcomes = list(run_cases(cases, tmp_path / "out", watch=Silence(), workers=0).values())
+    assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
+    scan.write_bytes(content)
+    assert sweep(study, tmp_path / "out", workers=0, progress=False).sizes["case"] == 2
+
+
+def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
+    study.write_text(STUDY)
+    case = read_study(study)
+    key = case.key
+    bump(scan, 2e-5)
+    with pytest.raises(ChangedError, match=r"bump\.toml: surface: .*scan\.npy: was changed after the study was read"):
+        run(case, tmp_path / "out", progress=False)
+    assert not (tmp_path / "out").exists()
+    assert read_study(study).key != key
+
+
+def test_open_scan__a_file_that_changes_while_it_is_read(scan, monkeypatch):
+    plausible = readers._from_instrument
+
+    def slow(*args):
+        found = plausible(*args)
+        bump(scan, 2e-5)
+        return found
+
+    monkeypatch.setattr(readers, "_from_instrument", slow)
+    with pytest.raises(InputError, match=r"scan\.npy: was changed while it was read"):
+        open_scan(scan, unit="m", spacing=4e-5)
+
+
+def test_pack__a_copy_is_what_was_asked_for(study, scan, tmp_path):
+    case = read_cases(study)[0]
+    packed = Case.from_json(pack(case, tmp_path / "inputs"))
+    copy = type(scan)(json.loads(packed.to_json())["surface"]["file"])
+    assert packed.key == case.key
+    copy.write_bytes(b"damaged")
+    assert Case.from_json(pack(case, tmp_path / "inputs")).key == case.key
+    assert copy.read_bytes() == scan.read_bytes()
+
+
+def test_pack__a_file_that_changes_while_it_is_copied(study, scan, tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.copyfile", lambda _, to: bump(to.open("wb"), 3e-5).close())
+    with pytest.raises(RoughviscError, match=r"scan\.npy: was changed while it was copied"):
+        pack(read_cases(study)[0], tmp_path / "inputs")
+    assert not [path for path in (tmp_path / "inputs").rglob("*") if path.is_file()]

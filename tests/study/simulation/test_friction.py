@@ -1,0 +1,164 @@
+"""``rv.friction``: labels, directions, bodies, and what is refused."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.variables import SLIDING, STATUS_MEANINGS
+
+ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
+RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
+PRESS = {"pressure": 2e4, "speeds": [0.2, 2e-3, 20.0]}
+
+
+@pytest.fixture(scope="module")
+def curve():
+    return rv.friction(ROUGH, RUBBER, **PRESS, fields=("pressure", "gap"))
+
+
+def test_dataset__is_labelled_and_in_the_order_given(curve):
+    assert curve.speed.values.tolist() == [0.2, 2e-3, 20.0]
+    assert set(curve.variables) <= set(SLIDING)
+    for name, variable in curve.variables.items():
+        assert variable.attrs["long_name"] == SLIDING[name].long_name
+    assert curve.pressure.dims == ("speed", "x", "y")
+    assert curve.friction_coefficient.attrs["units"] == "1"
+    assert curve.status.attrs["flag_meanings"].split()[0] == "converged"
+    assert (curve.status == 0).all()
+    assert curve.attrs["direction"] == "x"
+    assert "No shear at the interface" in curve.attrs["model_note"]
+    assert float(curve.friction_coefficient[0]) == float(curve.friction_coefficient.max())
+
+
+def test_dataset__agrees_with_itself(curve):
+    area = 1e-3 * 0.8e-3
+    np.testing.assert_allclose(curve.force, 2e4 * area)
+    np.testing.assert_allclose(curve.nominal_pressure, 2e4)
+    np.testing.assert_allclose(curve.pressure.mean(("x", "y")), 2e4, rtol=1e-12)
+    np.testing.assert_allclose(curve.friction_coefficient * curve.force, curve.friction_force)
+    np.testing.assert_allclose(curve.dissipated_power, curve.friction_force * curve.speed)
+    np.testing.assert_allclose(curve.contact_fraction, (curve.pressure > 0).mean(("x", "y")))
+    np.testing.assert_allclose(curve.mean_gap, curve.gap.mean(("x", "y")))
+    assert ((curve.pressure == 0) | (curve.gap == 0)).all()
+    assert float(abs(curve.slope_friction_force / curve.friction_force - 1)[0]) < 0.1
+    assert (curve.contact_area_corrected < curve.contact_area).all()
+
+
+def test_area__shrinks_as_the_material_stiffens(curve):
+    ordered = curve.sortby("speed")
+    assert (np.diff(ordered.contact_area) < 0).all()
+
+
+def test_load_and_pressure__are_the_same(curve):
+    same = rv.friction(ROUGH, RUBBER, load=2e4 * 0.8e-6, speeds=[0.2, 2e-3, 20.0])
+    np.testing.assert_allclose(same.friction_coefficient, curve.friction_coefficient, rtol=1e-12)
+
+
+def test_directions__are_those_of_a_turned_surface():
+    """Along y as along x of the surface with its axes exchanged; against an axis as along it of the mirror image."""
+    one = {"pressure": 2e4, "speeds": 0.2, "fields": ("pressure",)}
+    along_y = rv.friction(ROUGH, RUBBER, **one, direction="y")
+    exchanged = rv.from_array(ROUGH.values.T, spacing=(0.8e-3 / 36, 1e-3 / 40))
+    along_x = rv.friction(exchanged, RUBBER, **one)
+    assert float(along_y.friction_coefficient[0]) == pytest.approx(float(along_x.friction_coefficient[0]), rel=1e-12)
+    np.testing.assert_allclose(along_y.pressure[0], along_x.pressure[0].T, rtol=1e-9)
+    against = rv.friction(ROUGH, RUBBER, **one, direction="-x")
+    mirrored = ROUGH.copy(data=ROUGH.values[::-1])
+    image = rv.friction(mirrored, RUBBER, **one)
+    assert float(against.friction_coefficient[0]) == pytest.approx(float(image.friction_coefficient[0]), rel=1e-12)
+    np.testing.assert_allclose(against.pressure[0], image.pressure[0].values[::-1], rtol=1e-9)
+    assert float(against.friction_coefficient[0]) > 0
+
+
+def test_temperature__shifts_the_speed(curve):
+    warm = rv.friction(ROUGH, rv.shifted(RUBBER, 0.01), pressure=2e4, speeds=20.0)
+    assert float(warm.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
+
+
+def test_sheet__rubs_less_as_it_is_thinner(curve):
+    thin = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=0.2, thickness=2e-5)
+    assert (thin.attrs["thickness"], thin.attrs["base"]) == (2e-5, "bonded")
+    assert float(thin.contact_area[0]) < 0.9 * float(curve.contact_area[0])
+    thick = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=0.2, thickness=1e-2)
+    assert float(thick.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
+
+
+def test_persson__is_that_of_the_surface_as_it_slides(curve):
+    """In full contact the theory is exact, whichever the direction; in partial contact its area is not far off."""
+    pressed = {"pressure": 1e7, "speeds": [0.02, 0.2], "tolerance": 1e-6}
+    for direction in ("x", "-y"):
+        full = rv.friction(ROUGH, RUBBER, **pressed, direction=direction)
+        assert (full.status == STATUS_MEANINGS.index("full_contact")).all()
+        np.testing.assert_allclose(full.persson_friction_coefficient, full.friction_coefficient, rtol=1e-5)
+    np.testing.assert_allclose(curve.persson_contact_fraction, curve.contact_fraction, rtol=0.5)
+
+
+def test_last_octave__is_the_change_from_a_surface_without_it():
+    """Two waves: the shorter is what is left out; in full contact each has the friction of its own."""
+    x, k = (np.arange(63) + 0.5) / 63 * 1e-3, 2 * np.pi / 1e-3
+    both = 1e-6 * (np.cos(k * x) + 0.4 * np.cos(5 * k * x + 1))
+    long, two = (rv.from_array(np.repeat(z[:, None], 3, 1), spacing=1e-3 / 63) for z in (1e-6 * np.cos(k * x), both))
+    press = {"pressure": 1e6, "speeds": [0.02, 0.2], "tolerance": 1e-6}
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
+    exact = 1 - less.friction_coefficient / found.friction_coefficient
+    assert (exact > 0.2).all()
+    np.testing.assert_allclose(found.last_octave_friction, exact, rtol=1e-6)
+    np.testing.assert_allclose(found.last_octave_area, 0, atol=1e-12)
+    assert found.attrs["last_octave"] == "waves shorter than 0.0004 m"
+    assert "last_octave" not in less.attrs
+    assert set(found.variables) <= set(SLIDING)
+    press["pressure"] = 1e3
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
+    np.testing.assert_allclose(
+        found.last_octave_area, 1 - less.contact_area_corrected / found.contact_area_corrected, rtol=1e-9
+    )
+    assert (found.last_octave_area < -0.1).all(), "finer roughness takes area away"
+    with pytest.raises(rv.InputError, match="no waves beyond its shortest octave"):
+        rv.friction(long, RUBBER, **press, last_octave=True)
+
+
+def test_last_octave__of_a_body_without_friction_is_not_known():
+    found = rv.friction(ROUGH, rv.elastic(1e6), pressure=2e4, speeds=0.2, last_octave=True)
+    assert np.isnan(found.last_octave_friction).all()
+
+
+def test_measured_material__by_its_series(curve):
+    t = np.geomspace(1e-9, 1e4, 1400)
+    table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
+    found = rv.friction(ROUGH, table, **PRESS)
+    # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
+    np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
+
+
+def test_seam__is_told():
+    tilted = ROUGH.copy(data=ROUGH.values + 1e-4 * np.arange(40)[:, None] / 40)
+    assert "repeats with a step" in rv.friction(tilted, RUBBER, pressure=2e3, speeds=1e-2).attrs["border_note"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"speeds": []}, r"speeds is \[\]: expected positive numbers"),
+        ({"speeds": [1.0, -1.0]}, "speeds is"),
+        ({"speeds": "fast"}, "speeds is 'fast'"),
+        ({"pressure": None}, "load is None and pressure is None: expected one of them"),
+        ({"load": 1.0}, "expected one of them"),
+        ({"pressure": 0.0}, r"pressure is 0\.0: expected a positive number"),
+        ({"direction": "z"}, "direction is 'z': expected 'x' or '-x' or 'y' or '-y'"),
+        ({"fields": ("displacement",)}, "fields holds 'displacement': expected some of pressure, gap"),
+        ({"tolerance": 2.0}, r"tolerance is 2\.0"),
+        ({"base": "bonded"}, "base is 'bonded' without a thickness"),
+    ],
+)
+def test_friction__refuses(settings, message):
+    with pytest.raises(rv.InputError, match=message):
+        rv.friction(ROUGH, RUBBER, **{**PRESS, **settings})
+
+
+def test_missing_points_and_fluids__are_refused():
+    with pytest.raises(rv.InputError, match="height is missing"):
+        rv.friction(ROUGH.where(ROUGH.x > 1e-4), RUBBER, **PRESS)
+    with pytest.raises(rv.InputError, match="expected a whole surface"):
+        rv.friction(rv.flat_punch(1e-4, 4e-4, 15), RUBBER, **PRESS)
+    with pytest.raises(rv.InputError, match="creeps without end"):
+        rv.friction(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)

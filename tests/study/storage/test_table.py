@@ -1,0 +1,106 @@
+"""The table of a sweep says of every case what was asked, how it ended and where it is."""
+
+import csv
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import BALL
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.execution.watch import Silence
+from roughvisc.study.statement.case import read_cases
+from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.table import CASES
+
+SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
+#: The last two touch the border of the grid, which counts as measured and does not grow.
+SWEEP = """
+[[sweep]]
+"program.0.load" = ["500 uN", "1 mN", 2, "3 N"]
+"solve.edge" = "error"
+"material.kelvin_viscosity" = [1e5, "0.2 MPa s", 1e5, 1e5]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a sweep of four cases, two of which fail."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "balls.toml").write_text(SMALL.replace('"A ball"', '"Bälle, größer"') + SWEEP, encoding="utf-8")
+    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=Silence())
+    return folder / "out"
+
+
+def test_table__says_what_the_results_say(folder):
+    table = rv.to_table(folder)
+    assert table.index.tolist() == [1, 2, 3, 4]
+    assert table.index.name == "case"
+    assert table["program.0.load [uN]"].tolist() == [500, 1000, 2e6, 3e6], "in the unit that the study states first"
+    assert table["material.kelvin_viscosity [MPa s]"].tolist() == [0.1, 0.2, 0.1, 0.1]
+    assert set(table["solve.edge"]) == {"error"}
+    assert table["status"].tolist() == ["converged", "converged", "failed", "failed"]
+    assert (table["message"].str.contains("border") == [False, False, True, True]).all()
+    for row in range(2):
+        with open_result(folder / table["file"].iloc[row]) as ds:
+            for heading, value in {
+                "time [s]": ds.time[-1],
+                "force [N]": ds.force[-1],
+                "approach [m]": ds.approach[-1],
+                "contact_area_corrected [m^2]": ds.contact_area_corrected[-1],
+                "contact_fraction": ds.contact_fraction[-1],
+                "mean_gap [m]": ds.mean_gap[-1],
+                "largest stated_error": ds.stated_error.max(),
+                "largest residual": ds.residual.max(),
+            }.items():
+                assert table[heading].iloc[row] == float(value), heading
+    assert table["force [N]"].iloc[2:].isna().all()
+    assert set(table["file"].iloc[2:]) == {""}
+
+
+def test_table__is_written_with_the_results(folder):
+    text = (folder / CASES).read_bytes()
+    assert text.startswith(b"\xef\xbb\xbf"), "the mark by which a spreadsheet knows UTF-8"
+    rows = list(csv.DictReader(text.decode("utf-8-sig").splitlines()))
+    assert [row["title"] for row in rows] == ["Bälle, größer"] * 4
+    assert [row["program.0.load [uN]"] for row in rows] == ["500", "1000", "2000000", "3000000"]
+    pd.testing.assert_frame_equal(
+        pd.read_csv(folder / CASES, index_col="case", nrows=2, keep_default_na=False),
+        rv.to_table(folder).iloc[:2],
+        rtol=1e-6,
+        check_dtype=False,
+    )
+
+
+def test_table__leaves_out_what_is_not_known(folder, tmp_path):
+    with pytest.raises(InputError, match="holds no results"):
+        rv.to_table(tmp_path)
+    (tmp_path / "one.toml").write_text(SMALL)
+    rv.run(rv.read_study(tmp_path / "one.toml"), out=tmp_path / "one", progress=False)
+    table = rv.to_table(tmp_path / "one")
+    assert table["title"].tolist() == ["A ball"]
+    assert not [name for name in table if name.startswith(("program", "material"))], "nothing was varied"
+
+
+def test_table__names_cases_that_were_not_reached(tmp_path):
+    class Stop(Silence):
+        def ended(self, outcome):
+            raise KeyboardInterrupt
+
+    (tmp_path / "balls.toml").write_text(SMALL + '[sweep]\n"program.0.load" = ["1 mN", "2 mN"]\n')
+    with pytest.raises(KeyboardInterrupt):
+        run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, watch=Stop())
+    written = pd.read_csv(tmp_path / "out" / CASES)
+    assert written["status"].tolist() == ["converged", "not computed"]
+    assert written["program.0.load [mN]"].tolist() == [1, 2]
+    assert len(rv.to_table(tmp_path / "out")) == 1
+
+
+def test_results__are_frames_of_pandas(folder):
+    results = rv.open_results(folder)
+    frame = results[["force", "contact_area_corrected"]].to_dataframe().reset_index()
+    assert len(frame) == 2 * 3
+    assert np.array_equal(frame["force"], results.force.values.ravel())
+    assert np.array_equal(frame["program.0.load"].unique(), [5e-4, 1e-3])

@@ -1,0 +1,102 @@
+"""Nothing stays behind: what a killed run left is removed, and what somebody needs is not."""
+
+import json
+import os
+import time
+
+import pytest
+from sample_results import hertz_creep
+from support import BALL
+
+from roughvisc.errors import InputError, InUseError
+from roughvisc.study.execution.sweep import sweep
+from roughvisc.study.statement.case import read_cases
+from roughvisc.study.storage.lock import STALE, held
+from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.tidy import tidy
+
+KEYS = [f"{i:016x}" for i in range(4)]
+
+
+def leave(folder, key, *, checkpoint=True):
+    """What a run of a case leaves that is killed at its worst moment."""
+    (folder / f".{key}.unfinished").mkdir(parents=True)
+    (folder / f".{key}.unfinished" / ("checkpoint.0" if checkpoint else "rows")).write_bytes(b"0")
+    (folder / f".{key}.lock").write_text(json.dumps({"host": os.uname().nodename, "pid": 1, "token": ""}))
+    (folder / f".{key}.1a2b3c4d.part.nc").write_bytes(b"0")
+    (folder / f".{key}.failed.1a2b3c4d.part.json").write_bytes(b"0")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A finished case, an unfinished one, one that has nothing to go on from, a failed one."""
+    out = tmp_path / "out"
+    for key in KEYS[:3]:
+        leave(out, key, checkpoint=key != KEYS[2])
+    write_result(hertz_creep((6, 5), 2).assign_attrs(case_key=KEYS[0]), out / f"{KEYS[0]}.nc")
+    (out / f"{KEYS[3]}.failed.json").write_text("{}")
+    (out / f"{KEYS[3]}.nc.damaged").write_bytes(b"0")
+    for name, age in (("..index.1a2b3c4d.part.npz", 7200), (".new.1a2b3c4d.part.png", 60), (".mine", 7200)):
+        (out / name).write_bytes(b"0")
+        os.utime(out / name, (time.time() - age,) * 2)
+    return out
+
+
+def test_tidy__keeps_results_and_what_a_run_goes_on_from(folder):
+    tidy(folder)
+    kept = {f"{KEYS[0]}.nc", f".{KEYS[1]}.unfinished", ".new.1a2b3c4d.part.png", ".mine"}
+    assert {path.name for path in folder.iterdir()} == kept | {f"{KEYS[3]}.failed.json", f"{KEYS[3]}.nc.damaged"}
+    assert tidy(folder) == []
+
+
+def test_clean__removes_all_but_results_if_asked_to(folder, invoke):
+    status, out, err = invoke("clean", folder, "--all")
+    assert (status, err) == (0, "")
+    assert {path.name for path in folder.iterdir()} == {f"{KEYS[0]}.nc", ".new.1a2b3c4d.part.png", ".mine"}
+    assert f"removed .{KEYS[1]}.unfinished\n" in out
+    assert invoke("clean", folder)[1] == "0 leftovers removed\n"
+    assert invoke("clean", folder / "none")[0] == 2
+
+
+def test_tidy__leaves_a_case_alone_that_is_being_computed(folder):
+    before = {path.name for path in folder.glob(f".{KEYS[0]}.*")}
+    with held(folder / f".{KEYS[0]}.lock"):
+        tidy(folder, everything=True)
+        assert {path.name for path in folder.glob(f".{KEYS[0]}.*")} == before
+    tidy(folder)
+    assert not list(folder.glob(f".{KEYS[0]}.*"))
+
+
+def test_sweep__tidies_up_after_cases_that_it_need_not_compute(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text(BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
+    cases = read_cases(path)
+    sweep(cases, tmp_path / "out", workers=0, progress=False)
+    before = sorted(p.name for p in (tmp_path / "out").iterdir())
+    leave(tmp_path / "out", cases[0].key)
+    sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == before
+
+
+def test_lock__does_not_follow_a_link(tmp_path):
+    target = tmp_path / "precious"
+    target.write_text("mine")
+    lock = tmp_path / f".{KEYS[0]}.lock"
+    lock.symlink_to(target)
+    with pytest.raises(InputError, match=r"\.lock: is a link: expected the lock of a run"), held(lock):
+        pass
+    assert target.read_text() == "mine"
+    assert tidy(tmp_path) == [lock]
+    assert target.exists()
+
+
+@pytest.mark.parametrize("age", [2 * STALE, -2 * STALE])
+def test_lock__of_yesterday_or_tomorrow_is_not_believed(tmp_path, age):
+    lock = tmp_path / "lock"
+    lock.write_text(json.dumps({"host": "elsewhere", "pid": 1, "token": ""}))
+    with pytest.raises(InUseError, match="process 1 on elsewhere"), held(lock):
+        pass
+    os.utime(lock, (time.time() - age,) * 2)
+    with held(lock) as mine:
+        mine.check()
+    assert not lock.exists()

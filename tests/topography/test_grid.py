@@ -1,0 +1,151 @@
+"""The door for heights: whatever states them is converted to metres or refused, by every public function."""
+
+import numpy as np
+import pint
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import checked, in_metres, spacing
+
+UNITS = pint.UnitRegistry()
+H = rv.self_affine((24e-6, 27e-6), (12, 9), hurst=0.8, rms_slope=0.1, seed=4)
+
+
+def stated_in(unit, h=H):
+    """The same heights in another unit, as a user's file would have them."""
+    scale = float(UNITS.Quantity(1, "m").to(unit).magnitude)
+    there = (h * scale).assign_coords({axis: h[axis] * scale for axis in ("x", "y")}).assign_attrs(h.attrs, units=unit)
+    for axis in ("x", "y"):
+        there[axis].attrs["units"] = unit
+    return there
+
+
+def of_pint():
+    """Heights as a pint array, over coordinates that state no unit."""
+    return xr.DataArray(
+        UNITS.Quantity(H.values * 1e9, "nm"),
+        {axis: (axis, H[axis].values) for axis in ("x", "y")},
+        dims=("x", "y"),
+    )
+
+
+def masked(values):
+    return np.ma.masked_array(values, mask=np.arange(values.size).reshape(values.shape) == 7)
+
+
+SAME = {
+    "um": lambda: stated_in("um"),
+    "inch": lambda: stated_in("inch"),
+    "heights alone": lambda: stated_in("mm").assign_coords(x=H.x, y=H.y),
+    "coordinates alone": lambda: H.assign_coords(x=stated_in("nm").x),
+    "pint": of_pint,
+    "pint in chunks": lambda: of_pint().chunk(x=4),
+    "no unit": lambda: H.drop_attrs(),
+    "transposed": lambda: H.T,
+    "a Dataset": lambda: xr.Dataset({"other": 1.0, "height": stated_in("um")}),
+    "in chunks": lambda: H.chunk(y=5),
+    "big-endian": lambda: H.astype(">f8"),
+}
+
+
+@pytest.mark.parametrize("form", SAME)
+def test_heights__are_metres_however_they_are_stated(form):
+    found = checked(SAME[form](), "test")
+    assert (found.dims, found.dtype, type(found.data)) == (("x", "y"), np.dtype(float), np.ndarray)
+    np.testing.assert_allclose(found, H, rtol=1e-14)
+    np.testing.assert_allclose(spacing(SAME[form]() if form != "a Dataset" else found), (2e-6, 3e-6), rtol=1e-14)
+    assert {found.attrs["units"], found.x.attrs.get("units", "m"), found.y.attrs.get("units", "m")} == {"m"}
+
+
+def test_heights__of_integers_and_masked():
+    counts = xr.DataArray(masked(np.arange(108).reshape(12, 9)), H.coords, attrs={"units": "nm"})
+    found = checked(counts, "test")
+    expected = np.where(np.arange(108) == 7, np.nan, np.arange(108) * 1e-9).reshape(12, 9)
+    np.testing.assert_allclose(found, expected, rtol=1e-14)
+    np.testing.assert_array_equal(in_metres(masked(H.values), "heights"), np.where(expected >= 0, H, np.nan))
+    lengths = UNITS.Quantity(np.arange(108.0).reshape(12, 9), "nm")
+    np.testing.assert_allclose(rv.from_array(lengths, 1e-6), np.arange(108.0).reshape(12, 9) * 1e-9, rtol=1e-14)
+
+
+REFUSED = {
+    "kelvin": (lambda: H.assign_attrs(units="K"), "the height has the unit 'K': expected a length"),
+    "nonsense": (lambda: H.assign_attrs(units="bananas"), "'bananas': expected a length, such as 'm' or 'um'"),
+    "empty": (lambda: H.assign_attrs(units=""), "has the unit '': expected a length"),
+    "coordinate in s": (lambda: H.assign_coords(y=H.y.assign_attrs(units="s")), "coordinate 'y' has the unit 's'"),
+    "complex": (lambda: H + 0j, "is of complex128: expected real numbers"),
+    "durations": (lambda: (H * 1e9).astype("timedelta64[s]"), "is of timedelta64"),
+    "objects": (lambda: H.astype(object), "is of object"),
+    "yes and no": (lambda: H > 0, "is of bool"),
+    "packed": (
+        lambda: H.assign_attrs(scale_factor=1e-9),
+        "packed .attribute 'scale_factor'.: expected decoded",
+    ),
+    "no height": (lambda: xr.Dataset({"z": H}), "a Dataset that holds z: expected one that holds 'height'"),
+    "frames": (lambda: H.expand_dims("time"), r"dimensions \('time', 'x', 'y'\): expected heights over"),
+    "an array": (lambda: H.values, "found ndarray: expected an xarray.DataArray"),
+}
+
+
+@pytest.mark.parametrize("form", REFUSED)
+def test_heights__that_are_none_are_refused_in_one_sentence(form):
+    made, message = REFUSED[form]
+    with pytest.raises(InputError, match=f"test: .*{message}"):
+        checked(made(), "test")
+
+
+def written(h, tmp_path, suffix):
+    rv.save_scan(h, tmp_path / f"scan{suffix}")
+    return rv.open_scan(tmp_path / f"scan{suffix}")
+
+
+def pressed(h, **how):
+    program = rv.Program().pressure(2e4, over=0)
+    return rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", progress=False, **how)
+
+
+DOORS = {
+    "level": rv.level,
+    "mask_outliers": rv.mask_outliers,
+    "fill": rv.fill,
+    "gaussian_filter": lambda h: rv.gaussian_filter(h, 9e-6),
+    "resample": lambda h: rv.resample(h, (6, 3)),
+    "crop": lambda h: rv.crop(h, x=(2e-6, 15e-6)),
+    "rotate90": rv.rotate90,
+    "invert": rv.invert,
+    "combine": lambda h: rv.combine(H, h),
+    "combine, below": lambda h: rv.combine(h, H),
+    "taper": lambda h: rv.taper(h, 6e-6),
+    "mirror": rv.mirror,
+    "parameters": rv.parameters,
+    "psd": rv.psd,
+    "accessor": lambda h: h.height.roughvisc.level(2) if isinstance(h, xr.Dataset) else h.roughvisc.level(2),
+    "simulate": pressed,
+    "simulate, with the grid's error": lambda h: pressed(h, grid_error=True),
+}
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_door__gives_the_same_in_any_unit(door):
+    asked = xr.Dataset({"height": stated_in("um").T})
+    before = asked.copy(deep=True)
+    found, expected = (DOORS[door](h) for h in (asked, H))
+    xr.testing.assert_identical(asked, before)
+    if isinstance(found, xr.DataArray):
+        found, expected = (h.to_dataset(name="height") for h in (found, expected))
+    for name, variable in found.variables.items():
+        if variable.dtype.kind in "fiu" and "wall_time" not in name:
+            size = float(abs(expected[name]).max())
+            np.testing.assert_allclose(variable, expected[name].variable, rtol=1e-9, atol=1e-9 * size, err_msg=name)
+            assert variable.attrs.get("units") == expected[name].attrs.get("units"), name
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".x3p", ".sdf"])
+def test_file__holds_metres_whatever_the_unit_was(suffix, tmp_path):
+    np.testing.assert_allclose(written(stated_in("um"), tmp_path, suffix), H, rtol=1e-9)
+
+
+def test_figure__of_a_surface_in_another_unit():
+    images = [rv.plot.surface(h).axes[0].get_images()[0].get_array() for h in (stated_in("um").T, H)]
+    np.testing.assert_allclose(*images, rtol=1e-9)

@@ -1,0 +1,67 @@
+"""Names of cases: what was varied, for readers and for file systems."""
+
+import re
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from roughvisc.views.sweep_figures.case_names import case_words, file_stems
+from roughvisc.views.sweep_figures.files import write_figure
+
+
+def case(written=None, **varied):
+    return {"varied": {key.replace("__", "."): value for key, value in varied.items()}, "written": written or {}}
+
+
+def test_case_words__are_what_the_study_says():
+    assert case_words(case(program__0__load=2.0, program__1__hold=5.0)) == "Load 2 N, hold 5 s"
+    assert case_words(case({"program.0.load": "2000 mN"}, program__0__load=2.0)) == "Load 2000 mN"
+    assert case_words(case(program__0__load=1.0, program__2__load=2.0)) == "Load (program.0) 1 N, load (program.2) 2 N"
+    assert case_words(case(surface__file="/far/away/Plate 3.sur", solve__tolerance=1e-3)) == (
+        "File Plate 3.sur, tolerance 0.001"
+    )
+    assert case_words({}) == ""
+
+
+def test_file_stems__are_safe_and_tell_cases_apart():
+    cases = {
+        "a" * 16: case(program__0__load=2.0, program__1__hold=5.0),
+        "b" * 16: case({"surface.size": "5 µm"}, surface__size=5e-6),
+        "c" * 16: case({"program.0.load": "5 mN"}, program__0__load=5e-3),
+        "d" * 16: case({"program.0.load": "5 MN"}, program__0__load=5e6),
+        "e" * 16: case(surface__file="/scans/a.sur"),
+        "f" * 16: case(surface__file="/scans/a.x3p"),
+        "0" * 16: case(material__terms=[{"modulus": 1e6 * n, "time": n} for n in range(40)]),
+        "1" * 16: case(surface__file='../$(rm -rf) "ä" <b>|?*.sur', material__fluidity=3e-7),
+        "2" * 16: case(),
+        "3" * 16: case(program__0__load=1.0, program__2__load=2.0),
+    }
+    stems = file_stems(cases)
+    assert stems["a" * 16] == "load_2N-hold_5s"
+    assert stems["b" * 16] == "size_5um"
+    assert stems["c" * 16] == "load_5mN-cccccccc", "not told from 5 MN where capitals do not count"
+    assert stems["d" * 16] == "load_5MN-dddddddd"
+    assert stems["e" * 16] == "file_a-eeeeeeee"
+    assert stems["2" * 16] == "2" * 16
+    assert stems["3" * 16] == "program.0.load_1N-program.2.load_2N"
+    assert len({stem.casefold() for stem in stems.values()}) == len(cases)
+    assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,89}", stem) for stem in stems.values()), stems
+    alone = file_stems({"a" * 16: cases["a" * 16]})
+    assert alone["a" * 16] == stems["a" * 16], "whatever else lies in the folder"
+
+
+def test_write_figure__puts_a_title_above_and_moves_nothing(tmp_path):
+    def drawn(title):
+        figure = Figure(figsize=(2, 1.5), layout="constrained")
+        ax = figure.add_subplot()
+        ax.plot([0, 1], label="line")
+        figure.legend(loc="outside upper center")
+        with Image.open(write_figure(figure, tmp_path / "figure.png", 100, title)) as picture:
+            return np.array(picture.convert("L"))
+
+    plain, titled = drawn(""), drawn("Load 2 N, kelvin viscosity 1 kPa s, hold 5 s")
+    extra = len(titled) - len(plain)
+    assert np.array_equal(titled[extra:], plain), "the figure stands below its title as it was"
+    assert extra > 40, "two lines"
+    assert (titled[:extra] < 100).any(axis=1).sum() > 12
