@@ -56,7 +56,7 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     for name in known:
         variable = annotated.variables[name]
         declared = _vocabulary(variable.dims)[str(name)]
-        variable.attrs.update(declared.attributes())
+        variable.attrs.update(declared.attributes() | ({"cartesian_axis": declared.axis} if declared.axis else {}))
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
     for name in {"status", of_step("status")} & set(annotated.variables):

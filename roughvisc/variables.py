@@ -44,8 +44,6 @@ class Variable:
             attrs["units"] = self.units
         if self.comment:
             attrs["comment"] = self.comment
-        if self.axis:
-            attrs["cartesian_axis"] = self.axis
         return attrs
 
 
