@@ -36,7 +36,8 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Holds declared variables only; extra leading dimensions (``case``) are allowed.
+        Holds declared variables only, and scalar coordinates of any name: what was varied in a case. Extra leading
+        dimensions (``case``) are allowed.
 
     Raises
     ------
@@ -46,14 +47,16 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         If a variable's dimensions are not the declared ones.
     """
     other = {}
-    for name, variable in dataset.variables.items():
+    known = {name: one for name, one in dataset.variables.items() if not _is_label(dataset, name)}
+    for name, variable in known.items():
         declared = _declared(str(name), variable.dims)
         if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
             other[name] = variable.astype(declared.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
-    for name, variable in annotated.variables.items():
+    for name in known:
+        variable = annotated.variables[name]
         declared = _vocabulary(variable.dims)[str(name)]
-        variable.attrs.update(declared.attributes())
+        variable.attrs.update(declared.attributes() | ({"cartesian_axis": declared.axis} if declared.axis else {}))
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
     for name in {"status", of_step("status")} & set(annotated.variables):
@@ -62,6 +65,11 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
             flag_meanings=" ".join(STATUS_MEANINGS),
         )
     return annotated
+
+
+def _is_label(dataset: xr.Dataset, name: Hashable) -> bool:
+    """Whether a variable is a scalar coordinate that is not declared."""
+    return name not in VARIABLES and name in dataset.coords and not dataset.variables[name].dims
 
 
 def describe(dataset: xr.Dataset) -> xr.Dataset:
@@ -121,6 +129,6 @@ def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
     if name not in known:
         raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
     declared = known[name]
-    if dims[-len(declared.dims) :] != declared.dims:
+    if dims[len(dims) - len(declared.dims) :] != declared.dims:
         raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
     return declared

@@ -18,7 +18,8 @@ NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 class Variable:
     """One entry of the vocabulary: what a variable is, how it is written, and which others state its error.
 
-    ``short`` is what it is called where there is no room for ``long_name``.
+    ``short`` is what it is called where there is no room for ``long_name``. ``axis`` is the axis that a coordinate
+    lies on.
     """
 
     dims: tuple[str, ...]
@@ -28,6 +29,7 @@ class Variable:
     dtype: str = "float64"
     ancillary: tuple[str, ...] = ()
     short: str = ""
+    axis: str = ""
 
     @property
     def label(self) -> str:
@@ -51,10 +53,14 @@ _SERIES = ("time",)
 _RUNS = ("setting",)
 
 VARIABLES: dict[str, Variable] = {
-    # coordinates: x and y carry no `axis` attribute, which would make ParaView wrap the surface on a sphere
-    "time": Variable(("time",), "s", "time since the start of the program", "at a jump the right-hand state is kept"),
-    "x": Variable(("x",), "m", "position of the cell centre along x"),
-    "y": Variable(("y",), "m", "position of the cell centre along y"),
+    # coordinates: with an attribute `axis` on x and y ParaView would wrap the surface on a sphere
+    "time": Variable(
+        ("time",), "s", "time since the start of the program", "at a jump the right-hand state is kept", axis="T"
+    ),
+    "x": Variable(("x",), "m", "position of the cell centre along x", axis="X"),
+    "y": Variable(("y",), "m", "position of the cell centre along y", axis="Y"),
+    "step": Variable(("step",), "1", "number of the accepted step", "counted from 0", dtype="int32"),
+    "case_key": Variable((), "", "key of the case", "what the file is named by", dtype="str"),
     # the surface
     "height": Variable(
         _GRID,
@@ -334,7 +340,9 @@ def of_step(name: str) -> str:
 def _over_steps(name: str) -> Variable:
     """The same variable over the accepted steps."""
     one = VARIABLES[name]
-    return replace(one, dims=("step",), ancillary=tuple(of_step(other) for other in one.ancillary if other in STEPPED))
+    return replace(
+        one, dims=("step",), axis="", ancillary=tuple(of_step(other) for other in one.ancillary if other in STEPPED)
+    )
 
 
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}

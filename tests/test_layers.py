@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 PACKAGE = ROOT / "roughvisc"
 
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
-_LABELS = {"errors", "labels", "variables", "units"}
+_LABELS = {"errors", "labels", "notebook", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
 _SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact", "mechanics.sliding"}
@@ -24,7 +24,8 @@ ALLOWED = {
     "variables": set(),
     "labels": {"errors", "units", "variables"},
     "units": {"errors"},
-    "mechanics.materials": {"errors", "units"},
+    "notebook": set(),
+    "mechanics.materials": {"errors", "notebook", "units"},
     "mechanics.halfspace": {"errors"},
     "mechanics.contact": {"errors", "mechanics.halfspace"},
     "mechanics.hereditary": {"errors", "mechanics.materials"},
@@ -34,6 +35,7 @@ ALLOWED = {
         "mechanics.halfspace",
         "mechanics.hereditary",
         "mechanics.materials",
+        "notebook",
         "units",
     },
     "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.halfspace"},

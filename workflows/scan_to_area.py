@@ -43,6 +43,8 @@ def at_age(results, time):
         [ds.drop_dims("step", errors="ignore").sel(time=[time]) for ds in results],
         "time",
         data_vars="minimal",
+        coords="minimal",
+        compat="override",
         join="exact",
     )
 

@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.views.figures.animate import animate
+from roughvisc.views.figures.animate import animate, animation
 from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require
 from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
@@ -31,6 +31,7 @@ from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
     "animate",
+    "animation",
     "area_against_load",
     "contact_clusters",
     "distributions",

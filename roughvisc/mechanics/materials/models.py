@@ -22,6 +22,7 @@ from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.materials.protocol import Material, complete
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tabulated import Tabulated
+from roughvisc.notebook import table
 
 __all__ = [
     "Material",
@@ -185,6 +186,9 @@ class Pair:
     def __repr__(self) -> str:
         """As it was built."""
         return f"pair({self.a!r}, {self.b!r})"
+
+    def _repr_html_(self) -> str:
+        return table("pair", [("a", repr(self.a)), ("b", repr(self.b))])
 
     @property
     def poisson(self) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
-from roughvisc.mechanics.materials.words import as_built
+from roughvisc.mechanics.materials.words import Built, as_built
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,12 @@ class PowerLaw:
             raise InputError(f"exponent is {self.exponent!r}: expected a number above 0 and below 1")
 
     def __repr__(self) -> str:
+        return str(self._built())
+
+    def _repr_html_(self) -> str:
+        return self._built().html()
+
+    def _built(self) -> Built:
         """With readable units."""
         return as_built(
             "PowerLaw",

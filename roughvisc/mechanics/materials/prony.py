@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.secular import merged, secular_roots
-from roughvisc.mechanics.materials.words import as_built
+from roughvisc.mechanics.materials.words import Built, as_built
 
 Array = NDArray[np.float64]
 
@@ -68,6 +68,12 @@ class Prony:
             raise InputError("all compliances are zero: a rigid material cannot be pressed")
 
     def __repr__(self) -> str:
+        return str(self._built())
+
+    def _repr_html_(self) -> str:
+        return self._built().html()
+
+    def _built(self) -> Built:
         """As springs and dashpots where it is a model of few of them, else as the series."""
         parameters: dict[str, tuple[Any, str]]
         name, spring = "Prony", (1 / self.glassy if self.glassy else np.inf, "Pa")

@@ -11,7 +11,7 @@ from scipy.optimize import isotonic_regression
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
-from roughvisc.mechanics.materials.words import as_built
+from roughvisc.mechanics.materials.words import Built, as_built
 
 Array = NDArray[np.float64]
 
@@ -85,6 +85,12 @@ class Tabulated:
         return "; ".join(self.notes)
 
     def __repr__(self) -> str:
+        return str(self._built())
+
+    def _repr_html_(self) -> str:
+        return self._built().html()
+
+    def _built(self) -> Built:
         """With readable units; of a long table its ends."""
         noise = {"noise": (self.noise, "1")} if self.noise else {}
         rows = {"times": (self.times, "s"), "compliances": (self.compliances, "1/Pa")}

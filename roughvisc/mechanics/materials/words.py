@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from roughvisc.notebook import table
 from roughvisc.units import said, unit_for
 
 #: Values of a series or a table up to which all of them are listed.
 _LISTED = 4
 
 
-def as_built(name: str, poisson: float, note: str, **parameters: tuple[Any, str]) -> str:
+@dataclass(frozen=True)
+class Built:
+    """The call that builds a material, in words: its name, and each argument with its value."""
+
+    name: str
+    arguments: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(f'{key}={text}' for key, text in self.arguments)})"
+
+    def html(self) -> str:
+        """As a table."""
+        return table(self.name, self.arguments)
+
+
+def as_built(name: str, poisson: float, note: str, **parameters: tuple[Any, str]) -> Built:
     """A material as the call that builds it.
 
     Parameters
@@ -27,15 +44,15 @@ def as_built(name: str, poisson: float, note: str, **parameters: tuple[Any, str]
 
     Examples
     --------
-    >>> as_built("maxwell", 0.5, "", shear_modulus=(3e6, "Pa"), viscosity=(1e5, "Pa s"))
-    'maxwell(shear_modulus=3 MPa, viscosity=100 kPa s)'
-    >>> as_built("Prony", 0.3, "", compliances=((1e-6, 2e-6), "1/Pa"), times=((0.01, 0.1), "s"))
-    'Prony(compliances=(1, 2) 1/MPa, times=(10, 100) ms, poisson=0.3)'
+    >>> print(as_built("maxwell", 0.5, "", shear_modulus=(3e6, "Pa"), viscosity=(1e5, "Pa s")))
+    maxwell(shear_modulus=3 MPa, viscosity=100 kPa s)
+    >>> print(as_built("Prony", 0.3, "", compliances=((1e-6, 2e-6), "1/Pa"), times=((0.01, 0.1), "s")))
+    Prony(compliances=(1, 2) 1/MPa, times=(10, 100) ms, poisson=0.3)
     """
-    parts = [f"{key}={_text(value, unit)}" for key, (value, unit) in parameters.items()]
-    parts += [f"poisson={poisson:g}"] if poisson != 0.5 else []
-    parts += [f"note={note!r}"] if note else []
-    return f"{name}({', '.join(parts)})"
+    arguments = [(key, _text(value, unit)) for key, (value, unit) in parameters.items()]
+    arguments += [("poisson", f"{poisson:g}")] if poisson != 0.5 else []
+    arguments += [("note", repr(note))] if note else []
+    return Built(name, tuple(arguments))
 
 
 def _text(value: Any, unit: str) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.segment import CONTROLS, PUSHING, UNITS, Control, Segment
+from roughvisc.notebook import table
 from roughvisc.units import bounded_quantity, said, shown
 
 #: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
@@ -72,13 +73,27 @@ class Program:
 
     def __repr__(self) -> str:
         """In words; of a long table its first segments."""
-        told, more = self.segments[:_TOLD], len(self.segments) - _TOLD
-        words = [str(segment) for segment in told] or ["nothing"]
+        words, more = self._words(), len(self.segments) - _TOLD
+        words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
+        return f"Program: {', '.join(words or ['nothing'])}"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (str(number), words, f"until {said(end, 's')}" if end else "")
+            for number, (words, end) in enumerate(zip(self._words(), self.corners[1:], strict=False))
+        ]
+        more = len(self.segments) - _TOLD
+        rows += [("...", f"{more} more segments", f"until {said(self.duration, 's')}")] if more > 0 else []
+        return table("Program" if rows else "Program: nothing", rows)
+
+    def _words(self) -> list[str]:
+        """The first segments."""
+        told = self.segments[:_TOLD]
+        words = [str(segment) for segment in told]
         for number, (before, segment) in enumerate(pairwise(told), 1):
             if segment.end is None and not segment.amplitude and segment.control == before.control:
                 words[number] = f"hold {said(segment.duration, 's')}"  # what else
-        words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
-        return f"Program: {', '.join(words)}"
+        return words
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)

@@ -24,7 +24,7 @@ from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.settings import Settings
-from roughvisc.study.storage.results import parameters_of
+from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
 

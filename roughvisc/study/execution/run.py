@@ -25,6 +25,7 @@ from roughvisc.study.simulation.simulate import press
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
 from roughvisc.variables import NOT_CONVERGED
 
@@ -86,7 +87,7 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
     transforms = transform_library() if keeper is None else keeper.saved.transforms
     dataset.attrs = _provenance(case, dataset.attrs.pop("history", ""), transforms) | dataset.attrs | scan
-    return dataset
+    return dataset.assign_coords(labels_of_case(json.loads(case.to_json()), case.key))
 
 
 def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:

@@ -123,6 +123,7 @@ class Rows:
         if len(kept) < len(rows):
             for name in ("time", *STEPPED):
                 variables[of_step(name)] = (("step",), np.array([row[name] for row in rows]))
+            variables["step"] = (("step",), np.arange(len(rows)))
         for name in self._settings.fields:
             frames = self._store.stacked(partial(self._frame, name), kept, (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from roughvisc.errors import ChangedError, InputError
+from roughvisc.notebook import table
 from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
 from roughvisc.study.statement.schema import Study, study_schema
@@ -119,6 +120,20 @@ class Case:
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
         return replace(self.settings.solving(), kernel=self.kernel())
+
+    def _repr_html_(self) -> str:
+        stated = _stated(self.settings)
+        surface = stated["surface"]
+        rows = [
+            ("key", _told(lambda: self.key)),
+            ("study", self.origin.name if self.origin else ""),
+            *((name, self.written.get(name) or str(value)) for name, value in self.varied.items()),
+            ("surface", Path(surface["file"]).name if "file" in surface else str(surface.get("generate", ""))),
+            ("material", _told(lambda: repr(self.material()))),
+            ("program", _told(lambda: repr(self.program()).removeprefix("Program: "))),
+            *((name, str(value)) for name, value in stated.get("solve", {}).items()),
+        ]
+        return table(self.title or "untitled", [row for row in rows if row[1]])
 
     def __reduce__(self) -> tuple[Any, ...]:
         # the classes of the tables are made at run time, so a case travels to another process as its text
@@ -264,6 +279,14 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
         raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
+
+
+def _told(what: Callable[[], str]) -> str:
+    """A text, or why it cannot be had: a table that shows a case refuses none."""
+    try:
+        return what()
+    except InputError as error:
+        return str(error)
 
 
 def _stated(settings: Study) -> dict[str, Any]:

@@ -38,7 +38,9 @@ _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
 #: Histories over the kept times, and over the accepted steps, with the times themselves.
-_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)))
+_HISTORIES = tuple(
+    name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)) and name != "step"
+)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,12 @@ class ResultBackend(BackendEntrypoint):
         path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
             variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
         decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
-        return decoded.drop_vars(drop_variables or (), errors="ignore")
+        texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
+        return decoded.assign_coords(texts).drop_vars(drop_variables or (), errors="ignore")
 
 
 def _variable(path: str, stored: netCDF4.Variable) -> xr.Variable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, overload
@@ -14,8 +13,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.index import LATEST, NETCDF, Entry, index_of, save_index
+from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
 from roughvisc.study.storage.store import no_results
 from roughvisc.variables import VARIABLES
 
@@ -54,8 +53,9 @@ def open_results(out, *, cases="last", ragged=False):
     -------
     xarray.Dataset or xarray.DataTree
         Variables as in a single result with a dimension ``case`` in front; ``height`` only where it differs. Varied
-        parameters are coordinates on ``case``, named by their dotted keys: numbers in SI, or strings. A tree has
-        the parameters as scalar coordinates of each node, whose name is the case's key.
+        parameters are coordinates on ``case``, numbers in SI or strings, each under two names: its dotted key, and
+        the identifier that it has in the files, ``program_0_load``. A tree has the parameters as scalar coordinates
+        of each node, whose name is the case's key.
 
     Raises
     ------
@@ -111,52 +111,6 @@ def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
                 )
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# what was varied
-
-
-def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
-    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
-    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
-    for key in dict.fromkeys(key for leaf in leaves for key in leaf):
-        below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
-        if not below and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
-            keys[key] = None
-    values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
-    return {key: _column(found) for key, found in values.items()}
-
-
-_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
-
-
-def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
-    named = stated.items() if isinstance(stated, dict) else enumerate(stated)
-    for key, value in named:
-        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
-            yield from _leaves(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
-
-
-def _value(case: Mapping[str, Any], leaf: Mapping[str, Any], key: str) -> Any:
-    varied = case.get("varied", {})
-    return varied[key] if key in varied else leaf.get(key)
-
-
-def _column(values: Sequence[Any]) -> NDArray[Any]:
-    numbers = [isinstance(v, int | float) and not isinstance(v, bool) for v in values]
-    if all(numbers):
-        return np.array(values)
-    if all(number or v is None for number, v in zip(numbers, values, strict=True)):
-        return np.array([np.nan if v is None else v for v in values], dtype=float)
-    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
-
-
-# ----------------------------------------------------------------------------------------------------------------
-# the views
-
-
 def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
     first = entries[0]
     variables: dict[str, Any] = {
@@ -174,12 +128,14 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
             else:
                 variables[name] = (dims, _lazy(folder, entries[:1], name, dtype)[0])
     coords = {"time": first.histories["time"], "x": first.x, "y": first.y}
-    dataset = annotate(xr.Dataset(variables, coords=coords, attrs=_attributes(entries)))
-    on_case: dict[str, Any] = {"case_key": ("case", np.array([entry.key for entry in entries]))}
-    for key, values in parameters.items():
-        unit = unit_of(key, first.case) if values.dtype.kind in "if" else ""
-        on_case[key] = ("case", values, {"long_name": key} | ({"units": unit} if unit else {}))
-    return dataset.assign_coords(on_case)
+    dataset = xr.Dataset(variables, coords=coords, attrs=_attributes(entries))
+    if "step" in dataset.dims:
+        dataset = dataset.assign_coords(step=np.arange(dataset.sizes["step"]))
+    dataset = annotate(dataset)
+    keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
+    labels = labels_of(parameters, first.case, ("case",))
+    dotted = {attributes["long_name"]: (dims, values, attributes) for dims, values, attributes in labels.values()}
+    return dataset.assign_coords(keys | dotted | labels)
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -144,8 +144,8 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Parameters
     ----------
     dataset : xarray.Dataset
-        Declared variables only; see :mod:`roughvisc.variables`. Fields that are read from elsewhere when they are
-        asked for are read and written a chunk at a time.
+        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Fields that are read from elsewhere
+        when they are asked for are read and written a chunk at a time.
     path : path
         The file to write; one of that name is replaced.
     precision : float, optional
@@ -172,7 +172,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
-    dataset = annotate(dataset)
+    dataset = _in_characters(_with_labels_named(annotate(dataset)))
     with whole_file(path) as temporary:
         try:
             with _new_file(temporary) as file:
@@ -190,6 +190,34 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             number = errno.ENOSPC if full else errno.EIO
             raise OSError(number, os.strerror(number), str(path)) from error
     return Path(path)
+
+
+def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
+    """Dataset whose variables name its scalar coordinates, by which CF tells a coordinate from a variable."""
+    labels = " ".join(str(name) for name, one in dataset.coords.items() if not one.dims)
+    if not labels:
+        return dataset
+    named = {name: one.variable.copy(deep=False) for name, one in dataset.data_vars.items()}
+    for variable in named.values():
+        variable.attrs = variable.attrs | {"coordinates": labels}
+    return dataset.assign(named)
+
+
+def _in_characters(dataset: xr.Dataset) -> xr.Dataset:
+    """Dataset whose text is characters along a dimension ``string16``, as xarray and CF read it.
+
+    Strings of any length, netCDF-4's own, crash netCDF4 1.7.5 where a file is open twice and one is closed.
+    """
+    for name, one in dataset.coords.items():
+        if one.dtype.kind == "U":
+            texts = np.char.encode(one.values, "utf-8")
+            texts = texts.astype(f"S{max(texts.itemsize, 1)}")
+            characters = texts[..., np.newaxis].view("S1")
+            attributes = one.attrs | {"_Encoding": "utf-8"}
+            dataset = dataset.drop_vars(name).assign(
+                {name: ((*one.dims, f"string{texts.itemsize}"), characters, attributes)}
+            )
+    return dataset
 
 
 @contextmanager
@@ -349,7 +377,7 @@ def _foreign(dataset: xr.Dataset) -> str:
     if absent := [name for name in ("time", "force", "approach") if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
     for name, variable in dataset.variables.items():
-        if name in VARIABLES and variable.dtype.kind not in "fiub":
+        if name in VARIABLES and variable.dtype.kind not in ("U" if VARIABLES[name].dtype == "str" else "fiub"):
             return f"holds {name} as {variable.dtype}"
     if odd := [name for name in ("force", "approach") if dataset[name].dims != ("time",)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"

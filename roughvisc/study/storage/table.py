@@ -14,7 +14,7 @@ from roughvisc.labels import heading
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.results import parameters_of
+from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results, whole_file
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED, VARIABLES

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -90,24 +91,58 @@ def animate(
         If the file name or the missing ffmpeg does not allow it, or the result holds no such field.
     """
     path = Path(path)
-    if frames < 1 or rate <= 0:
-        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
+    _check(frames, rate)
     writer = _writer(path, rate)
     unfinished = path.with_name(f".{path.stem}.part{path.suffix}")
-    figure, pictures = _moving(dataset, field, frames)
+    film = animation(dataset, field=field, frames=frames, rate=rate)
     try:
-        with writer.saving(figure, str(unfinished), dpi):
-            for _ in pictures:
-                writer.grab_frame()
+        film.save(str(unfinished), writer, dpi=dpi)
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
     return path
 
 
+def animation(dataset: xr.Dataset, *, field: str | None = None, frames: int = 100, rate: float = 12.0) -> FuncAnimation:
+    """Animation of a result, as :func:`animate` writes it: a notebook shows it with buttons to play it.
+
+    Parameters
+    ----------
+    dataset, field, frames, rate
+        As for :func:`animate`.
+
+    Returns
+    -------
+    matplotlib.animation.FuncAnimation
+        Its methods ``save`` and ``to_jshtml`` make files of it. Keep it in a variable until one of them has.
+
+    Raises
+    ------
+    InputError
+        If the result holds no such field.
+    """
+    _check(frames, rate)
+    figure, move, chosen = _moving(dataset, field, frames)
+    return _Film(figure, move, chosen, interval=1000 / rate, cache_frame_data=False)
+
+
+class _Film(FuncAnimation):
+    """An animation that a notebook plays without settings of matplotlib's."""
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() or self.to_jshtml()
+
+
+def _check(frames: int, rate: float) -> None:
+    if frames < 1 or rate <= 0:
+        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
+
+
 @styled
-def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure, Iterator[int]]:
-    """Figure, and an iterator that draws the next frame into it each time it is advanced."""
+def _moving(
+    dataset: xr.Dataset, field: str | None, count: int
+) -> tuple[Figure, Callable[[int], list[Artist]], list[int]]:
+    """Figure, what draws a frame into it, and the frames."""
     require(dataset, "time", "x", "y")
     field = field or ("pressure" if "pressure" in dataset else "gap")
     if field not in FIELDS:
@@ -127,15 +162,16 @@ def _moving(dataset: xr.Dataset, field: str | None, count: int) -> tuple[Figure,
     figure.align_ylabels(right)
     title = figure.suptitle("", fontsize=9)
 
-    def pictures():
-        for frame in chosen:
-            title.set_text(time_text(float(dataset["time"][frame])))
-            for move in movers:
-                move(frame)
-            yield frame
-            figure.set_layout_engine("none")  # the first picture's layout holds for all
+    def draw(frame: int) -> list[Artist]:
+        title.set_text(time_text(float(dataset["time"][frame])))
+        for move in movers:
+            move(frame)
+        return [title]
 
-    return figure, pictures()
+    draw(chosen[0])
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the first picture's layout holds for all
+    return figure, draw, chosen
 
 
 def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes, list[Axes], list[Axes]]:

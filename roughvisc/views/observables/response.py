@@ -38,7 +38,7 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
         return dataset[names]
     steps = dataset[[of_step(name) for name in names if of_step(name) in dataset]]
     steps = steps.assign_coords(time=("step", dataset[of_step("time")].values)).drop_vars(
-        of_step("time"), errors="ignore"
+        ["step", of_step("time")], errors="ignore"
     )
     steps = steps.isel(step=np.isfinite(steps["time"].values)).swap_dims(step="time")
     return describe(steps.rename({name: str(name).removeprefix(of_step("")) for name in steps.data_vars}))

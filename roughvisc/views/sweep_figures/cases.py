@@ -14,6 +14,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_names import names_of
@@ -132,7 +133,7 @@ class Cases:
     parameters: list[Parameter]
 
     def parameter(self, key: str) -> Parameter:
-        """Parameter of a dotted key.
+        """Parameter of a dotted key, or of the identifier that it has in the files.
 
         Raises
         ------
@@ -140,7 +141,7 @@ class Cases:
             If it was not varied.
         """
         for one in self.parameters:
-            if one.key == key:
+            if key in (one.key, identifier(one.key)):
                 return one
         raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
 
@@ -182,16 +183,17 @@ def cases_of(results: Any) -> Cases:
     """
     if isinstance(results, xr.DataTree):
         members = [_histories(node.to_dataset()) for node in results.children.values()]
-        names = dict.fromkeys(str(name) for member in members for name in member.coords if not member[name].dims)
+        scalars = [str(name) for member in members for name in member.coords if not member[name].dims]
+        names = dict.fromkeys(name for name in scalars if name not in _NO_PARAMETERS)
         columns = {name: [member[name] for member in members if name in member.coords] for name in names}
         columns = {name: found for name, found in columns.items() if len(found) == len(members)}
-        parameters = {name: (np.array([one.item() for one in found]), found[0]) for name, found in columns.items()}
+        parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
         held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "step"}]
         table = results[held].load()
         members = [table.isel(case=i) for i in range(results.sizes["case"])]
-        on_case = [str(name) for name in results.coords if results[name].dims == ("case",)]
-        parameters = {name: (results[name].values, results[name]) for name in on_case}
+        on_case = [one for one in results.coords.values() if one.dims == ("case",) and one.name not in _NO_PARAMETERS]
+        parameters = {_key(one): (one.values, one) for one in on_case}
     else:
         raise InputError(
             "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
@@ -199,11 +201,15 @@ def cases_of(results: Any) -> Cases:
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
     found = [
-        (key, values, str(source.attrs.get("units") or unit_of(key)))
-        for key, (values, source) in parameters.items()
-        if key not in _NO_PARAMETERS
+        (key, values, str(source.attrs.get("units") or unit_of(key))) for key, (values, source) in parameters.items()
     ]
     return Cases(members, list(_independent(found)))
+
+
+def _key(coordinate: xr.DataArray) -> str:
+    """Dotted key of a varied parameter, which its identifier does not tell."""
+    said = str(coordinate.attrs.get("long_name", ""))
+    return said if identifier(said) == identifier(str(coordinate.name)) else str(coordinate.name)
 
 
 def _histories(dataset: xr.Dataset) -> xr.Dataset:

@@ -31,9 +31,7 @@ def ran(tmp_path_factory):
 
 
 def first_picture(ds):
-    figure, pictures = animate._moving(ds, None, 9)
-    next(pictures)
-    return figure
+    return animate._moving(ds, None, 9)[0]
 
 
 def line(ds, frame=-1):

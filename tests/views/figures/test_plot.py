@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+import re
 import sys
 
 import matplotlib
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
+from matplotlib.animation import FuncAnimation
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
@@ -38,9 +40,7 @@ SAMPLES = {
 
 def first_picture(dataset):
     """The figure of an animation, as its first picture."""
-    figure, pictures = animation._moving(dataset, None, 3)
-    next(pictures)
-    return figure
+    return animation._moving(dataset, None, 3)[0]
 
 
 FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()}
@@ -526,12 +526,12 @@ def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
 
 def test_animate__map_section_and_history_move_together():
     ds = made.rough_creep()
-    figure, pictures = animation._moving(ds, "gap", 4)
+    figure, draw, frames = animation._moving(ds, "gap", 4)
     on_map, section, force, approach, area = (ax for ax in figure.axes if ax.get_label() != "<colorbar>")
     assert [ax.get_ylabel() for ax in (force, approach, area)] == ["Force [N]", "Approach [µm]", "Contact area [mm²]"]
-    seen = []
-    for frame in pictures:
-        seen.append(frame)
+    assert frames == [0, 4, 7, 11]
+    for frame in frames:
+        draw(frame)
         np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
         assert figure.get_suptitle() == axes.time_text(float(ds["time"][frame]))
         assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
@@ -539,14 +539,24 @@ def test_animate__map_section_and_history_move_together():
         index = int(ds["pressure"][-1].sum("x").argmax("y"))
         surface = (ds["height"] + ds["gap"].isel(time=frame)).isel(y=index)
         np.testing.assert_allclose(section.lines[1].get_ydata(), 1e6 * surface)
-    assert seen == [0, 4, 7, 11]
 
 
 def test_animate__without_histories_or_heights(tmp_path):
     bare = made.rough_creep()[["pressure"]]
-    figure, pictures = animation._moving(bare, None, 2)
-    assert list(pictures) == [0, 11]
+    figure, _, frames = animation._moving(bare, None, 2)
+    assert frames == [0, 11]
     assert len(figure.axes) == 2, "the map and its scale"
+
+
+def test_animation__plays_in_a_notebook():
+    film = plot.animation(made.rough_creep((22, 16)), frames=2, rate=4)
+    assert isinstance(film, FuncAnimation)
+    with matplotlib.rc_context({"savefig.dpi": 40}):
+        page = film._repr_html_()
+    assert page.count("data:image/png;base64") == 2
+    assert re.search(r"new Animation\(frames, img_id, slider_id, 250(\.0)?,", page), "a quarter of a second each"
+    with pytest.raises(InputError, match="positive"):
+        plot.animation(made.one_frame(), rate=0)
 
 
 def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):

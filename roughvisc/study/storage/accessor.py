@@ -1,0 +1,51 @@
+"""The accessor ``ds.roughvisc``: what is derived from a result, and its figures, as methods of the Dataset.
+
+``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
+Whatever opens or makes a result registers it. It imports nothing but xarray: the function is imported when asked for.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import xarray as xr
+
+#: Before the name of a figure.
+_PLOT = "plot_"
+#: beginning of a method's name -> module whose public names follow
+_ROOMS = {"": "roughvisc.views.observables", _PLOT: "roughvisc.views.plot"}
+
+
+@xr.register_dataset_accessor("roughvisc")
+class ResultAccessor:
+    """Observables and figures of this result; each is the function of that name with the result given.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result, or several as :func:`roughvisc.open_results` opens them.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # what notebooks and copies ask every object for
+            raise AttributeError(name)
+        start = _PLOT if name.startswith(_PLOT) else ""
+        room = import_module(_ROOMS[start])
+        if name.removeprefix(start) not in room.__all__:
+            raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(_methods())}")
+        function = getattr(room, name.removeprefix(start))
+        method = partial(function, self._dataset)
+        method.__doc__ = function.__doc__
+        return method
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *_methods()]
+
+
+def _methods() -> list[str]:
+    return [f"{start}{name}" for start, module in _ROOMS.items() for name in import_module(module).__all__]

@@ -1,0 +1,103 @@
+"""What was varied: the parameters of cases, and the coordinates that label results with them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.variables import VARIABLES
+
+#: Coordinate that holds the key of the case.
+CASE_KEY = "case_key"
+#: dimensions, values, attributes
+Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
+
+_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
+
+
+def identifier(key: str) -> str:
+    """Name of a varied parameter that Python and pandas take: its dotted key with underscores.
+
+    Examples
+    --------
+    >>> identifier("program.0.load")
+    'program_0_load'
+    """
+    return key.replace(".", "_")
+
+
+def labels_of(
+    parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
+) -> dict[str, Label]:
+    """Coordinates that hold what was varied; ``long_name`` is the dotted key.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Dotted key -> values over `dims`: numbers in SI, or strings.
+    case : mapping
+        A case in JSON, which tells the units.
+    dims : tuple of str
+        None: the values are of one case.
+    """
+    labels: dict[str, Label] = {}
+    for key, values in parameters.items():
+        unit = unit_of(key, case) if values.dtype.kind in "if" else ""
+        labels[identifier(key)] = (dims, values, {"long_name": key} | ({"units": unit} if unit else {}))
+    return labels
+
+
+def labels_of_case(case: Mapping[str, Any], key: str) -> dict[str, Label]:
+    """Scalar coordinates of one result: the key of its case, and what was varied in it.
+
+    Parameters
+    ----------
+    case : mapping
+        The case in JSON.
+    key : str
+        Its key.
+    """
+    varied = {name: values[0] for name, values in parameters_of([case]).items()}
+    return {CASE_KEY: ((), np.asarray(key), VARIABLES[CASE_KEY].attributes())} | labels_of(
+        {name: np.asarray(value) for name, value in varied.items()}, case
+    )
+
+
+def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
+    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
+    for key in dict.fromkeys(key for leaf in leaves for key in leaf):
+        below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
+        if not below and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
+            keys[key] = None
+    values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
+    return {key: _column(found) for key, found in values.items()}
+
+
+def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
+    named = stated.items() if isinstance(stated, dict) else enumerate(stated)
+    for key, value in named:
+        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
+            yield from _leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _value(case: Mapping[str, Any], leaf: Mapping[str, Any], key: str) -> Any:
+    varied = case.get("varied", {})
+    return varied[key] if key in varied else leaf.get(key)
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    numbers = [isinstance(v, int | float) and not isinstance(v, bool) for v in values]
+    if all(numbers):
+        return np.array(values)
+    if all(number or v is None for number, v in zip(numbers, values, strict=True)):
+        return np.array([np.nan if v is None else v for v in values], dtype=float)
+    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])

@@ -1,0 +1,157 @@
+"""What was varied labels every result file, in a way that xarray takes without this package."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL
+
+import roughvisc as rv
+from roughvisc.study.statement.case import read_study, vary
+from roughvisc.study.statement.schema import Study
+from roughvisc.study.storage.parameters import identifier, labels_of_case
+from roughvisc.variables import VARIABLES
+
+SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
+SWEEP = """
+[sweep]
+"program.0.load" = ["2 mN", "1 mN"]
+"solve.memory" = ["auto", "direct"]
+"""
+TOGETHER = {"concat_dim": "case", "data_vars": "all", "coords": "different", "compat": "equals", "join": "outer"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a sweep of four cases, which take different numbers of steps."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "balls.toml").write_text(SMALL + SWEEP)
+    rv.sweep(folder / "balls.toml", folder / "out", workers=0, progress=False)
+    return folder / "out"
+
+
+def test_file__of_a_varied_case_is_labelled(tmp_path):
+    (tmp_path / "ball.toml").write_text(SMALL)
+    case = vary(read_study(tmp_path / "ball.toml"), {"program.0.load": "2 mN", "program.1": {"hold": "0.3 s"}})
+    path = rv.run(case, tmp_path, progress=False).encoding["source"]
+    with xr.open_dataset(path) as ds:  # by xarray as it comes
+        scalar = {name: one.item() for name, one in ds.coords.items() if not one.dims}
+        assert scalar["case_key"] == ds.attrs["case_key"] == case.key
+        assert scalar["program_0_load"] == 2e-3
+        assert ds.program_0_load.attrs == {"long_name": "program.0.load", "units": "N"}
+        assert '"hold": 0.3' in scalar["program_1"], "a table as JSON"
+        assert set(scalar) == {"case_key", "program_0_load", "program_1"}
+    with netCDF4.Dataset(path) as file:
+        assert str not in {one.dtype for one in file.variables.values()}, "netCDF4 crashes on strings of any length"
+        assert {
+            one.coordinates for one in file.variables.values() if "time" in one.dimensions[:1] and one.ndim > 1
+        } == {"case_key program_0_load program_1"}
+
+
+def test_file__of_a_plain_case_has_its_key_alone(tmp_path):
+    (tmp_path / "ball.toml").write_text(SMALL)
+    with rv.run(tmp_path / "ball.toml", tmp_path, progress=False) as ds:
+        assert [name for name, one in ds.coords.items() if not one.dims] == ["case_key"]
+
+
+_NEW = "use_new_combine_kwarg_defaults"
+
+
+@pytest.mark.parametrize("options", [{}, *([{_NEW: True}] if _NEW in xr.get_options() else [])], ids=str)
+def test_files__open_together_by_xarray_alone(folder, options):
+    with (
+        xr.set_options(**options),
+        xr.open_mfdataset(f"{folder}/*.nc", combine="nested", **TOGETHER) as ds,
+    ):
+        assert sorted(ds.program_0_load.values) == [1e-3, 1e-3, 2e-3, 2e-3]
+        direct = ds.sel(case=ds.solve_memory == "direct").sortby("program_0_load")
+        assert direct.force.isel(time=-1).values == pytest.approx([1e-3, 2e-3], rel=1e-12)
+        areas = ds.contact_area.isel(time=-1).groupby("program_0_load").mean().load()
+        assert areas.sel(program_0_load=2e-3) > areas.sel(program_0_load=1e-3)
+        frame = ds[["force"]].to_dataframe()
+        assert len(frame.query("program_0_load > 1.5e-3 and solve_memory == 'auto'")) == ds.sizes["time"]
+        apart = ds[["force", "contact_area"]].set_index(case=["program_0_load", "solve_memory"]).unstack()
+        assert apart.force.sel(program_0_load=1e-3, solve_memory="auto")[0].values == pytest.approx(1e-3, rel=1e-12)
+        ours = rv.plot.sweep(ds.load(), "contact_area", along="program_0_load")
+        theirs = rv.plot.sweep(rv.open_results(folder), "contact_area", along="program.0.load")
+        assert [ax.get_xlabel() for ax in ours.axes] == [ax.get_xlabel() for ax in theirs.axes]
+        assert ours.axes[0].get_xlabel() == "Load [mN]"
+
+
+def test_open_results__has_both_names(folder):
+    ds = rv.open_results(folder)
+    assert ds.attrs.get("title") == "A ball"
+    for key in ("program.0.load", "solve.memory"):
+        xr.testing.assert_identical(ds[key].variable, ds[identifier(key)].variable)
+        assert ds[key].attrs["long_name"] == key
+    assert ds.sel(case=ds.program_0_load == 1e-3).sizes["case"] == 2
+    assert ds.step.values.tolist() == list(range(ds.sizes["step"]))
+    node = next(iter(rv.open_results(folder, ragged=True).children.values()))
+    assert float(node["program_0_load"]) == float(node["program.0.load"]) in (1e-3, 2e-3)
+
+
+def test_open_results__reads_files_without_labels(folder, tmp_path):
+    """As they were written before there were any."""
+    for path in folder.glob("*.nc"):
+        with xr.open_dataset(path) as ds:
+            ds.drop_vars([name for name, one in ds.coords.items() if not one.dims] + ["step"]).to_netcdf(
+                tmp_path / path.name
+            )
+    old, new = rv.open_results(tmp_path, cases="all"), rv.open_results(folder, cases="all")
+    assert old.program_0_load.values.tolist() == new.program_0_load.values.tolist()
+    xr.testing.assert_equal(old.load(), new.load())
+
+
+def test_labels__are_apart_from_all_variables():
+    tables = {f"{name}_" for name in Study.model_fields}
+    assert not [name for name in VARIABLES if any(name.startswith(table) for table in tables)]
+    assert not {*VARIABLES} & {*Study.model_fields}
+
+
+def test_labels__of_one_case_are_numbers_or_text():
+    varied = {"a.1": 2, "b": 0.5, "c": "word", "d": True, "e": [1, 2], "f": None}
+    labels = labels_of_case({"varied": varied}, "0" * 16)
+    found = {name: values.item() for name, (_, values, _) in labels.items()}
+    assert all(name.isidentifier() for name in labels)
+    del found["case_key"]
+    assert {name: found[name] for name in "bcde"} == {"b": 0.5, "c": "word", "d": "true", "e": "[1, 2]"}
+    assert found["a_1"] == 2
+    assert np.isnan(found["f"])
+
+
+def test_axes__are_found_by_cf_xarray(folder):
+    """Not by an attribute `axis`, with which ParaView would take x and y for longitude and latitude."""
+    pytest.importorskip("cf_xarray")
+    with xr.open_dataset(next(folder.glob("*.nc"))) as ds:
+        assert dict(ds.cf.axes) == {"X": ["x"], "Y": ["y"], "T": ["time"]}
+
+
+def test_axes__leave_the_surface_flat_in_paraview(folder):
+    """By the reader of VTK, which is ParaView's."""
+    vtk = pytest.importorskip("vtk")
+    path = next(folder.glob("*.nc"))
+    reader = vtk.vtkNetCDFCFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateMetaData()
+    reader.SetDimensions("(x, y)")
+    reader.Update()
+    image = reader.GetOutput()
+    with xr.open_dataset(path) as ds:
+        ends = [float(one) for axis in (ds.y, ds.x) for one in axis[[0, -1]]]
+        assert {image.GetPointData().GetArrayName(i) for i in range(3)} == {"pressure", "displacement", "height"}
+    assert image.GetBounds()[:4] == pytest.approx(ends, rel=1e-9)
+
+
+def test_zarr__gives_a_sweep_back(folder, tmp_path):
+    pytest.importorskip("zarr")
+    ds = rv.open_results(folder)
+    ds.to_zarr(tmp_path / "sweep.zarr", zarr_format=2)
+    with xr.open_zarr(tmp_path / "sweep.zarr", decode_timedelta=False) as back:
+        xr.testing.assert_equal(back.load(), ds.load())
+        assert back.program_0_load.attrs == ds.program_0_load.attrs
+
+
+def test_hvplot__draws_a_sweep(folder):
+    pytest.importorskip("hvplot.xarray")
+    drawn = rv.open_results(folder).contact_area.load().hvplot.line(x="time", by="case")
+    assert len(drawn) == 4
