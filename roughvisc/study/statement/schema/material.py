@@ -14,6 +14,7 @@ from pydantic import Field, ValidationInfo, WrapValidator, create_model, model_v
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.temperature import shifted
 from roughvisc.study.statement.body import BASE, body
@@ -166,6 +167,8 @@ class MaterialSection(Section):
 
     def kernel(self) -> Kernel:
         """What its surface does under pressure: a half-space's, or a sheet's."""
+        if self.sheet == dict.fromkeys(THICKNESS):  # a half-space asks nothing of the material, which may take a fit
+            return HALF_SPACE
         return body(self.build(), **self.sheet)
 
     @property
