@@ -65,17 +65,39 @@ def complex_compliance(material: Material, frequency: ArrayLike, tolerance: floa
     ([0.5, 0.375], [0.0, -0.125])
     """
     w = np.asarray(frequency, dtype=float)
+    closed = over_frequencies(material, w, tolerance)
+    if isinstance(closed, Pair):
+        return complex_compliance(closed.a, w) + complex_compliance(closed.b, w)
+    return _of_power_law(closed, w) if isinstance(closed, PowerLaw) else _of_series(closed, w)
+
+
+def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Prony | PowerLaw | Pair:
+    """What stands for a material at some frequencies, with a complex compliance in closed form.
+
+    Parameters
+    ----------
+    material : Material
+        A series, a power law and a pair of these stand for themselves; anything else has a certified series fitted.
+    frequency : array_like
+        Angular frequencies, of either sign. [1/s]
+    tolerance : float
+        Relative error of a series in place of the material.
+
+    Raises
+    ------
+    InputError
+        As :func:`complex_compliance`.
+    """
     if isinstance(material, Pair):
-        return complex_compliance(material.a, w, tolerance) + complex_compliance(material.b, w, tolerance)
-    if isinstance(material, PowerLaw):
-        return _of_power_law(material, w)
-    if isinstance(material, Prony):
-        return _of_series(material, w)
-    size = np.abs(w[w != 0])
+        return Pair(*(over_frequencies(body, frequency, tolerance) for body in (material.a, material.b)))
+    if isinstance(material, Prony | PowerLaw):
+        return material
+    size = np.abs(np.asarray(frequency, dtype=float))
+    size = size[size > 0]
     if not size.size:
         raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
-    return _of_series(series_of(complete(material), shortest, longest, tolerance).prony, w)
+    return series_of(complete(material), shortest, longest, tolerance).prony
 
 
 def _of_series(material: Prony, w: NDArray[np.float64]) -> Complex:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.sheet import Base
-from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.sliding.persson import persson
@@ -121,7 +121,7 @@ def friction(
     there, back = _turned(direction)
     gap = np.ascontiguousarray(there(ground.gap))
     sides = ground.spacing if direction.endswith("x") else ground.spacing[::-1]
-    compliance = partial(complex_compliance, material, tolerance=0.1 * tolerance)
+    waves = 2 * np.pi * np.fft.fftfreq(gap.shape[0], sides[0])
     smooth, shortest = without_last_octave(gap, sides) if last_octave else (gap, 0.0)
     if last_octave and not np.ptp(smooth) > 1e-9 * np.ptp(gap):
         raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
@@ -129,7 +129,8 @@ def friction(
     began, found, without = time.perf_counter(), None, None
     for number in np.argsort(asked):
         speed = float(asked[number])
-        sliding = Sliding(kernel, compliance, gap.shape, sides, speed)
+        closed = over_frequencies(material, speed * waves, 0.1 * tolerance)  # once: a table takes a fit
+        sliding = Sliding(kernel, partial(complex_compliance, closed), gap.shape, sides, speed)
         found = _state(sliding, gap, force, tolerance, found)
         row = _row(found, ground, there, back, speed, force, wanted)
         estimate = persson(sliding, gap, row["nominal_pressure"])

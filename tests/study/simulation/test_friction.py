@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.materials import frequency
 from roughvisc.variables import SLIDING, STATUS_MEANINGS
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
@@ -128,6 +129,15 @@ def test_measured_material__by_its_series(curve):
     found = rv.friction(ROUGH, table, **PRESS)
     # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
     np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
+
+
+def test_measured_material__is_fitted_once_a_speed(monkeypatch):
+    fitted, fit = [], frequency.series_of
+    monkeypatch.setattr(frequency, "series_of", lambda *asked: fitted.append(asked) or fit(*asked))
+    t = np.geomspace(1e-7, 1e3, 60)
+    table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
+    rv.friction(ROUGH, table, pressure=2e4, speeds=[0.1, 0.2], tolerance=1e-2)
+    assert len(fitted) == 2
 
 
 def test_seam__is_told():
