@@ -42,6 +42,10 @@ class DiskFullError(HinderedError):
     """No space is left for what a case has to write."""
 
 
+class TooLargeError(InputError, HinderedError):
+    """A case takes more memory than there is here: the message says how much, and what would fit."""
+
+
 class ChangedError(HinderedError):
     """A file was changed after the case that names it was read."""
 

@@ -206,6 +206,29 @@ def bounded_quantity(
     return number
 
 
+def stated_quantity(value: Any, unit: str, key: str, **bounds: Any) -> float:
+    """The same of a value that is known by a key, which messages begin with; scalars of NumPy and xarray are taken.
+
+    Parameters
+    ----------
+    value, unit, bounds
+        As :func:`bounded_quantity` has them.
+    key : str
+        What the value is given as.
+
+    Raises
+    ------
+    InputError
+        As :func:`bounded_quantity` does, beginning with the key.
+    """
+    if getattr(value, "shape", None) == ():
+        value = value.item()
+    try:
+        return bounded_quantity(value, unit, **bounds)
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from None
+
+
 def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> float:
     text = text.replace("°C", "degC").replace("°F", "degF")
     matched = _QUANTITY.fullmatch(text) if len(text) <= 100 else None

@@ -12,7 +12,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import KEEP, ORDER
-from roughvisc.topography.grid import checked, counts, like, noted, number, spacing, valid_values, with_coordinates
+from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
+from roughvisc.topography.grid import checked, counts, like, noted, number, require_heights, spacing, with_coordinates
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
@@ -37,7 +38,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     """
     h = checked(h, "level")
     ORDER.check("level: order", order)
-    valid_values(h, "level")
+    require_heights(h, "level")
     return noted(like(h, less_polynomial(h.values, order)), f"levelled: polynomial of order {order} removed")
 
 
@@ -49,9 +50,13 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     InputError
         If the points present do not determine the polynomial.
     """
-    heights = heights - np.nanmean(heights)  # absolute heights of instruments would cost digits
+    total = sum(np.nansum(heights[rows]) for rows in row_blocks(heights.shape))
+    count = sum(np.count_nonzero(~np.isnan(heights[rows])) for rows in row_blocks(heights.shape))
+    heights = heights - total / count  # absolute heights of instruments would cost digits
     for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
-        heights = heights - _polynomial(heights, order)
+        left, coefficients, right = _polynomial(heights, order)
+        for rows in row_blocks(heights.shape):
+            heights[rows] -= left[rows] @ coefficients @ right.T
     return heights
 
 
@@ -106,15 +111,10 @@ def gaussian_filter(
             f"gaussian_filter: cutoff is {cutoff!r}: expected at least three cells, {3 * max(sides):.6g} [m]"
         )
     KEEP.check("gaussian_filter: keep", keep)
-    mean = valid_values(h, "gaussian_filter").mean()
-    present = np.isfinite(h.values)
-    long = np.where(present, h.values - mean, 0.0)
-    share = present.astype(float)
-    for axis, d in enumerate(sides):
-        long, share = (_smoothed(field, axis, cutoff / d, periodic) for field in (long, share))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        long = np.where(present, long / share + mean, np.nan)
-    heights = long if keep == "long" else h.values - long
+    require_heights(h, "gaussian_filter")
+    heights = _long_waves(h.values, [cutoff / d for d in sides], periodic)
+    if keep == "short":
+        np.subtract(h.values, heights, out=heights)
     return noted(like(h, heights), f"Gaussian filter (ISO 16610-61), {keep} waves kept, cut-off {cutoff:.6g} m")
 
 
@@ -163,32 +163,46 @@ def averaged(
     filled : ndarray or None
         Where a point that was filled in has a part.
     """
-    present = np.isfinite(h.values)
-    total = along_x @ np.where(present, h.values, 0.0) @ along_y.T
-    share = along_x @ present.astype(float) @ along_y.T
-    with np.errstate(invalid="ignore", divide="ignore"):
-        heights = np.where(share >= 0.5 - 1e-12, total / share, np.nan)
-    if "filled" not in h.coords:
-        return heights, None
-    return heights, along_x @ h["filled"].transpose("x", "y").values.astype(float) @ along_y.T > 0
+    filled = h["filled"].transpose("x", "y").values if "filled" in h.coords else None
+    heights = np.empty((along_x.shape[0], along_y.shape[0]))
+    marked = None if filled is None else np.empty(heights.shape, dtype=bool)
+    for rows in row_blocks(heights.shape):
+        weights = along_x[rows]
+        reach = slice(int(weights.indices.min()), int(weights.indices.max()) + 1)
+        weights, known = weights[:, reach], h.values[reach]
+        present = np.isfinite(known)
+        total = weights @ np.where(present, known, 0.0) @ along_y.T
+        share = weights @ present.astype(float) @ along_y.T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            heights[rows] = np.where(share >= 0.5 - 1e-12, total / share, np.nan)
+        if filled is not None and marked is not None:
+            marked[rows] = weights @ filled[reach].astype(float) @ along_y.T > 0
+    return heights, marked
 
 
-def _polynomial(heights: np.ndarray, order: int) -> np.ndarray:
-    """Least-squares polynomial over the finite points, from moments, so that no design matrix is stored."""
-    present = np.isfinite(heights)
+def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Least-squares polynomial over the finite points: basis along x, coefficients, basis along y.
+
+    From moments, so that no design matrix is stored.
+    """
     bases = [np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order) for n in heights.shape]
     degrees = [order if n > 1 else 0 for n in heights.shape]  # heights do not vary across a strip
     terms = [(i, j) for i in range(degrees[0] + 1) for j in range(min(degrees[1], order - i) + 1)]
     products = [(b[:, :, None] * b[:, None, :]).reshape(len(b), -1) for b in bases]
-    moments = (products[0].T @ present.astype(float) @ products[1]).reshape([order + 1] * 4)
+    found, moments, right = 0, 0.0, 0.0
+    for rows in row_blocks(heights.shape):
+        present = np.isfinite(heights[rows])
+        found += int(present.sum())
+        moments = moments + products[0][rows].T @ present.astype(float) @ products[1]
+        right = right + bases[0][rows].T @ np.where(present, heights[rows], 0.0) @ bases[1]
+    moments = np.reshape(moments, [order + 1] * 4)
     normal = np.array([[moments[i, k, j, m] for k, m in terms] for i, j in terms])
-    right = bases[0].T @ np.where(present, heights, 0.0) @ bases[1]
     if np.linalg.cond(normal) > 1e12:
-        raise InputError(f"level: the {present.sum()} points present do not determine a polynomial of order {order}")
+        raise InputError(f"level: the {found} points present do not determine a polynomial of order {order}")
     coefficients = np.zeros((order + 1, order + 1))
     for (i, j), c in zip(terms, np.linalg.solve(normal, [right[i, j] for i, j in terms]), strict=True):
         coefficients[i, j] = c
-    return bases[0] @ coefficients @ bases[1].T
+    return bases[0], coefficients, bases[1]
 
 
 def _weights(old: int, new: int) -> scipy.sparse.csr_array:
@@ -204,6 +218,32 @@ def _weights(old: int, new: int) -> scipy.sparse.csr_array:
     middle = (edges[1:] + edges[:-1]) / 2
     entries = (np.diff(edges) / old, ((middle // old).astype(int), (middle // new).astype(int)))
     return scipy.sparse.csr_array(entries, shape=(new, old))
+
+
+def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np.ndarray:
+    """Waves longer than cut-offs in cells along each axis, missing where the heights are. [m]"""
+    mean = mean_of(heights)
+    long = np.empty_like(heights)
+    complete = True
+    for rows in row_blocks(heights.shape):
+        present = np.isfinite(heights[rows])
+        long[rows] = np.where(present, heights[rows] - mean, 0.0)
+        complete &= bool(present.all())
+    if complete:  # the shares of all points are products of those along each axis
+        shares = [_smoothed(np.ones((n, 1)), 0, c, periodic) for n, c in zip(heights.shape, cutoffs, strict=True)]
+        share = None
+    else:
+        share = np.isfinite(heights).astype(float)
+    for field in (long,) if share is None else (long, share):
+        for columns in column_blocks(heights.shape):
+            field[columns] = _smoothed(field[columns], 0, cutoffs[0], periodic)
+        for rows in row_blocks(heights.shape):
+            field[rows] = _smoothed(field[rows], 1, cutoffs[1], periodic)
+    for rows in row_blocks(heights.shape):
+        part = shares[0][rows] * shares[1].T if share is None else share[rows]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            long[rows] = np.where(np.isfinite(heights[rows]), long[rows] / part + mean, np.nan)
+    return long
 
 
 def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+
+from roughvisc.topography.blocks import deviation_of, row_blocks
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
 JUMP = 2.0
@@ -46,17 +49,26 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
         Zero along an axis of one cell, and for a flat surface.
     """
     values = h.transpose("x", "y").values
-    known = values[np.isfinite(values)]
-    rms = float(known.std()) if known.size else 0.0
+    rms = deviation_of(values)
     of_rms, of_neighbours = [], []
     for axis in (0, 1):
-        across = _rms(np.take(values, 0, axis) - np.take(values, -1, axis))
-        beside = _rms(np.diff(values, axis=axis))
+        across = _rms([np.take(values, 0, axis) - np.take(values, -1, axis)])
+        beside = _rms(_differences(values, axis))
         of_rms.append(across / rms if rms > 0 else 0.0)
         of_neighbours.append(across / beside if beside > 0 else 0.0)
     return BorderMismatch((of_rms[0], of_rms[1]), (of_neighbours[0], of_neighbours[1]))
 
 
-def _rms(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+def _differences(values: np.ndarray, axis: int) -> Iterator[np.ndarray]:
+    """Of neighbouring rows or columns, in blocks of rows."""
+    for rows in row_blocks(values.shape):
+        yield np.diff(values[rows.start : rows.stop + (axis == 0)], axis=axis)
+
+
+def _rms(parts: Iterable[np.ndarray]) -> float:
+    """Root mean square of what is finite in some arrays; zero if nothing is."""
+    total, count = 0.0, 0
+    for part in parts:
+        known = part[np.isfinite(part)]
+        total, count = total + (known**2).sum(), count + known.size
+    return float(np.sqrt(total / count)) if count else 0.0

@@ -9,7 +9,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
-from roughvisc.topography.grid import checked, like, noted, pair, spacing, valid_values, with_coordinates
+from roughvisc.topography.blocks import mean_of, row_blocks
+from roughvisc.topography.grid import checked, like, noted, pair, require_heights, spacing, with_coordinates
 from roughvisc.topography.laying import laid_on
 
 
@@ -215,15 +216,18 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
     """
     h = checked(h, "taper")
     widths = pair("width", width)
-    mean = valid_values(h, "taper").mean()
-    weight = np.ones(h.shape)
-    for axis, (w, d, n) in enumerate(zip(widths, spacing(h), h.shape, strict=True)):
+    require_heights(h, "taper")
+    mean = mean_of(h.values)
+    profiles = []
+    for w, d, n in zip(widths, spacing(h), h.shape, strict=True):
         if w > n * d / 2 * (1 + 1e-9):
             raise InputError(f"taper: width is {w!r}: expected at most half a side, {n * d / 2:.6g} [m]")
         from_border = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5) * d
-        profile = np.sin(np.pi / 2 * np.minimum(from_border / w, 1)) ** 2
-        weight = weight * (profile[:, None] if axis == 0 else profile)
-    return noted(like(h, mean + (h.values - mean) * weight), f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
+        profiles.append(np.sin(np.pi / 2 * np.minimum(from_border / w, 1)) ** 2)
+    heights = np.empty_like(h.values)
+    for rows in row_blocks(h.shape):
+        heights[rows] = mean + (h.values[rows] - mean) * (profiles[0][rows, None] * profiles[1])
+    return noted(like(h, heights), f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
@@ -242,9 +246,24 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
         Twice as many points along each axis. [m]
     """
     h = checked(h, "mirror")
-    nx, ny = h.shape
-    doubled = h.isel(x=np.r_[0:nx, nx - 1 : -1 : -1], y=np.r_[0:ny, ny - 1 : -1 : -1])
     axes = {}
     for axis, d in zip(("x", "y"), spacing(h), strict=True):
-        axes[axis] = (axis, float(h[axis][0]) + np.arange(doubled.sizes[axis]) * d, h[axis].attrs)
-    return noted(doubled.assign_coords(axes), "mirrored along x and y")
+        axes[axis] = (axis, float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d, h[axis].attrs)
+    maps = {
+        name: (("x", "y"), _with_images(one.transpose("x", "y").values), one.attrs)
+        for name, one in h.coords.items()
+        if set(one.dims) == {"x", "y"}
+    }
+    alone = {name: one.variable for name, one in h.coords.items() if not one.dims}
+    doubled = xr.DataArray(_with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
+    return noted(doubled, "mirrored along x and y")
+
+
+def _with_images(values: np.ndarray) -> np.ndarray:
+    """A map and its mirror images, written where they belong: no part of it is held twice."""
+    nx, ny = values.shape
+    whole = np.empty((2 * nx, 2 * ny), values.dtype)
+    whole[:nx, :ny] = values
+    whole[:nx, ny:] = values[:, ::-1]
+    whole[nx:] = whole[nx - 1 :: -1]
+    return whole

@@ -164,6 +164,11 @@ def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float,
     return axis_step(h, "x", step), axis_step(h, "y", step)
 
 
+def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
+    """Area that the nominal pressure on a surface refers to: of its whole grid, absent cells included. [m2]"""
+    return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))
+
+
 def axis_step(h: xr.DataArray | xr.Dataset, axis: str, step: str) -> float:
     """Side of the cells along one axis of a grid [m], as :func:`cell_side` gives it."""
     if axis not in h.coords:
@@ -244,12 +249,10 @@ def like(h: xr.DataArray, values: np.ndarray) -> xr.DataArray:
     return h.copy(deep=False, data=values)
 
 
-def valid_values(h: xr.DataArray, step: str) -> np.ndarray:
-    """The heights that are present [m], one-dimensional; an :class:`InputError` if there are none."""
-    values = h.values[np.isfinite(h.values)]
-    if not values.size:
+def require_heights(h: xr.DataArray, step: str) -> None:
+    """Refuse a grid of which all points are missing."""
+    if not any(np.isfinite(row).any() for row in h.values):
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
-    return values
 
 
 def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf, strict: bool = True) -> float:

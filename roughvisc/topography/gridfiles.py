@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -13,12 +14,15 @@ import xarray as xr
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
+from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
 #: Names that heights go by, in order of preference.
 _NAMES = ("height", "heights", "z", "h")
+#: How NetCDF-3 files begin: the classic format, and the one with offsets of 64 bits.
+_CLASSIC = (b"CDF\x01", b"CDF\x02")
 
 
 def grid_channels(path: Path) -> tuple[Channel, ...]:
@@ -47,7 +51,8 @@ def open_grid(
     with _open(path) as dataset:
         affordable(path, int(np.prod(channel.shape, dtype=object)), EXPANSION)
         h = dataset[channel.name]
-        h = h.load() if heights else h.copy(data=np.broadcast_to(np.nan, h.shape)).compute()
+        values = _read(h) if heights else np.broadcast_to(np.nan, h.shape)
+        h = h.copy(data=values).compute()
     extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
     h = h.transpose("x", "y")
     metres = _metres(unit_of(h), unit, channel.name)
@@ -60,12 +65,23 @@ def open_grid(
         else:
             axes.append(h[axis].values.astype(float) * _metres(unit_of(h[axis]), unit, axis))
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
-    grid = with_coordinates(h.values.astype(float) * metres if heights else h.values, *axes, attrs)
+    if heights and metres != 1.0:
+        values *= metres  # of which the grid is a view
+    grid = with_coordinates(h.values, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
             grid = grid.isel({axis: slice(None, None, -1)})
     return grid
+
+
+def _read(stored: xr.DataArray) -> np.ndarray:
+    """The numbers of a variable, read by blocks that hold whole chunks of the file: decoding makes copies."""
+    together = (stored.encoding.get("chunksizes") or (1,))[0]
+    values = np.empty(stored.shape)
+    for rows in row_blocks(stored.shape, multiple=together):
+        values[rows] = stored[rows].values
+    return values
 
 
 @contextmanager
@@ -76,9 +92,18 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
     if zarr:
         with xr.open_dataset(path, engine="zarr", decode_times=False) as dataset:
             yield dataset
+    elif _begins(path) in _CLASSIC:  # netCDF's own library does not survive every damaged one; no more than the file
+        content = io.BytesIO(path.read_bytes())  # is ever held, whatever sizes its header claims
+        with xr.open_dataset(content, engine="scipy", decode_times=False) as dataset:
+            yield dataset
     else:  # xarray would lock no more than the reading, and netCDF-4 does not stand two threads at all
         with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, engine="netcdf4", decode_times=False, lock=False) as dataset:
             yield dataset
+
+
+def _begins(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return stream.read(4)
 
 
 def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,11 @@ import numpy as np
 import scipy.ndimage
 import xarray as xr
 
+from roughvisc.topography.blocks import BLOCK, count_of, deviation_of, extremes_of, row_blocks
 from roughvisc.topography.borders import BorderMismatch, border_mismatch
 from roughvisc.topography.cards import condition
-from roughvisc.topography.conditioning import crop, gaussian_filter, level, mask_outliers, mirror
-from roughvisc.topography.grid import cell_edges, checked, spacing, valid_values
+from roughvisc.topography.conditioning import crop, fill, gaussian_filter, level, mask_outliers
+from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
 from roughvisc.topography.parameters import parameters
 from roughvisc.topography.spectrum import psd
 
@@ -127,47 +129,60 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
     h = checked(h, "inspect_scan")
     limits, holes = _without_holes(h)
     part = crop(h, **limits) if limits else h
-    levelled = level(part)
-    masked = mask_outliers(levelled)
-    missing = int(part.isnull().sum())
-    spikes = int(masked.isnull().sum()) - missing
+    missing, spikes, rms_levelled, tilt, kept = _despiked(part)
     doubtful = spikes > MOST_SPIKES * part.size
-    kept = levelled if doubtful else masked
     straight, flat = _rms(level(kept)), _rms(level(kept, 2)) if min(part.shape) > 2 else np.nan
     curved = flat < np.sqrt(1 - FORM) * straight
     steps: dict[str, Any] = {"crop": limits} if limits else {}
     steps |= {"level": 2 if curved else _order(part, kept)}
     steps |= {"outliers": True} if spikes and not doubtful else {}
     steps |= {"fill": "harmonic"} if missing or "outliers" in steps else {}
-    treated = condition(h, steps)
+    points, rms_raw = part.size, _rms(part)
+    del part  # of a big scan no more is held than is needed
+    if steps["level"] == 1 and not doubtful:  # what comes of these steps is there
+        treated = fill(kept) if "fill" in steps else kept
+        del kept
+    else:
+        del kept
+        treated = condition(h, steps)
     borders = border_mismatch(treated)
     noise = _noise(treated)
     if noise is not None and noise.noisy_slopes > _HARMLESS and noise.wavelength >= 3 * max(spacing(treated)):
         steps["filter"] = float(f"{noise.wavelength:.2g}")
         steps["filter"] = max(steps["filter"], 3.001 * max(spacing(treated)))
         treated = gaussian_filter(treated, steps["filter"])
-    slope = float(parameters(treated)["rms_slope"])
-    if borders.jumps:
-        steps["mirror"] = True
-        treated = mirror(treated)
-    area = float(np.prod([n * d for n, d in zip(treated.shape, spacing(treated), strict=True)]))
+    steps |= {"mirror": True} if borders.jumps else {}
+    images = 2 if borders.jumps else 1
     return Inspection(
-        points=part.size,
+        points=points,
         missing=missing,
         spikes=spikes,
         holes=holes,
-        rms_raw=_rms(part),
-        rms_levelled=_rms(levelled),
+        rms_raw=rms_raw,
+        rms_levelled=rms_levelled,
         rms_despiked=straight,
         rms_flat=flat,
-        tilt=_tilt(part, levelled),
+        tilt=tilt,
         borders=borders,
         noise=noise,
-        rms_slope=slope,
-        area=area,
-        shape=(treated.shape[0], treated.shape[1]),
+        rms_slope=float(parameters(treated)["rms_slope"]),
+        area=float(np.prod([images * n * d for n, d in zip(treated.shape, spacing(treated), strict=True)])),
+        shape=(images * treated.shape[0], images * treated.shape[1]),
         steps=steps,
     )
+
+
+def _despiked(part: xr.DataArray) -> tuple[int, int, float, tuple[float, float], xr.DataArray]:
+    """Missing points and spikes, rms height [m] and tilt of a scan, and the scan less its plane.
+
+    It is without the spikes, unless they are so many that they may be the surface.
+    """
+    missing = part.size - count_of(part.values)
+    levelled = level(part)
+    rms, tilt = _rms(levelled), _tilt(part, levelled)
+    masked = mask_outliers(levelled)
+    spikes = part.size - count_of(masked.values) - missing
+    return missing, spikes, rms, tilt, levelled if spikes > MOST_SPIKES * part.size else masked
 
 
 def _order(part: xr.DataArray, levelled: xr.DataArray) -> int:
@@ -176,14 +191,16 @@ def _order(part: xr.DataArray, levelled: xr.DataArray) -> int:
 
 
 def _rms(h: xr.DataArray) -> float:
-    return float(valid_values(h, "inspect_scan").std())
+    require_heights(h, "inspect_scan")
+    return deviation_of(h.values)
 
 
 def _tilt(before: xr.DataArray, after: xr.DataArray) -> tuple[float, float]:
-    """Slopes of the plane that was taken off. [-]"""
-    plane = before.values - after.values
+    """Slopes of the plane that was taken off; of a big scan, from some of its points. [-]"""
+    every = math.ceil(math.sqrt(8 * before.size / BLOCK))
+    plane = before.values[::every, ::every] - after.values[::every, ::every]
     nx, ny = plane.shape
-    dx, dy = spacing(before)
+    dx, dy = (every * d for d in spacing(before))
     with np.errstate(invalid="ignore"):
         known = np.isfinite(plane)
     x, y = np.meshgrid((np.arange(nx) - nx / 2) * dx, (np.arange(ny) - ny / 2) * dy, indexing="ij")
@@ -195,10 +212,14 @@ def _tilt(before: xr.DataArray, after: xr.DataArray) -> tuple[float, float]:
 
 def _without_holes(h: xr.DataArray) -> tuple[dict[str, tuple[float, float]], float]:
     """Limits of the largest rectangle without large holes [m], empty if there are none, and the share in them."""
-    missing = h.isnull().values
-    if not missing.any():
+    if count_of(h.values) == h.size:
         return {}, 0.0
-    void = scipy.ndimage.uniform_filter(missing.astype(float), _WINDOW, mode="nearest") > 0.5
+    void, reach = np.empty(h.shape, dtype=bool), _WINDOW // 2
+    for rows in row_blocks(h.shape):  # each with the rows that its windows reach
+        first = max(rows.start - reach, 0)
+        missing = np.isnan(h.values[first : rows.stop + reach]).astype(float)
+        mean = scipy.ndimage.uniform_filter(missing, _WINDOW, mode="nearest")
+        void[rows] = mean[rows.start - first : rows.stop - first] > 0.5
     share = float(void.mean())
     if share < _HOLES:
         return {}, share
@@ -234,7 +255,10 @@ def _largest_rectangle(present: np.ndarray) -> tuple[tuple[int, int], tuple[int,
 def _noise(h: xr.DataArray) -> Noise | None:
     """Short-wave end of the spectrum; None where the surface is flat, small, or has missing points."""
     values, sides = h.values, spacing(h)
-    if min(h.shape) < 16 or np.isnan(values).any() or not values.std() > 1e-12 * np.abs(values).max(initial=1e-300):
+    if min(h.shape) < 16 or count_of(values) < h.size:
+        return None
+    rms = deviation_of(values)
+    if not rms > 1e-12 * max(1e-300, *map(abs, extremes_of(values))):
         return None
     spectrum = psd(h, "hann")
     q, density, modes = (spectrum[name].values for name in ("wavevector", "psd", "modes"))
@@ -246,7 +270,7 @@ def _noise(h: xr.DataArray) -> Noise | None:
     smooth = scipy.ndimage.median_filter(density, 5, mode="nearest")
     below = np.flatnonzero(smooth < _ABOVE * tail)
     strength = float(np.sqrt(tail / (sides[0] * sides[1])))
-    floor = bool(power > _WHITE and below.size and below[0] > 0 and strength > _ROUNDING * values.std())
+    floor = bool(power > _WHITE and below.size and below[0] > 0 and strength > _ROUNDING * rms)
     shortest = float(2 * np.pi / q[below[0] - 1]) if floor else 2 * max(sides)
     slopes = density * modes * q**2
 

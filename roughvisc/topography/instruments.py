@@ -266,7 +266,7 @@ def _npy(path: Path) -> Opened:
     areal = heights.ndim == 2 and heights.dtype.kind in "fiu"
 
     def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
-        return np.asarray(heights, dtype=float) * unit, None
+        return np.multiply(heights, unit, dtype=float), None
 
     return Opened("npy", (Channel(0, "array", areal, heights.shape, None),), load)
 
@@ -305,7 +305,13 @@ def _surface_topography(path: Path, format: str, source: TextIO | None = None) -
             raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
         sized = found.physical_sizes is not None
         topography = found.topography() if sized else found.topography(physical_sizes=channel.shape)
-        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * metres(channel, unit)
+        read = np.ma.asarray(topography.heights(), dtype=float)
+        heights = np.ma.filled(read, np.nan)
+        # a copy is scaled where it is; what the library may still hold is not
+        heights = np.multiply(
+            heights, metres(channel, unit), out=None if np.may_share_memory(heights, read.data) else heights
+        )
+        del read
         if top_line_first(format):
             heights = heights[:, ::-1]
         return heights, cells(topography.physical_sizes, heights.shape, channel, unit) if sized else None

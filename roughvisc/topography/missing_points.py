@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -11,10 +11,14 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import FILL, WINDOW
-from roughvisc.topography.grid import checked, like, noted, number, spacing, valid_values
+from roughvisc.topography.blocks import extremes_of, median_of
+from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
+from roughvisc.topography.harmonic import harmonic
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
+#: Numbers in the windows that are sorted at once.
+_AT_ONCE = 2_000_000
 
 
 def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> xr.DataArray:
@@ -48,13 +52,21 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     h = checked(h, "mask_outliers")
     WINDOW.check("mask_outliers: window", window)
     threshold = number("threshold", threshold, "-")
-    valid_values(h, "mask_outliers")
-    off = np.abs(h.values - _local_median(h.values, window))
-    scale = np.fmax(_local_median(off, window), np.nanmedian(off)) * _MAD
-    outlier = off > np.maximum(threshold * scale, 1e-12 * np.nanmax(np.abs(h.values)))
+    require_heights(h, "mask_outliers")
+    off = np.empty_like(h.values)
+    for rows, median in _local_median(h.values, window):
+        off[rows] = np.abs(h.values[rows] - median)
+    typical, faintest = median_of(off), 1e-12 * max(map(abs, extremes_of(h.values)))
+    outlier = np.empty(h.shape, dtype=bool)
+    for rows, median in _local_median(off, window):
+        scale = np.fmax(median, typical) * _MAD
+        outlier[rows] = off[rows] > np.maximum(threshold * scale, faintest)
     count = int(outlier.sum())
+    heights = off  # its memory
+    heights[...] = h.values
+    heights[outlier] = np.nan
     line = f"outliers masked: {count} points beyond {threshold:g} deviations from the median of {window} x {window}"
-    return noted(like(h, np.where(outlier, np.nan, h.values)), line, outliers=count + h.attrs.get("outliers", 0))
+    return noted(like(h, heights), line, outliers=count + h.attrs.get("outliers", 0))
 
 
 def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "harmonic") -> xr.DataArray:
@@ -86,9 +98,11 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
         raise InputError(
             "fill: the missing cells are absent (there is no material): expected a scan with missing points"
         )
-    valid_values(h, "fill")
+    require_heights(h, "fill")
     missing = np.isnan(h.values)
-    heights = np.where(missing, _FILLS[method](h, missing), h.values) if missing.any() else h.values.copy()
+    heights = h.values.copy()
+    if missing.any():
+        heights[missing] = _FILLS[method](h.values, missing, spacing(h))
     marked = missing | (h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else False)
     filled = like(h, heights).assign_coords(
         filled=(("x", "y"), marked, {"long_name": "height was missing and filled in"})
@@ -97,14 +111,19 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
     return noted(filled, line, fill_method=method)
 
 
-def _local_median(values: np.ndarray, window: int) -> np.ndarray:
-    """Median over a square window of the finite values, NaN where there are none; smaller windows at the border."""
+def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.ndarray]]:
+    """Rows, and the median over a square window of the finite values about each of their points.
+
+    NaN where there are none; smaller windows at the border. In blocks: a window's worth of copies of the whole would
+    be large.
+    """
     reach = window // 2
-    padded = np.pad(values, reach, constant_values=np.nan)
-    result = np.empty_like(values)
-    rows = max(1, 2_000_000 // (window**2 * values.shape[1]))
-    for start in range(0, len(values), rows):  # in blocks: a window's worth of copies of the whole would be large
-        block = padded[start : start + rows + 2 * reach]
+    rows = max(1, _AT_ONCE // (window**2 * values.shape[1]))
+    for start in range(0, len(values), rows):
+        stop = min(start + rows, len(values))
+        first, last = max(start - reach, 0), min(stop + reach, len(values))
+        beyond = (first - (start - reach), stop + reach - last)
+        block = np.pad(values[first:last], [beyond, (reach, reach)], constant_values=np.nan)
         stacked = np.lib.stride_tricks.sliding_window_view(block, (window, window)).reshape(
             *(-1, values.shape[1]), window**2
         )
@@ -112,40 +131,34 @@ def _local_median(values: np.ndarray, window: int) -> np.ndarray:
         count = np.isfinite(ordered).sum(axis=-1)[..., None]
         low = np.take_along_axis(ordered, np.maximum((count - 1) // 2, 0), axis=-1)
         high = np.take_along_axis(ordered, np.minimum(count // 2, window**2 - 1), axis=-1)
-        result[start : start + rows] = np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
-    return result
+        yield slice(start, stop), np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
 
 
-def _harmonic(h: xr.DataArray, missing: np.ndarray) -> np.ndarray:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the library's imports
-        from SurfaceTopography import Topography
-
-    offset = np.nanmean(h.values)
-    masked = np.ma.masked_array(np.where(missing, 0.0, h.values - offset), mask=missing)
-    return offset + np.asarray(Topography(masked, h.shape).interpolate_undefined_data().heights())
+def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:
+    """The nearest height present, of each missing point. [m]"""
+    nearest = scipy.ndimage.distance_transform_edt(missing, sides, return_distances=False, return_indices=True)
+    return heights[nearest[0][missing], nearest[1][missing]]
 
 
-def _nearest(h: xr.DataArray, missing: np.ndarray) -> np.ndarray:
-    nearest = scipy.ndimage.distance_transform_edt(missing, spacing(h), return_distances=False, return_indices=True)
-    return h.values[tuple(nearest)]
-
-
-def _linear(h: xr.DataArray, missing: np.ndarray) -> np.ndarray:
+def _linear(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:
+    """Heights on the triangles between points present, of each missing point. [m]"""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
-    heights = _nearest(h, missing)
+    found = _nearest(heights, missing, sides)
     # the points that border a hole are enough; all would be triangulated for minutes
     rim = scipy.ndimage.binary_dilation(missing, np.ones((3, 3)), iterations=2) & ~missing
-    sides = np.array(spacing(h))
+    steps = np.array(sides)
     try:
-        between = LinearNDInterpolator(np.argwhere(rim) * sides / sides.max(), h.values[rim])
+        between = LinearNDInterpolator(np.argwhere(rim) * steps / steps.max(), heights[rim])
     except QhullError:  # all on one line: the nearest are all there is
-        return heights
-    inside = between(np.argwhere(missing) * sides / sides.max())
-    heights[missing] = np.where(np.isnan(inside), heights[missing], inside)
-    return heights
+        return found
+    inside = between(np.argwhere(missing) * steps / steps.max())
+    return np.where(np.isnan(inside), found, inside)
 
 
-_FILLS = {"harmonic": _harmonic, "nearest": _nearest, "linear": _linear}
+_FILLS = {
+    "harmonic": lambda heights, missing, sides: harmonic(heights, missing),
+    "nearest": _nearest,
+    "linear": _linear,
+}

@@ -21,6 +21,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography import gridfiles, instruments
+from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.instruments import Channel, Opened, brief, forget
@@ -285,12 +286,23 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
 
 def _low_enough(h: xr.DataArray, path: Path) -> None:
     """Refuse heights of metres, whose unit is another; not in a file of a dozen points, which is an example."""
-    beyond = np.abs(h.values) > HIGHEST
-    if beyond.any() and h.size >= _FEWEST:
+    count, example = _beyond(h.values, HIGHEST)
+    if count and h.size >= _FEWEST:
         raise InputError(
-            f"{path}: {beyond.sum()} heights are like {h.values[beyond][0]:.6g} m, which is not plausible (at most "
+            f"{path}: {count} heights are like {example:.6g} m, which is not plausible (at most "
             f"{HIGHEST:g} m from zero): expected heights in the unit that the file states, or that unit= states"
         )
+
+
+def _beyond(values: np.ndarray, most: float) -> tuple[int, float]:
+    """How many heights are further from zero, and the first of them. [m]"""
+    count, example = 0, math.nan
+    for rows in row_blocks(values.shape):
+        beyond = np.abs(values[rows]) > most
+        if beyond.any():
+            example = example if count else float(values[rows][beyond][0])
+            count += int(beyond.sum())
+    return count, example
 
 
 def finite(h: xr.DataArray, source: str) -> None:
@@ -298,9 +310,9 @@ def finite(h: xr.DataArray, source: str) -> None:
     values = h.values
     if np.isnan(values).all():
         raise InputError(f"{source}: all {h.size} points are missing: expected heights")
-    beyond = np.abs(values) > FARTHEST
-    if beyond.any():
+    count, example = _beyond(values, FARTHEST)
+    if count:
         raise InputError(
-            f"{source}: {beyond.sum()} heights are like {values[beyond][0]:.6g} m: expected none beyond {FARTHEST:g} m "
+            f"{source}: {count} heights are like {example:.6g} m: expected none beyond {FARTHEST:g} m "
             "(where they mark missing points, put NaN in their place and use from_array)"
         )

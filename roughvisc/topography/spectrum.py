@@ -9,6 +9,7 @@ import scipy.fft
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.blocks import column_blocks, count_of, mean_of, row_blocks
 from roughvisc.topography.grid import checked, spacing
 
 # Of the mean square slope, what tells the shortest wave of a surface.
@@ -17,8 +18,14 @@ _OF_SLOPE = 0.99
 
 def hann(z: np.ndarray) -> np.ndarray:
     """Heights under a Hann window whose mean square is one. [m]"""
-    weight = np.multiply.outer(*(1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n) for n in z.shape))
-    return z * weight / np.sqrt(np.mean(weight**2))
+    along_x, along_y = _hann_weights(z.shape)
+    return z * along_x[:, None] * along_y
+
+
+def _hann_weights(shape: tuple[int, ...]) -> list[np.ndarray]:
+    """Weights along each axis, of mean square one. [-]"""
+    weights = [1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n) for n in shape]
+    return [weight / np.sqrt(np.mean(weight**2)) for weight in weights]
 
 
 def modes(
@@ -42,14 +49,20 @@ def modes(
     power, count : ndarray, shape (nx, ny // 2 + 1)
         Squared moduli [m2], and how many modes each stands for: two where its conjugate is not stored.
     """
-    (nx, ny), (dx, dy) = z.shape, cells
+    q_x, q_y, count = _wavevectors(z.shape, cells)
     power = np.abs(scipy.fft.rfft2(z, norm=norm)) ** 2
+    return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
+
+
+def _wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Wavevectors along x and, from zero on, along y [rad/m]; how many modes a column stands for."""
+    (nx, ny), (dx, dy) = shape, cells
     q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy)
     count = np.full(q_y.size, 2.0)
     count[0] = 1.0
     if ny % 2 == 0:
         count[-1] = 1.0
-    return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
+    return q_x, q_y, count
 
 
 def without_last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, float]:
@@ -69,15 +82,27 @@ def without_last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.n
     shortest : float
         Twice the wavelength above which 99 % of the mean square slope lie: what is below that one counts as none. [m]
     """
-    q_x, q_y, power, count = modes(z, cells)
-    q = np.hypot(q_x, q_y)
-    order = np.argsort(q, axis=None)
-    slope = np.cumsum((count * q**2 * power).ravel()[order])
-    if not slope[-1] > 0:
+    q_x, q_y, count = _wavevectors(z.shape, cells)
+    waves, q = scipy.fft.rfft2(z), np.hypot(q_x[:, None], q_y)
+    begins = last_octave(q, count * q**2 * np.abs(waves) ** 2)
+    if not begins:
         return z, 0.0
-    most = 0.5 * float(q.ravel()[order][np.searchsorted(slope, _OF_SLOPE * slope[-1])])
-    kept = scipy.fft.irfft2(np.where(q <= most, scipy.fft.rfft2(z), 0.0), s=z.shape)
-    return kept, 2 * np.pi / most
+    return scipy.fft.irfft2(np.where(q <= begins, waves, 0.0), s=z.shape), 2 * np.pi / begins
+
+
+def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
+    """Wave number beyond which the shortest octave of waves lies; zero of a surface without slopes. [rad/m]
+
+    Parameters
+    ----------
+    q, slope : ndarray
+        Length of each wavevector [rad/m], and its share in the mean square slope, on any scale.
+    """
+    order = np.argsort(q, axis=None)
+    summed = np.cumsum(slope.ravel()[order])
+    if not summed[-1] > 0:
+        return 0.0
+    return 0.5 * float(q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])])
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
@@ -113,21 +138,24 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     """
     h = checked(h, "psd", least=1)
-    if np.isnan(h.values).any():
-        raise InputError(f"psd: {int(np.isnan(h.values).sum())} points are missing: expected none (fill them first)")
+    if missing := h.size - count_of(h.values):
+        raise InputError(f"psd: {missing} points are missing: expected none (fill them first)")
     if window not in (None, "hann"):
         raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
     cells, shape = spacing(h), h.shape
-    z = h.values - h.values.mean()
-    q_x, q_y, power, count = modes(hann(z) if window else z, cells)
-    density = power * (cells[0] * cells[1] / (shape[0] * shape[1]))
-    q, count = np.hypot(q_x, q_y), count.ravel()
+    q_x, q_y, stands_for = _wavevectors(shape, cells)
     step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)
-    ring = np.maximum(np.round(q.ravel() / step).astype(int), 1) - 1
-    ring[0] = -1  # the mean
-    counted, at, total = (
-        np.bincount(ring + 1, weight)[1:] for weight in (count, count * q.ravel(), count * density.ravel())
-    )
+    most = max(round(float(np.hypot(np.abs(q_x).max(), q_y[-1])) / step), 1)
+    counted, at, total = np.zeros((3, most))
+    z_q = _transformed(h.values, window is not None)
+    for rows in row_blocks(z_q.shape):
+        density = (np.abs(z_q[rows]) ** 2 * (cells[0] * cells[1] / (shape[0] * shape[1]))).ravel()
+        q = np.hypot(q_x[rows, None], q_y)
+        count = np.broadcast_to(stands_for, q.shape).ravel()
+        ring = np.maximum(np.round(q.ravel() / step).astype(int), 1)
+        ring[q.ravel() == 0] = 0  # the mean
+        for found, weight in ((counted, count), (at, count * q.ravel()), (total, count * density)):
+            found += np.bincount(ring, weight, most + 1)[1:]
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
@@ -143,3 +171,16 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         coords={"wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"})},
         attrs={"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"},
     )
+
+
+def _transformed(heights: np.ndarray, window: bool) -> np.ndarray:
+    """Transform of heights less their mean, in blocks along each axis: no copy of the heights beside it. [m]"""
+    along_x, along_y = _hann_weights(heights.shape)
+    mean = mean_of(heights)
+    z_q = np.empty((heights.shape[0], heights.shape[1] // 2 + 1), dtype=complex)
+    for rows in row_blocks(heights.shape):
+        z = heights[rows] - mean
+        z_q[rows] = scipy.fft.rfft(z * along_x[rows, None] * along_y if window else z, axis=1)
+    for columns in column_blocks(z_q.shape, z_q.itemsize):
+        z_q[columns] = scipy.fft.fft(z_q[columns], axis=0)
+    return z_q

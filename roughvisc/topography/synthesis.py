@@ -5,6 +5,7 @@ Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the reci
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -16,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, grown, recipe_of, sphere
 
-__all__ = ["cone", "flat_punch", "grown", "self_affine", "sphere", "wavy"]
+__all__ = ["cone", "flat_punch", "grown", "is_analytic", "self_affine", "sphere", "wavy"]
 
 
 def wavy(amplitude: float, wavelength: float, size: Any, shape: Any, waves: int = 2) -> xr.DataArray:
@@ -190,3 +191,22 @@ def _synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
         rows = scipy.fft.irfft(spectrum[start : start + 64], ny, axis=1, norm="forward")
         flat[start * ny : start * ny + rows.size] = rows.reshape(-1)
     return flat[: nx * ny].reshape(nx, ny)
+
+
+def is_analytic(h: xr.DataArray) -> bool:
+    """Whether heights are those of an indenter or a regular wave, by a recipe that still gives them.
+
+    Examples
+    --------
+    >>> ball = sphere(1e-2, 1e-3, 8)
+    >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
+    (True, False, True)
+    """
+    if grown(h, 1.0) is not None:
+        return True
+    try:
+        recipe = json.loads(h.attrs["recipe"])
+        again = wavy(size=recipe["size"], shape=recipe["shape"], **recipe["parameters"]).values
+    except (KeyError, TypeError, ValueError):
+        return False
+    return again.shape == h.shape and bool(np.abs(h.values - again).max() <= 1e-9 * np.abs(again).max())

@@ -16,11 +16,14 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.blocks import BLOCK
 from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.readers import sha256
 
 #: Suffixes that :func:`save_scan` knows.
 WRITABLE = (".nc", ".x3p", ".sdf")
+#: Sides of a chunk of a big grid in netCDF.
+_CHUNK = 256
 
 
 def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
@@ -43,8 +46,7 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
     known_suffix(path)
     cell = spacing(h)
     if path.suffix.lower() == ".nc":
-        compressed = {"zlib": True, "complevel": 1, "shuffle": True}
-        h.rename("height").to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
+        _save_netcdf(h.rename("height"), path)
     elif path.suffix.lower() == ".x3p":
         import x3pio
 
@@ -56,6 +58,14 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
 
         metadata = sdfio.Metadata(manufacturer_id="roughvisc")
         sdfio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
+
+
+def _save_netcdf(h: xr.DataArray, path: Path) -> None:
+    """Write a grid with all that it holds."""
+    compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+    if h.nbytes > BLOCK:
+        compressed["chunksizes"] = tuple(min(n, _CHUNK) for n in h.shape)  # to be read by blocks of rows
+    h.to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
 
 
 def known_suffix(path: Path) -> None:

@@ -169,6 +169,7 @@ def client():
         yield client
 
 
+@pytest.mark.long
 def test_open_mfdataset__opens_a_hundred_scans_lazily_in_processes(client, tmp_path):
     paths = []
     for i in range(100):

@@ -359,6 +359,20 @@ def test_damage__of_real_scans(name, tmp_path):
     survive(tmp_path / name, (SCANS / name).read_bytes(), **options)
 
 
+@pytest.mark.parametrize("version", ["NETCDF3_CLASSIC", "NETCDF3_64BIT"])
+def test_netcdf_classic__is_kept_from_the_library_that_damage_crashes(version, tmp_path, monkeypatch):
+    whole = from_array(tilted(), CELL).to_dataset(name="height").expand_dims(scan=2)
+    packed = {"height": {"dtype": "int16", "scale_factor": 1e-9, "_FillValue": -1}}
+    whole.isel(scan=0).to_netcdf(tmp_path / "scan.nc", format=version, engine="netcdf4", encoding=packed)
+    monkeypatch.setattr("netCDF4.Dataset", None)
+    found = open_scan(tmp_path / "scan.nc")
+    np.testing.assert_allclose(found, tilted(), atol=1e-9)
+    assert found.dtype.isnative
+    assert found.attrs["source_sha256"] == hashlib.sha256((tmp_path / "scan.nc").read_bytes()).hexdigest()
+    (tmp_path / "cut.nc").write_bytes((tmp_path / "scan.nc").read_bytes()[:-40])
+    assert "damaged" in refusal(tmp_path / "cut.nc")
+
+
 @pytest.mark.parametrize("kind", ["x3p", "npy"])
 def test_damage__forged_header_allocates_nothing(kind, tmp_path):
     path = tmp_path / f"forged.{kind}"
