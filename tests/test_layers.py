@@ -39,6 +39,7 @@ ALLOWED = {
         "units",
     },
     "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.halfspace"},
+    "mechanics.transport": {"errors", "mechanics.contact", "mechanics.halfspace"},
     "mechanics.closed_forms": {"errors", "mechanics.halfspace", "mechanics.materials", "mechanics.stepping"},
     "topography": _LABELS,
     "study.statement": _STATEMENT,

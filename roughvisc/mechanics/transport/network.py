@@ -1,0 +1,132 @@
+"""The gap as a network: cells that a fluid may fill, and the faces through which it flows from one to the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Conductances of the faces of a grid, relative to the mobility of the widest cell.
+
+    Attributes
+    ----------
+    along : ndarray, shape (nx + 1, ny)
+        Of the faces across the flow; the first and the last row are the two sides. [-]
+    across : ndarray, shape (nx, ny)
+        Of the face of each cell to its neighbour at larger y; the last column joins the borders or is closed. [-]
+    scale : float
+        Mobility of the widest cell, its gap cubed over 12. [m^3]
+    """
+
+    along: Array
+    across: Array
+    scale: float
+
+
+@dataclass(frozen=True)
+class Network:
+    """The cells on some path from one side to the other.
+
+    Attributes
+    ----------
+    cells : ndarray of int, shape (n,)
+        Their places in the flattened map.
+    first, second : ndarray of int, shape (m,)
+        Numbers of the cells that each face joins, the first below the second; sorted, each pair once.
+    conductance : ndarray, shape (m,)
+        Of these faces. [-]
+    entrance, exit : ndarray, shape (n,)
+        Conductances to the sides where the fluid comes in and goes out; zero of cells inside. [-]
+    """
+
+    cells: Numbers
+    first: Numbers
+    second: Numbers
+    conductance: Array
+    entrance: Array
+    exit: Array
+
+
+def faces_of(gap: Array, spacing: tuple[float, float], wrap: bool) -> Faces:
+    """Conductances of all faces of a map.
+
+    Parameters
+    ----------
+    gap : ndarray, shape (nx, ny)
+        Not missing; cells without a positive one are closed. [m]
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+    wrap : bool
+        Whether the borders across the flow meet, or are walls.
+
+    Returns
+    -------
+    Faces
+
+    Notes
+    -----
+    The mobility of a cell is its gap cubed over 12. Between the centres of two cells the two halves are in series: the
+    conductance is the harmonic mean of their mobilities times the length of the face over the distance; that of a side,
+    at half the distance, is twice the mobility of the cell times the same.
+    """
+    widest = float(gap.max(initial=0.0))
+    if not widest > 0:
+        nothing = np.zeros((gap.shape[0] + 1, gap.shape[1]))
+        return Faces(nothing, nothing[:-1], 0.0)
+    mobility = (np.maximum(gap, 0.0) / widest) ** 3
+    aspect = spacing[1] / spacing[0]
+    along = np.concatenate([2 * mobility[:1], _in_series(mobility[:-1], mobility[1:]), 2 * mobility[-1:]])
+    across = _in_series(mobility, np.roll(mobility, -1, axis=1))
+    if not wrap or gap.shape[1] == 1:
+        across[:, -1] = 0.0
+    return Faces(along * aspect, across / aspect, widest**3 / 12)
+
+
+def _in_series(one: Array, other: Array) -> Array:
+    """Harmonic mean; without the product, which a double may not hold."""
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    return 2 * low / (1 + np.divide(low, high, where=high > 0, out=np.zeros_like(low)))
+
+
+def network_of(faces: Faces) -> Network | None:
+    """The cells on some path from one side to the other; None where nothing connects the two.
+
+    Cells that share only a corner are apart. Dead ends of the paths are among the cells.
+    """
+    nx, ny = faces.across.shape
+    number = np.arange(nx * ny).reshape(nx, ny)
+    first = np.concatenate([number[:-1].ravel(), number.ravel()])
+    second = np.concatenate([number[1:].ravel(), np.roll(number, -1, axis=1).ravel()])
+    conductance = np.concatenate([faces.along[1:-1].ravel(), faces.across.ravel()])
+    entrance, exit_ = np.zeros((2, nx, ny))
+    entrance[0], exit_[-1] = faces.along[0], faces.along[-1]
+    open_ = np.flatnonzero(conductance)
+    kept = _spanning(first[open_], second[open_], entrance.ravel() > 0, exit_.ravel() > 0)
+    if not kept.any():
+        return None
+    cells = np.flatnonzero(kept)
+    new = np.cumsum(kept) - 1
+    open_ = open_[kept[first[open_]]]
+    ends = np.sort(np.stack([new[first[open_]], new[second[open_]]]), axis=0)
+    # two cells across whose borders meet share two faces: one of both together
+    joined = sparse.coo_array((conductance[open_], ends), shape=(len(cells), len(cells))).tocsr()
+    rows = np.repeat(np.arange(len(cells)), np.diff(joined.indptr))
+    columns = joined.indices.astype(np.int64)
+    return Network(cells, rows, columns, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
+
+
+def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leaving: NDArray[np.bool_]) -> NDArray:
+    """Cells of the connected parts that touch both sides."""
+    count = len(entering)
+    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    touched = [np.bincount(part[side], minlength=part.max(initial=0) + 1) > 0 for side in (entering, leaving)]
+    return (touched[0] & touched[1])[part]

@@ -1,0 +1,250 @@
+"""Flow through a gap: networks solved by hand, means of the gap cubed, duality, bounds that close."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from roughvisc.mechanics.transport.bounds import bounds
+from roughvisc.mechanics.transport.flow import flow, fluxes
+from roughvisc.mechanics.transport.network import faces_of, network_of
+
+CELL = (2e-6, 3e-6)
+
+
+def random_gap(shape, seed=0, open_part=0.7, decades=4.0):
+    """Gaps that span decades, and cells without one. [m]"""
+    source = np.random.default_rng(seed)
+    gap = 1e-6 * 10 ** (-decades / 3 * source.random(shape))
+    return np.where(source.random(shape) < open_part, gap, 0.0)
+
+
+def series(gaps):
+    """Conductance of a channel one cell wide, half cells at its ends. [m3]"""
+    return CELL[1] / np.sum(CELL[0] / (np.asarray(gaps) ** 3 / 12))
+
+
+def kirchhoff(gap, cell, wrap):
+    """Conductance by a dense matrix written cell by cell; the closed cells carry a leak that no one can see."""
+    nx, ny = gap.shape
+    mobility = gap**3 / 12
+    matrix, source = np.zeros((nx * ny, nx * ny)), np.zeros(nx * ny)
+
+    def join(i, j, conductance):
+        for a, b in ((i, j), (j, i)):
+            matrix[a, a] += conductance
+            matrix[a, b] -= conductance
+
+    def mean(a, b):
+        return 2 * a * b / (a + b) if a > 0 and b > 0 else 0.0
+
+    for i in range(nx):
+        for j in range(ny):
+            here = i * ny + j
+            if i + 1 < nx:
+                join(here, here + ny, mean(mobility[i, j], mobility[i + 1, j]) * cell[1] / cell[0])
+            if j + 1 < ny or (wrap and ny > 1):
+                join(here, i * ny + (j + 1) % ny, mean(mobility[i, j], mobility[i, (j + 1) % ny]) * cell[0] / cell[1])
+    side = 2 * mobility * cell[1] / cell[0]
+    for j in range(ny):
+        matrix[j, j] += side[0, j]
+        source[j] += side[0, j]
+        matrix[(nx - 1) * ny + j, (nx - 1) * ny + j] += side[-1, j]
+    pressure = np.linalg.lstsq(matrix, source, rcond=None)[0]
+    return float(side[-1] @ pressure[-ny:])
+
+
+@pytest.mark.parametrize("length", [1, 2, 7, 40])
+def test_channel__cells_in_series(length):
+    gap = 1e-6 * (0.2 + np.random.default_rng(length).random((length, 1)))
+    assert_allclose(flow(gap, CELL).conductance, series(gap), rtol=1e-13, atol=0)
+
+
+def test_channels__in_parallel_add_up():
+    gap = random_gap((30, 9), open_part=1.0)
+    gap[:, 1::2] = 0.0
+    expected = sum(series(gap[:, row]) for row in range(0, 9, 2))
+    assert_allclose(flow(gap, CELL).conductance, expected, rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+def test_gap_along_the_flow__is_the_harmonic_mean_of_its_cube(wrap):
+    profile = 1e-6 * (0.1 + np.random.default_rng(1).random(31))
+    found = flow(np.repeat(profile[:, None], 12, axis=1), CELL, wrap=wrap)
+    mean = 1 / np.mean(1 / profile**3)
+    assert_allclose(found.conductance, mean / 12 * (12 * CELL[1]) / (31 * CELL[0]), rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+def test_gap_across_the_flow__is_the_arithmetic_mean_of_its_cube(wrap):
+    profile = 1e-6 * (0.1 + np.random.default_rng(2).random(12))
+    found = flow(np.repeat(profile[None], 31, axis=0), CELL, wrap=wrap)
+    assert_allclose(found.conductance, np.mean(profile**3) / 12 * (12 * CELL[1]) / (31 * CELL[0]), rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (6, 1), (5, 2), (7, 6), (9, 11)])
+def test_network__equals_one_written_cell_by_cell(shape, wrap):
+    for seed in range(3):
+        gap = random_gap(shape, seed, open_part=0.85, decades=2.0)
+        expected = kirchhoff(gap, CELL, wrap)
+        found = flow(gap, CELL, wrap=wrap)
+        assert_allclose(found.conductance, expected, rtol=1e-9, atol=1e-30)
+
+
+def test_closed__where_a_wall_or_a_corner_is_between():
+    gap = np.ones((6, 5)) * 1e-6
+    gap[3] = 0.0
+    found = flow(gap, CELL)
+    assert found.is_closed
+    assert found.conductance == found.lower == found.upper == 0.0
+    assert np.isnan(found.pressure).all()
+    staircase = np.eye(5) * 1e-6  # cells that share corners alone
+    assert flow(staircase, CELL).is_closed
+    assert flow(np.zeros((4, 4)), CELL).is_closed
+    assert flow(np.full((4, 4), -1e-6), CELL).is_closed
+
+
+def test_sides_that_meet__open_a_path():
+    gap = np.zeros((3, 5))
+    gap[0, 0] = gap[1, 0] = gap[1, 4] = gap[2, 4] = 1e-6
+    assert flow(gap, CELL).is_closed
+    along, across = 1 / (CELL[1] / CELL[0]), CELL[1] / CELL[0]
+    resistance = 0.5 * along + along + across + along + 0.5 * along  # four cells in a row
+    assert_allclose(flow(gap, CELL, wrap=True).conductance, 1e-18 / 12 / resistance, rtol=1e-13, atol=0)
+
+
+def test_pools_and_dead_ends__carry_nothing():
+    channel = np.zeros((9, 7))
+    channel[:, 3] = 1e-6
+    beside = channel.copy()
+    beside[3, 4] = beside[2:5, 5] = 5e-6  # dead end
+    beside[7, 0] = 5e-6  # pool
+    alone, found = flow(channel, CELL), flow(beside, CELL)
+    assert_allclose(found.conductance, alone.conductance, rtol=1e-12, atol=0)
+    assert np.isnan(found.pressure[7, 0])
+    assert np.isfinite(found.pressure[3, 5])
+    along, across = fluxes(beside, CELL, found.pressure)
+    assert np.abs(along[2:5, 4:6]).max() < 1e-12 * along.max()
+    assert np.abs(across).max() < 1e-12 * along.max()
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+def test_fluxes__carry_the_same_through_every_section(wrap):
+    gap = random_gap((25, 22), seed=3, open_part=0.8)
+    found = flow(gap, CELL, wrap=wrap)
+    along, across = fluxes(gap, CELL, found.pressure, wrap=wrap)
+    assert found.conductance > 0
+    assert_allclose(along.sum(axis=1) * CELL[1], found.conductance, rtol=1e-9, atol=0)
+    assert not along[gap == 0].any()
+    assert not across[gap == 0].any()
+
+
+def test_fluxes__of_a_plane_gap_are_those_of_poiseuille():
+    gap = np.full((6, 4), 2e-6)
+    along, across = fluxes(gap, CELL, flow(gap, CELL).pressure)
+    assert_allclose(along, (2e-6) ** 3 / 12 / (6 * CELL[0]), rtol=1e-12, atol=0)
+    assert np.abs(across).max() < 1e-12 * along.max()
+
+
+def test_fluxes__turn_with_the_channel():
+    gap = np.zeros((3, 4))
+    gap[0, 0] = gap[1, 0] = gap[1, 1] = gap[1, 2] = gap[2, 2] = 1e-6
+    found = flow(gap, CELL)
+    along, across = fluxes(gap, CELL, found.pressure)
+    expected = np.zeros((3, 4))
+    expected[1, :3] = found.conductance / CELL[0] * np.array([0.5, 1.0, 0.5])  # half of a corner's faces carry it
+    assert_allclose(across, expected, rtol=1e-12, atol=0)
+    expected[:] = 0.0
+    expected[[0, 2], [0, 2]], expected[1, [0, 2]] = found.conductance / CELL[1], found.conductance / CELL[1] / 2
+    assert_allclose(along, expected, rtol=1e-12, atol=0)
+
+
+def unlike_its_inverse(cells):
+    """Gap on a unit square whose cube, turned by a right angle, is one over itself; the flow through it is bent."""
+    wave = np.cos(2 * np.pi * (np.arange(cells) + 0.5) / cells)
+    x, y = wave[:, None], wave[None]
+    return np.exp((x - y) * (1 + 0.6 * x * y) / 2)
+
+
+def test_rate__second_order_on_a_gap_whose_conductance_duality_gives():
+    """Of a square with mobilities m along x, and with 1/m along y, the conductances multiply to one (Keller)."""
+    errors = []
+    for cells in (16, 32, 64):
+        found = flow(unlike_its_inverse(cells), (1 / cells, 1 / cells))
+        errors.append(abs(12 * found.conductance - 1))
+    rates = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert errors[-1] < 1e-3
+    assert np.all(rates > 1.9)
+
+
+def test_rate__second_order_on_a_wedge():
+    """Gap ``1 + x``: the integral of its inverse cube is 3/8."""
+    errors = []
+    for cells in (10, 20, 40):
+        x = (np.arange(cells) + 0.5) / cells
+        found = flow(np.repeat(1 + x[:, None], 3, axis=1), (1 / cells, 1 / 3))
+        errors.append(abs(12 * found.conductance * 3 / 8 - 1))
+    assert np.all(np.abs(np.log2(np.divide(errors[:-1], errors[1:])) - 2) < 0.05)
+
+
+@given(seed=st.integers(0, 2**31), wrap=st.booleans(), noise=st.floats(1e-6, 1.0))
+def test_bounds__hold_for_any_pressure(seed, wrap, noise):
+    gap = random_gap((8, 7), seed, open_part=0.85)
+    network = network_of(faces_of(gap, CELL, wrap))
+    if network is None:
+        return
+    found = flow(gap, CELL, wrap=wrap)
+    scale = gap.max() ** 3 / 12
+    exact = found.pressure.ravel()[network.cells]
+    pressure = exact + noise * np.random.default_rng(seed).normal(size=len(exact))
+    lower, upper = bounds(network, pressure)
+    assert 0 <= lower * scale <= found.conductance * (1 + 1e-12)
+    assert upper * scale >= found.conductance * (1 - 1e-12)
+
+
+def test_bounds__narrow_with_the_square_of_the_error():
+    gap = random_gap((20, 18), seed=5, open_part=0.9)
+    network = network_of(faces_of(gap, CELL, False))
+    exact = flow(gap, CELL).pressure.ravel()[network.cells]
+    noise = np.random.default_rng(0).normal(size=len(exact))
+    widths = [np.diff(bounds(network, exact + size * noise))[0] for size in (1e-4, 1e-5)]
+    assert np.log10(widths[0] / widths[1]) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("decades", [0, 6, 12, 15])
+def test_bounds__close_at_any_contrast(decades):
+    found = flow(random_gap((48, 45), seed=7, open_part=0.72, decades=decades), CELL)
+    assert 0 < found.lower <= found.conductance <= found.upper <= found.lower * (1 + 1e-9)
+
+
+def test_bounds__close_where_a_slit_joins_two_lakes():
+    gap = np.full((41, 30), 1e-6)
+    gap[20] = 0.0
+    gap[20, 11] = 1e-6 * 1e-7  # 21 decades between the mobilities
+    found = flow(gap, CELL)
+    assert found.upper <= found.lower * (1 + 1e-6)
+    slit = (1e-13) ** 3 / 12 * CELL[1] / CELL[0]  # its two halves are all the resistance there is
+    assert_allclose(found.conductance, slit, rtol=1e-6, atol=0)
+
+
+def test_lengths__in_any_unit():
+    gap = random_gap((14, 11), seed=2)
+    metres, nanometres = flow(gap, CELL), flow(gap * 1e9, (CELL[0] * 1e9, CELL[1] * 1e9))
+    assert_allclose(nanometres.conductance, metres.conductance * 1e27, rtol=1e-12, atol=0)
+
+
+def test_flow__is_the_same_from_either_side():
+    gap = random_gap((15, 12), seed=4, open_part=0.85)
+    there, back = flow(gap, CELL), flow(gap[::-1, ::-1], CELL)
+    assert_allclose(there.conductance, back.conductance, rtol=1e-12, atol=0)
+    assert np.allclose(there.pressure, 1 - back.pressure[::-1, ::-1], atol=1e-12, equal_nan=True)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_gap__that_is_missing_is_refused(value):
+    gap = np.ones((4, 4))
+    gap[1, 1] = value
+    with pytest.raises(ValueError, match="missing or infinite"):
+        flow(gap, CELL)
