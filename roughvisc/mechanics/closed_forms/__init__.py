@@ -4,6 +4,14 @@ Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2
 material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
 """
 
+from roughvisc.mechanics.closed_forms.adhesion import (
+    adhesive_load,
+    conformal_energy,
+    pull_off_force,
+    punch_pull_off,
+    rough_attraction,
+    tabor_parameter,
+)
 from roughvisc.mechanics.closed_forms.cylinder import SlidingCylinder, sliding_cylinder
 from roughvisc.mechanics.closed_forms.elastic import (
     AxisymmetricContact,
@@ -39,6 +47,12 @@ from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloi
 from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
 from roughvisc.mechanics.closed_forms.sheet import OnSheet, PunchOnSheet
 from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
+from roughvisc.mechanics.closed_forms.validity import (
+    dundurs_coupling,
+    half_space_excess,
+    radiation_lag,
+    sticking_stiffness,
+)
 from roughvisc.mechanics.halfspace.sheet import Sheet
 
 __all__ = [
@@ -59,9 +73,13 @@ __all__ = [
     "SlidingCylinder",
     "StepLoad",
     "WavyContact",
+    "adhesive_load",
+    "conformal_energy",
+    "dundurs_coupling",
     "flat_punch",
     "full_contact_pressure",
     "full_contact_wave",
+    "half_space_excess",
     "hereditary_integral",
     "hertz",
     "johnson_greenwood_higginson",
@@ -69,13 +87,19 @@ __all__ = [
     "lee_radok",
     "lee_radok_step",
     "power_law_ramp",
+    "pull_off_force",
     "punch_approach",
     "punch_dissipation",
     "punch_force",
     "punch_pressure",
+    "punch_pull_off",
+    "radiation_lag",
     "reduced_contact",
+    "rough_attraction",
     "sliding_cylinder",
     "sneddon_cone",
+    "sticking_stiffness",
+    "tabor_parameter",
     "ting",
     "westergaard",
     "westergaard_half_width",

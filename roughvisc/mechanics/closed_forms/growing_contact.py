@@ -236,7 +236,8 @@ def hereditary_integral(
     ndarray
         The integral: exact, a sum over the corners.
     """
-    if len({segment.control for segment in program.segments}) > 1 or any(s.amplitude for s in program.segments):
+    controls = {segment.control for segment in program.segments}
+    if len(controls) > 1 or program.slides or any(segment.amplitude for segment in program.segments):
         raise InputError("expected a program of ramps, holds and jumps of one control")
     t = np.asarray(t, dtype=float)
     total = np.zeros(t.shape)
@@ -310,8 +311,9 @@ def lee_radok(indenter: Indenter, material: Material, program: Program) -> Growi
     """
     value = 0.0
     for segment in program.segments:
-        if segment.control != "load" or segment.amplitude or (segment.end is not None and segment.end < value):
-            raise InputError("a growing contact needs a program of load that never falls")
+        falls = segment.end is not None and segment.end < value
+        if segment.control != "load" or segment.amplitude or segment.slide or falls:
+            raise InputError("a growing contact needs a program of load that never falls, and does not slide")
         value = value if segment.end is None else segment.end
     return GrowingContact(indenter, material, program)
 

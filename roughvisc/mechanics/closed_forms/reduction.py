@@ -269,6 +269,8 @@ def reduced_contact(
     instants = np.unique(corners) if times is None else np.asarray(times, dtype=float)
     if instants.ndim != 1 or np.any(np.diff(instants) <= 0) or not np.all((instants >= 0) & (instants <= corners[-1])):
         raise InputError(f"times must ascend within the program, which lasts {corners[-1]!r} s")
+    if program.slides:
+        raise InputError("the program slides, and the indenter is taken to stay where it is: expected no slide")
     if refinements < 1:
         raise InputError(f"refinements is {refinements!r}: expected at least 1")
     exponentials = exponentials and isinstance(material, Prony)

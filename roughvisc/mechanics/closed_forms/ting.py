@@ -82,7 +82,7 @@ def _load_of(force: Program | Function, end: float | None) -> tuple[Function, li
     starts, values, slopes = [], [], []
     value = 0.0
     for segment, start in zip(force.segments, force.corners, strict=False):
-        if segment.control != "load" or segment.amplitude:
+        if segment.control != "load" or segment.amplitude or segment.slide:
             raise InputError("a single maximum is implemented for ramps, holds and jumps of load, or a function")
         final = value if segment.end is None else segment.end
         if segment.duration > 0:
