@@ -61,21 +61,16 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     -------
     Certificate
     """
-    pressure = pressure.take(contact)
-    own, here = displacement.take(contact), separation.take(contact)
-    energy = float((pressure * own).sum())
-    lowest = (
-        float(separation.min())
-        if problem.present is None
-        else float(separation.min(where=problem.present, initial=math.inf))
-    )
-    load = float(pressure.sum())
+    at = problem.influence.at
+    carried, own, here = at(pressure, contact), at(displacement, contact), at(separation, contact)
+    energy, load = float((carried * own).sum()), float(carried.sum())
+    lowest = problem.lowest_of(separation)
     if problem.load is not None:
         level = float(np.mean(here))
-        duality_gap = float((pressure * (here - lowest)).sum())
+        duality_gap = float((carried * (here - lowest)).sum())
     else:
         level = problem.target
-        duality_gap = _under_approach(problem, pressure, displacement, here, lowest)
+        duality_gap = _under_approach(problem, carried, displacement, here, lowest)
     # with rounding of the sums above; a pressure of nothing has no error to speak of
     largest = max(float(here.max(initial=1.0)), -float(here.min(initial=-1.0)))
     converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0

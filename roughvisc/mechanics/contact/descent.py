@@ -37,7 +37,8 @@ class Trial:
     slope : float
         Derivative of ``f`` along the change.
     asked : float
-        L1 norm of the change that the preconditioner asked for, but for the scale; NaN where it was not wanted.
+        L1 norm of the change that the preconditioner asked for, but for the scale, and times what makes it as cautious
+        a measure as one level's; NaN where it was not wanted.
     """
 
     free_set: Cells
@@ -76,6 +77,7 @@ def conjugate_gradient(
     pressure: Array,
     separation: Array,
     level: float,
+    energy: float,
     *,
     step_length: float,
     previous: Step | None,
@@ -91,6 +93,8 @@ def conjugate_gradient(
         The pressure so far, and the gap with its displacement at zero approach.
     level : float
         Approach of the contact.
+    energy : float
+        ``p.Kp``.
     step_length : float
         Length of the step along the search direction.
     previous : Step or None
@@ -99,14 +103,15 @@ def conjugate_gradient(
         Whether to measure the change that the preconditioner asks for.
     """
     free_set = problem.free_set(pressure, separation, level)
-    residual = separation.take(free_set)
+    at = problem.influence.at
+    residual = at(separation, free_set)
     residual -= level if problem.load is None else float(np.mean(residual))
-    search = problem.preconditioned(residual, free_set)
-    asked = float(np.abs(search).sum()) if measured else math.nan
+    held = at(pressure, free_set)
+    search, caution = problem.answered(residual, free_set, held, energy)
+    asked = caution * float(np.abs(search).sum()) if measured else math.nan
     if previous is not None:
         search = _conjugate(problem, search, residual, free_set, previous)
     search *= -step_length
-    held = pressure.take(free_set)
     search += held
     trial = _cut(search, problem.load)
     change = trial - held
@@ -118,9 +123,10 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
     work = problem.influence.work
     work.fill(0)
     work.reshape(-1)[previous.free_set] = previous.change
-    beta = float((search * (previous.displacement.take(free_set) * (previous.unit / previous.curvature))).sum())
+    at = problem.influence.at
+    beta = float((search * (at(previous.displacement, free_set) * (previous.unit / previous.curvature))).sum())
     if beta > 0:
-        conjugate = search - beta * problem.tangent(work.take(free_set))
+        conjugate = search - beta * problem.tangent(at(work, free_set))
         if float((residual * conjugate).sum()) > 0:
             return conjugate
     return search

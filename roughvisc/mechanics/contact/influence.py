@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact.passes import taken
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
@@ -37,6 +40,15 @@ class Influence:
         self.work = np.empty(halfspace.shape)
 
     @property
+    def threads(self) -> int:
+        """How many work on one field."""
+        return self.halfspace.threads
+
+    def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
+        """Values of a field at some cells, as flat indices."""
+        return taken(field, cells, self.threads)
+
+    @property
     def largest(self) -> float:
         """Largest eigenvalue of the influence, or a bound on it."""
         return self.halfspace.largest_influence * self.scale
@@ -59,7 +71,7 @@ class Influence:
         """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
         self.convolutions += 1
         field, size = self._spread(displacement, cells)
-        pressure = self.halfspace.approximate_inverse(field).take(cells).astype(float)
+        pressure = self.at(self.halfspace.approximate_inverse(field), cells).astype(float)
         pressure *= size
         return pressure
 
@@ -67,6 +79,20 @@ class Influence:
         """The same for a displacement everywhere, of ordinary size."""
         self.convolutions += 1
         return self.halfspace.approximate_inverse(displacement).astype(float)
+
+    def of_blocks(self, loads: Array) -> Array:
+        """Displacement of blocks of cells by their loads, both flat: no convolution to speak of."""
+        blocks = self.halfspace.coarse
+        cells = blocks.cell_area / self.halfspace.cell_area
+        displacement = blocks.displacement(loads.reshape(blocks.shape) / cells)
+        displacement *= self.scale
+        return displacement.reshape(-1)
+
+    @property
+    def of_one_block(self) -> float:
+        """Displacement of a block by a unit load on it alone."""
+        blocks = self.halfspace.coarse
+        return blocks.self_influence * self.scale * self.halfspace.cell_area / blocks.cell_area
 
     def _spread(self, values: Array, cells: Cells) -> tuple[Single, float]:
         """Values of some cells over the whole grid, zero elsewhere, over the largest; and that: single underflows."""

@@ -26,6 +26,7 @@ from roughvisc.mechanics.contact.descent import (
 from roughvisc.mechanics.contact.error_estimate import estimated_error
 from roughvisc.mechanics.contact.full_contact import approach_under_load, carries_excess
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
+from roughvisc.mechanics.contact.passes import add_scaled
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.contact.state import ContactState
 
@@ -126,6 +127,7 @@ def solved(
                 iterate.pressure,
                 separation,
                 certificate.level,
+                certificate.energy,
                 step_length=search.step_length,
                 previous=previous,
                 measured=estimate_error,
@@ -195,7 +197,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
     pressure, displacement = iterate.pressure.reshape(-1), iterate.displacement
     pressure[free_set] = taken = trial.pressure
     response, unit = _response(influence, iterate, trial, search.single)
-    curvature = unit * float((trial.change * response.take(free_set)).sum())
+    curvature = unit * float((trial.change * influence.at(response, free_set)).sum())
     minimum = minimum_along(trial, curvature)
     fraction, cut = admissible_fraction(trial, minimum)
     if fraction != 1:
@@ -203,7 +205,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
         taken += trial.held
         np.maximum(taken, 0, out=taken)
         pressure[free_set] = taken
-    displacement += np.multiply(response, fraction * unit, out=influence.work)
+    add_scaled(displacement, response, fraction * unit, influence.threads)
     stepped = Iterate(iterate.pressure, displacement, free_set[taken > 0], approximate=search.single)
     if search.spacer:
         return stepped, replace(search, spacer=False), None

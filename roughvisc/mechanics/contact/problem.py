@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
+from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
@@ -111,15 +113,25 @@ class Problem:
 
     def separation(self, displacement: Array) -> Array:
         """Gap under pressure at zero approach, in the work array: there until that is used for something else."""
-        return np.add(self.gap, displacement, out=self.influence.work)
+        return passes.add(self.gap, displacement, self.influence.work, self.influence.threads)
+
+    def lowest_of(self, separation: Array) -> float:
+        """Least separation of the present cells."""
+        return passes.lowest(separation, self.present, self.influence.threads)
 
     def free_set(self, pressure: Array, separation: Array, level: float) -> Cells:
         """Cells that may change pressure: those in contact and those that would penetrate."""
-        mask = separation < level
-        if self.present is not None:
-            mask &= self.present
-        mask |= pressure > 0
-        return np.flatnonzero(mask)
+        apart, carried = separation.reshape(-1), pressure.reshape(-1)
+        present = None if self.present is None else self.present.reshape(-1)
+
+        def free(part: slice) -> Mask:
+            mask = apart[part] < level
+            if present is not None:
+                mask &= present[part]
+            mask |= carried[part] > 0
+            return mask
+
+        return passes.cells_where(free, separation.size, self.influence.threads)
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load."""
@@ -128,6 +140,17 @@ class Problem:
     def preconditioned(self, residual: Array, free_set: Cells) -> Array:
         """About the change of pressure that a residual asks for, but for the scale; keeps a given load."""
         return self.tangent(self.influence.approximate_pressure(residual, free_set))
+
+    def answered(self, residual: Array, free_set: Cells, pressure: Array, energy: float) -> tuple[Array, float]:
+        """The same by both levels of the preconditioner where the second pays, and how cautious to be of its size.
+
+        ``pressure`` is that on the free set so far, and ``energy`` is ``p.Kp``.
+        """
+        waves = LongWaves.of(self.influence, free_set, pressure, energy)
+        if waves is None:
+            return self.preconditioned(residual, free_set), 1.0
+        cells = partial(self.influence.approximate_pressure, cells=free_set)
+        return self.tangent(waves.preconditioned(residual, cells)), CAUTION
 
     def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""

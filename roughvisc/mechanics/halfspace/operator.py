@@ -6,8 +6,8 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
+from queue import SimpleQueue
 from typing import Any, Literal
 
 import numpy as np
@@ -17,14 +17,20 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
+from roughvisc.mechanics.halfspace.threads import blocks, side_by_side
 from roughvisc.mechanics.halfspace.transforms import transforms
 
 Array = NDArray[np.float64]
 Boundary = Literal["free", "periodic"]
 
-# Points of the columns transformed together, but at least so many columns, and rows: they stay in the cache (measured
-# at 64 to 1024 squared).
-_POINTS, _COLUMNS, _ROWS = 1 << 13, 32, 128
+# Points of the columns transformed together, but at least so many columns; and at most so many rows and points of
+# rows: they stay in the cache (measured at 64 to 4096 squared).
+_POINTS, _COLUMNS, _ROWS, _ROW_POINTS = 1 << 13, 32, 128, 1 << 18
+# Cells from which periodic transforms go by blocks too: at 1024 squared and above they take 0.7 to 0.9 of SciPy's time
+# for whole fields, and as long as ducc0's; below they are slower.
+_BLOCKED = 1024**2
+# Cells a side of a block.
+_BLOCK = 8
 # Cells from which several threads are faster than one (measured: slower at 512 squared, faster at 1024 squared).
 _THREADED = 1024**2
 
@@ -69,7 +75,7 @@ class HalfSpace:
         self.boundary = boundary
         self.mirrored = mirrored
         self.kernel = kernel
-        self.workers = workers if shape[0] * shape[1] >= _THREADED else 1
+        self.workers = workers
         self._transforms = transforms(mirrored)
         #: Number of cells of the surface, mirror images included.
         self.surface_shape = (self._transforms.images * shape[0], self._transforms.images * shape[1])
@@ -87,6 +93,20 @@ class HalfSpace:
     def on(self, shape: tuple[int, int], spacing: tuple[float, float]) -> HalfSpace:
         """The same body, boundary and symmetry on another grid."""
         return HalfSpace(shape, spacing, self.boundary, mirrored=self.mirrored, kernel=self.kernel)
+
+    @property
+    def threads(self) -> int:
+        """How many threads work on one field."""
+        if self.shape[0] * self.shape[1] < _THREADED:
+            return 1
+        return fft.get_workers() if self.workers is None else self.workers
+
+    @cached_property
+    def coarse(self) -> HalfSpace:
+        """The same body on blocks of some cells a side, of the same period."""
+        coarse = (-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK))
+        (nx, ny), (mx, my), (dx, dy) = self.shape, coarse, self.spacing
+        return self.on(coarse, (dx * nx / mx, dy * ny / my))
 
     @property
     def cell_area(self) -> float:
@@ -143,32 +163,59 @@ class HalfSpace:
         """Convolution in the precision of both."""
         if self.boundary == "periodic":
             return self._filtered(pressure, symbol)
-        along, (nx, ny), my = self._transforms, self.shape, self._points[1]
-        # Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of
-        # columns go forward, are multiplied and come back while they stay in the cache.
-        spectrum, room = (_as_single(memory, pressure.dtype) for memory in self._working_memory)
-        for rows in _blocks(nx, _ROWS):
-            spectrum[rows] = along.of_rows(pressure[rows], n=my, axis=1, workers=self.workers)
-        for block in _blocks(spectrum.shape[1], room.shape[1]):
+        return self._by_blocks(pressure, symbol, self._points)
+
+    def _by_blocks(self, field: NDArray[Any], symbol: NDArray[Any], points: tuple[int, int]) -> NDArray[Any]:
+        """Convolution on so many points, in the precision of field and symbol.
+
+        Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of columns
+        go forward, are multiplied and come back while they stay in the cache.
+        """
+        along, (nx, ny), (mx, my) = self._transforms, self.shape, points
+        spectrum, rooms = self._working_memory(points, field.dtype)
+        found = np.empty(self.shape, field.dtype)
+        rows = list(blocks(nx, min(_ROWS, max(_ROW_POINTS // my, 1))))
+
+        def forward(rows: slice) -> None:
+            spectrum[rows] = along.of_rows(field[rows], n=my, axis=1, workers=1)
+
+        def across(block: slice) -> None:
+            room = rooms.get()
             columns = room[:, : block.stop - block.start]
             columns[:nx] = spectrum[:, block]
             columns[nx:] = 0
-            columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=self.workers)
+            columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
             along.multiply(columns, symbol[:, block])
-            columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=self.workers)
+            columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=1)
             spectrum[:, block] = columns[:nx]
-        displacement = np.empty(self.shape, pressure.dtype)
-        for rows in _blocks(nx, _ROWS):
-            displacement[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=self.workers)[:, :ny]
-        return displacement
+            rooms.put(room)
+
+        def back(rows: slice) -> None:
+            found[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=1)[:, :ny]
+
+        side_by_side(forward, rows, self.threads)
+        side_by_side(across, list(blocks(spectrum.shape[1], _together(mx, spectrum.shape[1]))), self.threads)
+        side_by_side(back, rows, self.threads)
+        return found
+
+    def _working_memory(
+        self, points: tuple[int, int], kind: np.dtype[Any]
+    ) -> tuple[NDArray[Any], SimpleQueue[NDArray[Any]]]:
+        """For transforms along y, and some columns of their transforms for each thread."""
+        mx, count = points[0], self._transforms.width(points[1])
+        number = np.result_type(kind, np.complex64) if self._transforms.is_complex else kind
+        rooms: SimpleQueue[NDArray[Any]] = SimpleQueue()
+        for room in self._memory[1][: self.threads]:
+            rooms.put(_as(room, number, (mx, _together(mx, count))))
+        return _as(self._memory[0], number, (self.shape[0], count)), rooms
 
     @cached_property
-    def _working_memory(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Transforms along y, and some columns of their transforms: taken anew each time, half of it is page faults."""
-        mx, count = self._points[0], self._transforms.width(self._points[1])
-        together = min(max(_POINTS // mx, _COLUMNS), count)
-        kind = complex if self._transforms.is_complex else float
-        return np.empty((self.shape[0], count), kind), np.empty((mx, together), kind)
+    def _memory(self) -> tuple[NDArray[Any], list[NDArray[Any]]]:
+        """Bytes to work in: taken anew each time, half of it is page faults."""
+        (mx, my), size = self._points, 16 if self._transforms.is_complex else 8
+        count = self._transforms.width(my)
+        rooms = [np.empty(size * mx * _together(mx, count), np.uint8) for _ in range(self.threads)]
+        return np.empty(size * self.shape[0] * count, np.uint8), rooms
 
     def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
@@ -196,19 +243,20 @@ class HalfSpace:
         symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
         return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
 
-    def _filtered(self, field: NDArray, symbol: NDArray) -> NDArray:
-        field_q = self._transforms.of_field(field, workers=self.workers)
+    def _filtered(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+        """Convolution on the cells themselves."""
+        if field.size >= _BLOCKED:
+            return self._by_blocks(field, symbol, self.shape)
+        field_q = self._transforms.of_field(field, workers=1)
         self._transforms.multiply(field_q, symbol)
-        return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=self.workers)
+        return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
 
 
-def _as_single(memory: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """The first half of some memory as numbers of half the size, where these are wanted."""
-    if kind == np.float64:
-        return memory
-    halved = np.complex64 if memory.dtype == np.complex128 else np.float32
-    return memory.reshape(-1).view(halved)[: memory.size].reshape(memory.shape)
+def _together(points: int, count: int) -> int:
+    """Columns of so many points that are transformed together, of a count of them."""
+    return min(max(_POINTS // points, _COLUMNS), count)
 
 
-def _blocks(length: int, size: int) -> Iterator[slice]:
-    return (slice(first, min(first + size, length)) for first in range(0, length, size))
+def _as(memory: NDArray[np.uint8], number: np.dtype[Any], shape: tuple[int, int]) -> NDArray[Any]:
+    """The first bytes of some memory as an array."""
+    return memory[: shape[0] * shape[1] * number.itemsize].view(number).reshape(shape)

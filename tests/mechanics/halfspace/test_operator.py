@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from hypothesis import given
+from scipy import fft
 from strategies import boundaries, examples, seeds, shapes
 from support import direct
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
@@ -40,10 +42,10 @@ def test_periodic_displacement__of_a_wave(shape, waves):
 def test_operators__are_symmetric_and_positive(shape, boundary, seed):
     halfspace = HalfSpace(shape, (1.0, 0.6), boundary)
     a, b = np.random.default_rng(seed).standard_normal((2, *shape))
-    for operator, precision in ((halfspace.displacement, 1e-12), (halfspace.approximate_inverse, 1e-5)):
-        scale = np.linalg.norm(operator(a)) * np.linalg.norm(b) + 1e-300
-        assert np.sum(operator(a) * b) == pytest.approx(np.sum(a * operator(b)), abs=precision * scale)
-        assert np.sum(operator(a) * a) >= -precision * scale
+    for applied, precision in ((halfspace.displacement, 1e-12), (halfspace.approximate_inverse, 1e-5)):
+        scale = np.linalg.norm(applied(a)) * np.linalg.norm(b) + 1e-300
+        assert np.sum(applied(a) * b) == pytest.approx(np.sum(a * applied(b)), abs=precision * scale)
+        assert np.sum(applied(a) * a) >= -precision * scale
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -55,10 +57,56 @@ def test_approximate_inverse__inverts_what_is_far_from_the_border(boundary):
     assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
 
 
-def test_displacement__does_not_depend_on_threads():
+@pytest.fixture
+def in_small_blocks(monkeypatch):
+    """Blocks and threads as on a large grid."""
+    for name, value in {"_THREADED": 1, "_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROWS": 8}.items():
+        monkeypatch.setattr(operator, name, value)
+
+
+FIELDS = pytest.mark.parametrize("boundary", ["free", "periodic"])
+KINDS = pytest.mark.parametrize("mirrored", [False, True])
+
+
+def fields_by(halfspace, pressure):
+    single = pressure.astype(np.float32)
+    displaced = [halfspace.displacement(pressure), halfspace.displacement_single(single)]
+    return [*displaced, halfspace.approximate_inverse(single)]
+
+
+@FIELDS
+@KINDS
+def test_fields__do_not_depend_on_threads(in_small_blocks, boundary, mirrored):
     pressure = np.random.default_rng(4).random((65, 70))
-    one, two = (HalfSpace((65, 70), (1.0, 1.0), workers=w).displacement(pressure) for w in (1, 2))
-    assert np.array_equal(one, two)
+    found = []
+    for threads in (1, 2, 3):
+        halfspace = HalfSpace((65, 70), (1.0, 1.0), boundary, workers=threads, mirrored=mirrored)
+        assert halfspace.threads == threads
+        found.append(fields_by(halfspace, pressure))
+    for others in found[1:]:
+        assert all(np.array_equal(*pair) for pair in zip(found[0], others, strict=True))
+
+
+@FIELDS
+@KINDS
+def test_fields__are_the_same_by_blocks(monkeypatch, boundary, mirrored):
+    pressure = np.random.default_rng(4).random((33, 46))
+    made = {"boundary": boundary, "mirrored": mirrored}
+    whole = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
+    for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROWS": 8}.items():
+        monkeypatch.setattr(operator, name, value)
+    blocked = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
+    for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6), strict=True):
+        assert other.dtype == one.dtype
+        assert np.abs(one - other).max() < precision * np.abs(one).max()
+
+
+def test_threads__are_those_of_scipy_on_a_large_grid():
+    assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic").threads == 1
+    with fft.set_workers(2):
+        assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic").threads == 2
+        assert HalfSpace((1024, 1023), (1.0, 1.0), "periodic").threads == 1
+        assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic", workers=3).threads == 3
 
 
 def test_boundary__is_named_when_unknown():
@@ -78,10 +126,10 @@ def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
     surface = HalfSpace(quarter.surface_shape, (1.3, 0.7), boundary)
     assert surface.shape == (2 * shape[0], 2 * shape[1])
     assert quarter.cell_area == 4 * surface.cell_area
-    for operator, precision in (("displacement", 1e-13), ("approximate_inverse", 1e-5)):
-        kind = np.float64 if operator == "displacement" else np.float32
-        expected = getattr(surface, operator)(unfolded(corner).astype(kind))
-        found = getattr(quarter, operator)(corner.astype(kind))
+    for name, precision in (("displacement", 1e-13), ("approximate_inverse", 1e-5)):
+        kind = np.float64 if name == "displacement" else np.float32
+        expected = getattr(surface, name)(unfolded(corner).astype(kind))
+        found = getattr(quarter, name)(corner.astype(kind))
         assert found.dtype == kind
         np.testing.assert_allclose(unfolded(found), expected, rtol=0, atol=precision * np.abs(expected).max())
     if max(shape) > 1:  # of one cell and its images nothing is periodic
