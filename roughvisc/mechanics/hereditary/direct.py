@@ -107,6 +107,16 @@ class History:
         """The same state: no step reaches behind the present instant by a rule of its own."""
         return state
 
+    def moved(self, state: HistoryState, cells: int, axis: int) -> HistoryState:
+        """State of a periodic body seen from a profile that has moved by so many cells along an axis."""
+
+        def rolled(block: Block) -> Block:
+            place = list(np.unravel_index(block.cells, state.shape))
+            place[axis] = (place[axis] - cells) % state.shape[axis]
+            return Block(np.ravel_multi_index((place[0], place[1]), state.shape), block.pressures)
+
+        return HistoryState(state.shape, state.times, tuple(rolled(block) for block in state.blocks))
+
     def enlarged(
         self,
         state: HistoryState,

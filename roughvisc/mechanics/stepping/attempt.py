@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial
 
 Array = NDArray[np.float64]
 
@@ -44,28 +45,31 @@ def attempt(
     length: float,
     rule: Rule,
     share: float = 1.0,
-    guess: tuple[Array, Array] | None = None,
+    guess: Callable[[float], tuple[Array, Array | None]] | None = None,
     stated: bool = False,
 ) -> Trial:
     """Contact state a step ahead, where the load or the approach has a given value.
 
-    ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought, and its displacement
-    at unit compliance, where such are known; ``stated`` asks for an estimate of the error that the solver leaves.
+    ``share`` scales the contact solver's tolerance; ``guess`` gives a pressure near the one sought and its displacement
+    at unit compliance, both times a number and in memory of their own; ``stated`` asks for an estimate of the error
+    that the solver leaves.
     """
     alpha, effective, carried = predicted(scene, state.memory, length, rule)
-    gap = scene.gap + carried
+    # what costs no convolution is not held while the contact is solved, and had again
+    again = effective is None
+    gap = np.add(scene.gap, carried, out=carried if again else None)
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
+        if again:
+            carried = predicted(scene, state.memory, length, rule)[2]
         nothing = np.zeros_like(gap)
         return Trial(Instant(time, nothing, 0.0, approach, nothing), carried, effective, length, rule, control)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
-    start, start_displacement = (
-        state.first_guess(length, alpha) if guess is None else (guess[0] * alpha, guess[1] * alpha)
-    )
+    start, start_displacement = state.first_guess(length, alpha) if guess is None else guess(alpha)
     contact = solve_contact(
         scene.halfspace,
         gap,
@@ -78,7 +82,10 @@ def attempt(
         overwrite=True,
         estimate_error=stated,
     )
+    del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
+    if again:
+        carried = predicted(scene, state.memory, length, rule)[2]
     carried += displacement
     if effective is not None:
         effective += pressure
@@ -136,7 +143,7 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
     return replace(
         state,
         now=now,
-        displacement=trial.displacement,
+        displacement=trial.displacement if spent is None else NO_FIELD,
         before=state.now if trial.length > 0 else None,
         memory=memory,
         largest_force=max(state.largest_force, now.force),
@@ -180,6 +187,8 @@ def work_while_held(state: State, trial: Trial) -> float | None:
     however the pressure runs meanwhile. A load that jumps is held from then on.
     """
     before, now = state.now, trial.instant
+    if trial.slides:  # the tangential force works too
+        return None
     if trial.control == "approach" and now.approach == before.approach:
         return 0.0
     if trial.control == "load" and (now.force == before.force or state.unresolved):
@@ -224,7 +233,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
         effective=shown.effective,
         level=level,
         control=trial.control,
-        given=scene.program.gives(_number(scene, state)),
+        given=scene.program.gives(segment_number(state)),
         bound=shown.bound,
         residual=shown.residual,
         uncertainty=state.uncertainty,
@@ -234,7 +243,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     )
 
 
-def _number(scene: Scene, state: State) -> int:
+def segment_number(state: State) -> int:
     """Index of the segment that ended or goes on at the present instant."""
     return max(state.segment - (state.now.time <= state.began), 0)
 

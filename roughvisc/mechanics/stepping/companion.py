@@ -8,16 +8,19 @@ Energies are sums over the steps, whose error follows the second order closely: 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.hereditary.exponentials import Rule
-from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, with_cost
+from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, segment_number, with_cost
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.domain import is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial, Uncertainty
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.tangential import tangential_force
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -25,7 +28,6 @@ Array = NDArray[np.float64]
 _SHARE = 2.5
 # Where steps double from one to the next, those of the companion grow fourfold.
 _GROWTH = 4.1
-_NO_FIELD = np.zeros((0, 0))
 #: Of the difference to the companion, what is stated as the error: three times it (second order) or all of it (first
 #: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
 STATED = 1.0
@@ -40,16 +42,19 @@ _ENTERED = 0.3
 
 def bare(state: State) -> State:
     """A companion's state without what it is never asked for, so that it holds few fields."""
-    before = None if state.before is None else replace(state.before, pressure=_NO_FIELD, unit_displacement=None)
-    displacement = state.displacement if state.energy is None else _NO_FIELD
-    return replace(state, before=before, displacement=displacement)
+    before = None if state.before is None else replace(state.before, pressure=NO_FIELD, unit_displacement=None)
+    return replace(state, before=before)
 
 
-def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> tuple[Array, Array]:
+def beside(
+    scale: float, now: Instant, companion: Instant | None = None, together: Instant | None = None
+) -> tuple[Array, Array]:
     """Where the companion of a state may be: as far from it as when both were last at the same instant.
 
     Parameters
     ----------
+    scale : float
+        What pressure and displacement are multiplied by. [-]
     now : Instant
         The state's.
     companion, together : Instant or None
@@ -58,18 +63,21 @@ def beside(now: Instant, companion: Instant | None = None, together: Instant | N
     Returns
     -------
     pressure, displacement : ndarray, shape (nx, ny)
-        [Pa], and at unit compliance [Pa m].
+        [Pa], and at unit compliance [Pa m], in memory of their own.
     """
     assert now.unit_displacement is not None
     if companion is None or together is None:
-        return now.pressure, now.unit_displacement
+        return now.pressure * scale, now.unit_displacement * scale
     pressure = now.pressure + companion.pressure
     pressure -= together.pressure
+    np.maximum(pressure, 0, out=pressure)
+    pressure *= scale
     if companion.unit_displacement is None or together.unit_displacement is None:
-        return np.maximum(pressure, 0, out=pressure), now.unit_displacement
+        return pressure, now.unit_displacement * scale
     displacement = now.unit_displacement + companion.unit_displacement
     displacement -= together.unit_displacement
-    return np.maximum(pressure, 0, out=pressure), displacement
+    displacement *= scale
+    return pressure, displacement
 
 
 def difference(
@@ -112,6 +120,7 @@ def difference(
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
         work=energy * abs(step.state.work - companion.work) + unresolved,
         dissipated=energy * abs(lost - companion_lost) + unresolved,
+        friction=stated * _friction_apart(scene, step, coarse.pressure, displacement) if scene.motions else 0.0,
         inside=area * inside,
         outside=area * outside,
         stored_excess=(kept - companion_kept) / -3,
@@ -140,7 +149,14 @@ def _used(scene: Scene, state: State) -> float:
     unknown = state.uncertainty
     if scene.is_soft(scene.program.duration):  # pressure and force jump with every cell that enters
         unknown = replace(unknown, pressure=0.0, force=0.0)
-    return unknown.relative(state) / scene.tolerance
+    return unknown.relative(state.largest_force, state.largest_approach) / scene.tolerance
+
+
+def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Array) -> float:
+    """Difference of the tangential force to that of the companion's pressure and displacement. [N]"""
+    slide = scene.motions[segment_number(step.state)]
+    fine = tangential_force(scene.halfspace, step.shown.pressure, step.displacement, slide)
+    return abs(fine - tangential_force(scene.halfspace, pressure, displacement, slide))
 
 
 def _energies(state: State) -> tuple[float, float]:
@@ -174,7 +190,7 @@ def caught_up(
     length = time - companion.now.time
     value = segment.value(time - companion.began, companion.start)
     rule = rule or rule_for(scene, companion, length, _GROWTH)
-    guess = beside(state.now, companion.now, together)
+    guess = partial(beside, now=state.now, companion=companion.now, together=together)
     trial = attempt(scene, companion, segment.control, value, length, rule, _SHARE, guess)
     trial = replace(trial, instant=replace(trial.instant, time=time))
     if is_outgrown(scene, trial.instant):

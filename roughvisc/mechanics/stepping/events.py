@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.attempt import attempt, committed, step_of, trial_at_rest, with_cost
@@ -23,7 +24,7 @@ def entering(scene: Scene, state: State) -> State:
         start = state.now.force if segments[index].control == "load" else state.now.approach
     # a corner in what is prescribed bends the histories and does not break them: the steps may stay as long, unless
     # the first one is of first order
-    smooth = len(neighbours) == 1 and all(segment.duration > 0 for segment in joined)
+    smooth = len(neighbours) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
     smooth = smooth and scene.remembers and not scene.is_soft(state.pace.suggestion)
     unresolved = "approach" in neighbours and state.now.force > 0 and not scene.can_jump
     return replace(
@@ -52,7 +53,7 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
         if companion is not None and not is_outgrown(scene, trial.instant):
             start = segment.value(0.0, companion.start)
             companion_trial = attempt(
-                scene, companion, segment.control, start, 0.0, "linear", guess=beside(trial.instant)
+                scene, companion, segment.control, start, 0.0, "linear", guess=partial(beside, now=trial.instant)
             )
             state = with_cost(state, companion_trial)
             companion = bare(committed(scene, companion, companion_trial))

@@ -40,6 +40,7 @@ from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.events import entering, jump, next_event
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.slide_march import through_slide
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
 
@@ -84,7 +85,8 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
                 yield step
             del step  # its fields are not needed while the next one is computed
         else:
-            for step in _through(scene, state, segment):
+            through = _through if segment.slide is None else through_slide
+            for step in through(scene, state, segment):
                 scene, state = step.scene, step.state
                 corner = state.segment < len(segments) and state.now.time == state.began
                 if not (corner and segments[state.segment].duration == 0 and scene.can_jump):

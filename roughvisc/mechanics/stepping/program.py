@@ -10,37 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.segment import CONTROLS, PUSHING, UNITS, Control, Segment
+from roughvisc.mechanics.stepping.segment import PUSHING, UNITS, Control, Segment
+from roughvisc.mechanics.stepping.slide import Direction, Slide
+from roughvisc.mechanics.stepping.words import INSTEAD, TOLD, known_control, known_direction, told
 from roughvisc.notebook import table
-from roughvisc.units import bounded_quantity, said, shown
-
-#: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
-INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
-
-#: Segments that a program tells one by one.
-_TOLD = 8
-
-
-def _said(value: Any, unit: str, key: str, **bounds: Any) -> float:
-    """A quantity of a program; what is wrong with it is said as of the same key of a study file."""
-    if getattr(value, "shape", None) == ():  # a scalar of NumPy or xarray
-        value = value.item()
-    try:
-        return bounded_quantity(value, unit, **bounds)
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
-
-
-def _known(control: Any, key: str) -> Any:
-    if control not in get_args(Control):
-        raise InputError(f"{key}: found {shown(control)}: expected {CONTROLS}")
-    return control
+from roughvisc.units import said, stated_quantity
 
 
 @dataclass(frozen=True)
@@ -73,27 +52,18 @@ class Program:
 
     def __repr__(self) -> str:
         """In words; of a long table its first segments."""
-        words, more = self._words(), len(self.segments) - _TOLD
+        words, more = told(self.segments), len(self.segments) - TOLD
         words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
         return f"Program: {', '.join(words or ['nothing'])}"
 
     def _repr_html_(self) -> str:
         rows = [
             (str(number), words, f"until {said(end, 's')}" if end else "")
-            for number, (words, end) in enumerate(zip(self._words(), self.corners[1:], strict=False))
+            for number, (words, end) in enumerate(zip(told(self.segments), self.corners[1:], strict=False))
         ]
-        more = len(self.segments) - _TOLD
+        more = len(self.segments) - TOLD
         rows += [("...", f"{more} more segments", f"until {said(self.duration, 's')}")] if more > 0 else []
         return table("Program" if rows else "Program: nothing", rows)
-
-    def _words(self) -> list[str]:
-        """The first segments."""
-        told = self.segments[:_TOLD]
-        words = [str(segment) for segment in told]
-        for number, (before, segment) in enumerate(pairwise(told), 1):
-            if segment.end is None and not segment.amplitude and segment.control == before.control:
-                words[number] = f"hold {said(segment.duration, 's')}"  # what else
-        return words
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)
@@ -102,8 +72,8 @@ class Program:
         """Go to a value of what is controlled, linearly."""
         here = f"program.{len(self.segments)}"
         least = 0.0 if control in PUSHING else None
-        end = _said(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
-        return self._then(Segment(control, _said(over, "s", f"{here}.over", least=0), end))
+        end = stated_quantity(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
+        return self._then(Segment(control, stated_quantity(over, "s", f"{here}.over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
         """This program followed by another one."""
@@ -160,7 +130,7 @@ class Program:
         --------
         >>> program = Program().pressure("0.2 MPa", over="50 ms").hold(1.0)
         >>> program.on_area(1e-6).segments[0]
-        Segment(control='load', duration=0.05, end=0.2, amplitude=0.0, period=inf)
+        Segment(control='load', duration=0.05, end=0.2, amplitude=0.0, period=inf, slide=None)
         """
         return self._to("pressure", value, over)
 
@@ -209,8 +179,53 @@ class Program:
         here = f"program.{len(self.segments)}"
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
-        kept = _known(control, f"{here}.control")
-        return self._then(Segment(kept, _said(duration, "s", f"{here}.hold", least=0)))
+        kept = known_control(control, f"{here}.control")
+        return self._then(Segment(kept, stated_quantity(duration, "s", f"{here}.hold", least=0)))
+
+    def slide(
+        self,
+        distance: float | str,
+        *,
+        speed: float | str | None = None,
+        over: float | str | None = None,
+        direction: Direction = "x",
+    ) -> Program:
+        """Slide the profile along the surface at constant speed; what is controlled keeps the value that it has.
+
+        Parameters
+        ----------
+        distance : float or str
+            How far; the profile moves by whole cells of its grid, one a time step, to the nearest one. [m]
+        speed, over : float or str
+            Speed [m/s], or how long it takes [s]: one of them.
+        direction : {"x", "-x", "y", "-y"}
+            In which the profile moves.
+
+        Returns
+        -------
+        Program
+
+        Raises
+        ------
+        InputError
+            If a quantity is not positive, not finite or of another kind, in the words of a study file.
+
+        Examples
+        --------
+        >>> press = Program().load(2.0, over=0.05)
+        >>> press.slide("2 mm", speed="1 mm/s").hold(1.0).slide("2 mm", over=2.0, direction="-x")
+        Program: load to 2 N over 50 ms, slide 2 mm along x over 2 s at 1 mm/s, hold 1 s, slide 2 mm along -x over 2 s at 1 mm/s
+        """  # noqa: E501 - one line of output
+        here = f"program.{len(self.segments)}"
+        far = stated_quantity(distance, "m", f"{here}.slide", above=0)
+        if (speed is None) == (over is None):
+            raise InputError(f"{here}: speed is {speed!r} and over is {over!r}: expected one of them")
+        if speed is None:
+            lasting = stated_quantity(over, "s", f"{here}.over", above=0)
+        else:
+            lasting = far / stated_quantity(speed, "m/s", f"{here}.speed", above=0)
+        control = self.segments[-1].control if self.segments else "load"
+        return self._then(Segment(control, lasting, slide=Slide(far, known_direction(direction, f"{here}.direction"))))
 
     @classmethod
     def table(
@@ -234,15 +249,18 @@ class Program:
         InputError
             If the lengths differ, or the times do not ascend from zero; the offending row is named.
         """
-        unit = UNITS[_known(control, "control")]
+        unit = UNITS[known_control(control, "control")]
         if len(times) != len(values) or not len(times):
             raise InputError(f"table has {len(times)} times and {len(values)} values: expected as many, at least one")
-        if times[0] != 0 and _said(times[0], "s", "table.times.0"):
+        if times[0] != 0 and stated_quantity(times[0], "s", "table.times.0"):
             raise InputError(f"table starts at time {times[0]!r} s: expected 0")
         segments = []
         before = 0.0
         for row, (time, value) in enumerate(zip(times, values, strict=True)):
-            now, end = _said(time, "s", f"table.times.{row}"), _said(value, unit, f"table.values.{row}")
+            now, end = (
+                stated_quantity(time, "s", f"table.times.{row}"),
+                stated_quantity(value, unit, f"table.values.{row}"),
+            )
             if not now >= before:
                 raise InputError(f"table row {row}: time {time!r} s after {before!r} s: expected ascending times")
             if row or end:
@@ -279,11 +297,11 @@ class Program:
         InputError
             If a quantity is of another kind, or load or pressure fall below zero.
         """
-        unit, instead = UNITS[_known(control, "control")], INSTEAD[control]
-        middle = _said(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
-        height = _said(amplitude, unit, "cycle.amplitude", instead=instead)
-        length = _said(period, "s", "cycle.period", above=0)
-        duration = length * _said(cycles, "1", "cycle.cycles", above=0)
+        unit, instead = UNITS[known_control(control, "control")], INSTEAD[control]
+        middle = stated_quantity(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
+        height = stated_quantity(amplitude, unit, "cycle.amplitude", instead=instead)
+        length = stated_quantity(period, "s", "cycle.period", above=0)
+        duration = length * stated_quantity(cycles, "1", "cycle.cycles", above=0)
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     def on_area(self, area: float) -> Program:
@@ -302,6 +320,11 @@ class Program:
         if not self.prescribes_pressure:
             return self
         return replace(self, segments=tuple(segment.on_area(area) for segment in self.segments))
+
+    @cached_property
+    def slides(self) -> bool:
+        """Whether the profile slides anywhere."""
+        return any(segment.slide is not None for segment in self.segments)
 
     @property
     def prescribes_pressure(self) -> bool:
@@ -351,3 +374,26 @@ class Program:
             )
         loads = [(s.end or 0.0) + abs(s.amplitude) for s in self.segments if s.control == "load"]
         return max(loads, default=0.0)
+
+    @property
+    def time_scale(self) -> float:
+        """Shortest time in which what is prescribed changes by its largest value; infinite if nothing does. [s]
+
+        A jump counts as long as what follows it: it stands for a change that is fast for the material, and slow for
+        waves. Where a ramp starts from a value that is found, it counts from zero.
+        """
+        sizes: dict[str, float] = {}
+        for one in self.segments:
+            sizes[one.control] = max(sizes.get(one.control, 0.0), abs(one.end or 0.0) + abs(one.amplitude))
+        scales, before, jumped = [np.inf], {"load": 0.0, "pressure": 0.0, "approach": 0.0}, False
+        for one in self.segments:
+            change = 0.0 if one.end is None else abs(one.end - before[one.control])
+            before[one.control] = before[one.control] if one.end is None else one.end
+            if one.duration == 0:
+                jumped = jumped or change > 0
+                continue
+            rate = change / one.duration + 2 * np.pi * abs(one.amplitude) / one.period
+            scales += [sizes[one.control] / rate] if rate > 0 else []
+            scales += [one.duration] if jumped else []
+            jumped = False
+        return float(min(scales))

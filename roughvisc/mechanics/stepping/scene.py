@@ -18,6 +18,8 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.program import Control, Program
+from roughvisc.mechanics.stepping.slide import Slid, Slide
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,6 +27,8 @@ Mask = NDArray[np.bool_]
 # A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
 # shows its pressure through one discarded short solve.
 _SOFT = 0.1
+#: In place of a field that is not held.
+NO_FIELD = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -118,6 +122,13 @@ class Scene:
         """Whether hardly any of a step's compliance is there at once."""
         return self.glassy < _SOFT * self.compliance(length)
 
+    @cached_property
+    def motions(self) -> tuple[Slide, ...]:
+        """What friction is against in each segment: its slide, the last one, or the first; empty if none slides."""
+        slides = [segment.slide for segment in self.program.segments]
+        last = next((slide for slide in slides if slide is not None), None)
+        return () if last is None else tuple(last := slide or last for slide in slides)
+
     def keeps(self, time: float) -> bool:
         """Whether a time is kept. [s]"""
         return self.times is None or time in self._kept
@@ -156,56 +167,6 @@ class Instant:
     unit_displacement: Array | None = None
 
 
-_EXCESS = ("stored_excess", "dissipated_excess")
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """What the time steps leave unknown at an instant, by the companion that takes steps twice as long.
-
-    Attributes
-    ----------
-    pressure : float
-        Of the pressure, its absolute values summed. [N]
-    approach, force : float
-        [m], [N]
-    work, dissipated : float
-        [J]
-    inside, outside : float
-        Area in contact that may be none, and area out of contact that may be in it. [m2]
-    stored_excess, dissipated_excess : float
-        What steps of finite length add to these energies, to leading order. [J]
-    """
-
-    pressure: float = 0.0
-    approach: float = 0.0
-    force: float = 0.0
-    work: float = 0.0
-    dissipated: float = 0.0
-    inside: float = 0.0
-    outside: float = 0.0
-    stored_excess: float = 0.0
-    dissipated_excess: float = 0.0
-
-    def or_worse(self, other: Uncertainty, part: float) -> Uncertainty:
-        """The larger of both, part by part; what steps add to the energies lies a part of the way to the other's."""
-        worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
-        here, there = ({name: getattr(one, name) for name in _EXCESS} for one in (self, other))
-        return Uncertainty(**worse | {name: (1 - part) * here[name] + part * there[name] for name in _EXCESS})
-
-    def relative(self, state: State) -> float:
-        """The largest of pressure, force and approach over what these have come to so far. [-]"""
-        if math.isnan(self.pressure):  # unknown, of surfaces at rest too
-            return math.nan
-        force, approach = state.largest_force, state.largest_approach
-        by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
-        return max(by_force, self.approach / approach if approach > 0 else 0.0)
-
-
-#: Of a march that has no companion.
-UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
-
-
 @dataclass(frozen=True)
 class State:
     """All that a march needs to go on: a plain value.
@@ -215,7 +176,8 @@ class State:
     now, before : Instant
         The present instant, and the one before if the next step may extrapolate from it.
     displacement : ndarray, shape (nx, ny)
-        Total displacement of the half-space at the present instant. [m]
+        Total displacement of the half-space at the present instant, where the work is summed up from it; empty where
+        the energies give that. [m]
     memory : object
         State of the memory at the present instant.
     segment : int
@@ -238,6 +200,8 @@ class State:
         As of then.
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
+    slid : Slid or None
+        How far the profile has slid; None before any slide.
     pace : Pace
         How long the next step should be.
     iterations, convolutions : int
@@ -261,6 +225,7 @@ class State:
     behind: int = 0
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     unresolved: bool = False
+    slid: Slid | None = None
     pace: Pace = field(default_factory=Pace)
     iterations: int = 0
     convolutions: int = 0
@@ -351,7 +316,7 @@ class Step:
     @property
     def time_error(self) -> float:
         """Relative error of pressure (L1), force and approach that the time steps leave. [-]"""
-        return self.uncertainty.relative(self.state)
+        return self.uncertainty.relative(self.state.largest_force, self.state.largest_approach)
 
     @property
     def stored(self) -> float:
@@ -384,6 +349,7 @@ class Trial:
     converged: bool = True
     iterations: int = 0
     convolutions: int = 0
+    slides: bool = False
 
     @property
     def apart(self) -> bool:

@@ -21,7 +21,8 @@ from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.stepping.attempt import work_between
 from roughvisc.mechanics.stepping.domain import at_edge, edge_error
 from roughvisc.mechanics.stepping.events import next_event
-from roughvisc.mechanics.stepping.scene import UNKNOWN, Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.uncertainty import UNKNOWN
 
 Array = NDArray[np.float64]
 

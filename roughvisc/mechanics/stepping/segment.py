@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.stepping.slide import Slide
 from roughvisc.units import said, shown
 
 Control = Literal["load", "approach", "pressure"]
@@ -33,6 +34,8 @@ class Segment:
         Value at the end, reached linearly; None keeps the value found at the start. [N, m or Pa]
     amplitude, period : float
         A sine wave about the value ``end``, which must also be the value at the start. [N, m or Pa], [s]
+    slide : Slide or None
+        How the profile moves along the surface meanwhile, while what is controlled keeps its value.
     """
 
     control: Control
@@ -40,6 +43,7 @@ class Segment:
     end: float | None = None
     amplitude: float = 0.0
     period: float = math.inf
+    slide: Slide | None = None
 
     def __post_init__(self) -> None:
         if self.control not in UNITS:
@@ -54,6 +58,8 @@ class Segment:
             raise InputError(f"{reached}: expected no negative {self.control}, contact here has no adhesion")
         if self.amplitude and not (self.period > 0 and math.isfinite(self.period)):
             raise InputError(f"period of a cycle is {self.period!r}: expected a positive number [s]")
+        if self.slide is not None and (self.end is not None or self.amplitude or self.duration == 0):
+            raise InputError("a slide takes time and keeps what is controlled: expected no end, no wave, duration > 0")
 
     def __str__(self) -> str:
         """In words, such as ``load to 2 N over 50 ms``."""
@@ -62,10 +68,18 @@ class Segment:
         if self.amplitude:
             wave = f"{said(self.end or 0.0, unit)} ± {said(self.amplitude, unit)}"
             return f"{named} {wave} in {self.duration / self.period:g} cycles of {said(self.period, 's')}"
+        if self.slide is not None:
+            way = f"slide {said(self.slide.distance, 'm')} along {self.slide.direction}"
+            return f"{way} over {lasting} at {said(self.slide.distance / self.duration, 'm/s')}"
         if self.end is None:
             return f"hold {named} {lasting}"
         reached = f"{named} to {said(self.end, unit)}"
         return f"{reached} over {lasting}" if self.duration else f"{reached} at once"
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing moves: what is controlled keeps its value, and the profile its place."""
+        return self.end is None and not self.amplitude and self.slide is None
 
     def value(self, elapsed: float, start: float) -> float:
         """Prescribed value [N or m] a time [s] after the start of the segment, which began at ``start``."""

@@ -11,7 +11,8 @@ from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import attempt, companion
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.simulation.rows import keeps_its_word, stated
 
 TOLERANCE, SHARPER = 1e-2, 30

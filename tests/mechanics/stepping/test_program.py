@@ -6,6 +6,9 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.stepping.segment import Segment
+from roughvisc.mechanics.stepping.slide import Slide
+
+PRESSED = rv.Program().load(1.0, over=1.0)
 
 
 def test_chain__adds_segments_in_order():
@@ -19,6 +22,18 @@ def test_chain__adds_segments_in_order():
 
 def test_hold__keeps_the_control_it_follows():
     assert rv.Program().approach(1e-6, over=1.0).hold(2.0).segments[1].control == "approach"
+
+
+def test_slide__keeps_what_is_controlled_and_takes_its_time():
+    program = PRESSED.hold(1.0, control="approach").slide("2 mm", speed="1 mm/s").slide(1e-3, over=4.0, direction="-y")
+    assert [(s.control, s.duration, s.end) for s in program.segments[2:]] == [("approach", 2.0, None)] * 1 + [
+        ("approach", 4.0, None)
+    ]
+    assert program.slides
+    assert not PRESSED.slides
+    assert str(program.segments[2]) == "slide 2 mm along x over 2 s at 1 mm/s"
+    assert [segment.holds for segment in program.segments] == [False, True, False, False]
+    assert rv.Program().pressure(1e3, over=0).slide(1e-3, speed=1.0).on_area(2.0).segments[1].slide == Slide(1e-3)
 
 
 def test_table__ramps_between_rows_and_jumps_within_a_time():
@@ -50,6 +65,16 @@ def test_cycle__is_a_sine_about_its_mean():
         (lambda: rv.Program.table([0, 2, 1], [0, 1, 2]), r"table row 2: time 1 s after 2\.0 s"),
         (lambda: rv.Program.table([1, 2], [0, 1]), r"table starts at time 1 s: expected 0"),
         (lambda: rv.Program.table([0], [0, 1]), r"table has 1 times and 2 values"),
+        (lambda: PRESSED.slide(0.0, speed=1.0), r"program\.1\.slide: found 0\.0: expected a number in m, .* above 0"),
+        (lambda: PRESSED.slide("1 N", speed=1.0), r"program\.1\.slide: found '1 N'"),
+        (lambda: PRESSED.slide(1e-3, speed="2 m"), r"program\.1\.speed: found '2 m'"),
+        (lambda: PRESSED.slide(1e-3, over=-1), r"program\.1\.over: found -1"),
+        (lambda: PRESSED.slide(1e-3), "program.1: speed is None and over is None: expected one of them"),
+        (lambda: PRESSED.slide(1e-3, speed=1, over=1), "program.1: speed is 1 and over is 1: expected one of them"),
+        (lambda: PRESSED.slide(1e-3, speed=1, direction="z"), "program.1.direction: found 'z': expected 'x', '-x'"),
+        (lambda: Segment("load", 1.0, 2.0, slide=Slide(1e-3)), "a slide takes time and keeps what is controlled"),
+        (lambda: Slide(-1e-3), "distance of a slide is -0.001"),
+        (lambda: Slide(1e-3, "z"), "direction of a slide is 'z'"),
     ],
 )
 def test_bad_programs__are_named(make, message):

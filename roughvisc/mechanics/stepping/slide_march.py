@@ -1,0 +1,164 @@
+"""The march through a slide: one cell a step, in the frame of the profile.
+
+The body moves backwards under the profile. Before each step what belongs to the body, its memory first of all, moves by
+one cell, whole and without interpolation; then the step is an elastic contact problem as ever. Pressure is nearly
+steady in the frame of the profile, so that the last one, where it was, is the first guess. The companion takes two
+cells at once, and tells what the length of the steps leaves unknown: that falls with the cells alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, step_of, with_cost
+from roughvisc.mechanics.stepping.companion import bare, beside, compared, of_a_pair, stating
+from roughvisc.mechanics.stepping.control import rule_for
+from roughvisc.mechanics.stepping.events import entering
+from roughvisc.mechanics.stepping.program import Segment
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+
+# Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
+# friction is a small part of it.
+_SHARE = 0.3
+_COMPANION_SHARE = 2.5
+
+
+def through_slide(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
+    """Accepted steps through a slide; the last one has entered the next segment.
+
+    Parameters
+    ----------
+    scene, state : Scene, State
+        What is prescribed, and how far it has come: into the slide, as far as a step of it.
+    segment : Segment
+        The slide.
+
+    Raises
+    ------
+    InputError
+        If the slide is shorter than half a cell, or the surface is not periodic.
+    """
+    assert segment.slide is not None
+    if scene.halfspace.boundary != "periodic":
+        raise InputError("a profile slides with periodic boundaries alone: expected boundary = 'periodic'")
+    cells = segment.slide.cells(scene.halfspace.spacing)
+    end, length = scene.program.corners[state.segment + 1], segment.duration / cells
+    waiting: list[Step] = []  # the first step of a pair, till the companion has told
+    while state.now.time < end:
+        taken = round((state.now.time - state.began) / length)
+        step = _further(scene, state, segment, instant(state.began, end, taken + 1, cells), length)
+        while waiting:
+            yield of_a_pair(waiting.pop(), step)
+        state = step.state
+        if state.behind and scene.keeps(state.now.time):
+            waiting.append(step)
+        else:
+            yield step
+        del step
+
+
+def _further(scene: Scene, state: State, segment: Segment, arrival: float, length: float) -> Step:
+    """The step over the next cell, with what the companion says of it where it has come along."""
+    assert segment.slide is not None
+    end = scene.program.corners[state.segment + 1]
+    guess = partial(beside, now=state.now)
+    trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, guess)
+    accepted = _accepted(scene, with_cost(state, trial), segment.slide, trial, 1)
+    accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
+    companion_trial, earlier = None, state.companion
+    if scene.remembers and state.behind == 0 and arrival < end:
+        accepted = replace(accepted, companion=bare(state) if earlier is None else earlier, behind=1)
+    elif earlier is not None:
+        accepted, companion_trial = _followed(scene, accepted, state, segment, length)
+    if arrival == end:
+        accepted = entering(scene, accepted)
+    step = step_of(scene, accepted, trial)
+    if companion_trial is None or earlier is None:
+        return step
+    asked = scene.keeps(arrival) or (state.behind > 0 and scene.keeps(state.now.time))
+    entered = _rolled(earlier.now.pressure, segment.slide, state.behind + 1)
+    step = compared(scene, step, companion_trial, entered, asked)
+    step = replace(step, state=replace(step.state, slid=_sharpened(step, state.uncertainty)))
+    # after a single step the companion knows no more than before
+    return step if state.behind else stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))
+
+
+def _tried(
+    scene: Scene,
+    state: State,
+    segment: Segment,
+    arrival: float,
+    length: float,
+    cells: int,
+    share: float,
+    guess: Callable[[float], tuple[np.ndarray, np.ndarray | None]],
+) -> Trial:
+    """A step over so many cells, each of which takes a length. [s]"""
+    assert segment.slide is not None
+    value = segment.value(arrival - state.began, state.start)
+    body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
+    stated = cells == 1 and scene.keeps(arrival)
+    trial = attempt(scene, body, segment.control, value, cells * length, rule, share, guess, stated=stated)
+    return replace(trial, instant=replace(trial.instant, time=arrival), slides=True)
+
+
+def _accepted(scene: Scene, state: State, slide: Slide, trial: Trial, cells: int) -> State:
+    """State after a step; the one before is kept as the profile saw it."""
+    accepted = committed(scene, _moved(scene, state, slide, cells), trial)
+    accepted = replace(accepted, before=state.now)
+    return restarted(scene, accepted, 0.0) if state.unresolved else accepted
+
+
+def _followed(scene: Scene, accepted: State, state: State, segment: Segment, length: float) -> tuple[State, Trial]:
+    """State whose companion has come to the same instant by one step, and that step."""
+    companion = accepted.companion
+    assert companion is not None
+    assert segment.slide is not None
+    cells = state.behind + 1
+    together = state.before if state.behind else None
+    guess = partial(beside, now=accepted.now, companion=companion.now, together=together)
+    share = _COMPANION_SHARE * _SHARE
+    trial = _tried(scene, companion, segment, accepted.now.time, length, cells, share, guess)
+    followed = bare(_accepted(scene, companion, segment.slide, trial, cells))
+    return replace(with_cost(accepted, trial), companion=followed, behind=0), trial
+
+
+def _path(scene: Scene, state: State, accepted: State, slide: Slide) -> Slid:
+    """How far the profile has come with a step. What is controlled is held: so much is the work of the normal force."""
+    before = state.slid or Slid()
+    normal = accepted.now.force * (accepted.now.approach - state.now.approach)
+    side = scene.halfspace.spacing[slide.axis]
+    return Slid(before.distance + side, before.work + (accepted.work - state.work) - normal)
+
+
+def _sharpened(step: Step, earlier: Uncertainty) -> Slid | None:
+    """How far the profile has come, its work without the leading part of what the steps have added since earlier."""
+    slid, now = step.state.slid, step.uncertainty
+    added = now.stored_excess - earlier.stored_excess + now.dissipated_excess - earlier.dissipated_excess
+    return None if slid is None else replace(slid, work=slid.work - added)
+
+
+def _moved(scene: Scene, state: State, slide: Slide, cells: int) -> State:
+    """State of the body as it lies under the profile when that has moved by so many cells."""
+
+    def moved(one: Instant) -> Instant:
+        displacement = None if one.unit_displacement is None else _rolled(one.unit_displacement, slide, cells)
+        return replace(one, pressure=_rolled(one.pressure, slide, cells), unit_displacement=displacement)
+
+    return replace(
+        state,
+        now=moved(state.now),
+        displacement=_rolled(state.displacement, slide, cells),
+        memory=scene.memory.moved(state.memory, slide.sense * cells, slide.axis),
+    )
+
+
+def _rolled(field: np.ndarray, slide: Slide, cells: int) -> np.ndarray:
+    return np.roll(field, -slide.sense * cells, slide.axis)

@@ -1,0 +1,67 @@
+r"""Tangential force of a contact without shear: that of the pressure on the inclined surface.
+
+A profile that moves along +x is held back by ``-int p du/dx dA``, with the displacement ``u`` of the body, which in
+contact has the slope of the profile. The part of ``u`` that is ``K p`` has no share in that, since ``K`` is even: on
+the grid its sum is zero to rounding, if the slope is that of the Fourier series. So the force does not depend on how
+steeply the pressure ends at the edges of contact, as the sum of pressure times slope of the profile does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.stepping.slide import Slide
+
+Array = NDArray[np.float64]
+
+
+def slope(field: Array, side: float, axis: int) -> Array:
+    """Slope of a periodic field along an axis, by its Fourier series.
+
+    Parameters
+    ----------
+    field : ndarray, shape (nx, ny)
+        Of any unit.
+    side : float
+        Of a cell along the axis. [m]
+    axis : int
+        0 for x, 1 for y.
+
+    Returns
+    -------
+    ndarray, shape (nx, ny)
+        The shortest wave of an even number of cells has none. [unit of the field / m]
+    """
+    count = field.shape[axis]
+    waves = 2 * math.pi * fft.rfftfreq(count, side)
+    if count % 2 == 0:
+        waves[-1] = 0.0
+    waves = waves[:, None] if axis == 0 else waves
+    return np.asarray(fft.irfft(fft.rfft(field, axis=axis) * (1j * waves), n=count, axis=axis, overwrite_x=True))
+
+
+def tangential_force(halfspace: HalfSpace, pressure: Array, displacement: Array, slide: Slide) -> float:
+    """Force against the motion of a profile, by the slope of the body under it. [N]
+
+    Parameters
+    ----------
+    halfspace : HalfSpace
+        The body, periodic.
+    pressure, displacement : ndarray, shape (nx, ny)
+        [Pa], [m]
+    slide : Slide
+        The motion.
+    """
+    inclined = slope(displacement, halfspace.spacing[slide.axis], slide.axis)
+    return -slide.sense * float(np.sum(pressure * inclined)) * halfspace.cell_area
+
+
+def slope_force(halfspace: HalfSpace, pressure: Array, gap: Array, slide: Slide) -> float:
+    """The same by the slope of the profile, from its undeformed gap [m]. [N]"""
+    inclined = slope(gap, halfspace.spacing[slide.axis], slide.axis)
+    return slide.sense * float(np.sum(pressure * inclined)) * halfspace.cell_area

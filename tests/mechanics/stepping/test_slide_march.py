@@ -1,0 +1,292 @@
+"""Slides: against closed forms of full contact, against steady sliding, and what must hold for any surface."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.hereditary.direct import History
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+from roughvisc.mechanics.stepping.attempt import segment_number
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.slide import Slide
+from roughvisc.mechanics.stepping.tangential import slope, slope_force, tangential_force
+
+PERIOD, TIME, AMPLITUDE = 1e-3, 1e-3, 1e-6
+WAVE = 2 * math.pi / PERIOD
+LOSSY = {0.2: 0.48, 0.9: 4.4, 2.2: 20.0}  # the largest loss tangent: retarded over instantaneous compliance
+
+
+def rubber(ratio=3.0):
+    """Modulus 1 MPa at once, and so many times the compliance retarded."""
+    return rv.zener(1e6, 1e6 / ratio, 1e6 / ratio * TIME)
+
+
+def wave(cells, across=1):
+    return AMPLITUDE * np.cos(2 * np.pi * (np.arange(cells) + 0.5) / cells)[:, None] * np.ones((1, across))
+
+
+def rough(shape):
+    settings = {"rolloff": PERIOD / 3, "shortcut": PERIOD / 8, "seed": 2}
+    return rv.self_affine(PERIOD, shape, hurst=0.8, rms_slope=0.1, **settings).values
+
+
+def scene(height, material, program, times=(), tolerance=1e-3, memory=None):
+    """On a square surface, or on a strip of square cells."""
+    nx, ny = height.shape
+    spacing = (PERIOD / nx, PERIOD / ny if ny > 3 else PERIOD / nx)
+    halfspace = HalfSpace((nx, ny), spacing, "periodic")
+    memory = memory or Modes(material)
+    return Scene(halfspace, height.max() - height, material, memory, program, times=times, tolerance=tolerance)
+
+
+def force(found, step):
+    """Against the motion. [N]"""
+    slide = found.motions[segment_number(step.state)]
+    return tangential_force(found.halfspace, step.shown.pressure, step.displacement, slide)
+
+
+def area(found):
+    return found.halfspace.cell_area * found.gap.size
+
+
+def modulus(material, frequency):
+    return 1 / complex(complex_compliance(material, frequency))
+
+
+def settled(height, material, speed, load, periods=6, **settings):
+    found = scene(height, material, rv.Program().load(load, over=0).slide(periods * PERIOD, speed=speed), **settings)
+    return found, list(march(found))
+
+
+def steady(found, material, speed, load):
+    halfspace = found.halfspace
+    sliding = Sliding(HALF_SPACE, partial(complex_compliance, material), halfspace.shape, halfspace.spacing, speed)
+    return steady_state(sliding, found.gap, load, tolerance=1e-6)
+
+
+@pytest.mark.parametrize("loss", LOSSY)
+def test_full_contact_of_a_wave__is_right_to_second_order_in_the_cell(loss):
+    """mu = k^2 A^2 Im E* / (4 p0), at the speed of the largest loss."""
+    material = rubber(LOSSY[loss])
+    speed = math.sqrt(1 + LOSSY[loss]) / (TIME * WAVE)
+    lost = modulus(material, WAVE * speed)
+    assert lost.imag / lost.real == pytest.approx(loss, rel=0.06)
+    pressure, errors = 3 * AMPLITUDE * WAVE * abs(lost), []
+    for cells in (24, 48):
+        load = pressure * PERIOD * PERIOD / cells
+        found, steps = settled(wave(cells), material, speed, load, periods=8)
+        exact = WAVE**2 * AMPLITUDE**2 * lost.imag / (4 * pressure)
+        errors.append(force(found, steps[-1]) / load / exact - 1)
+    assert abs(errors[1]) < 3e-3
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
+
+
+def test_soft_body__slides_by_the_two_step_rule():
+    """Kelvin-Voigt in full contact, E* = E (1 + i w T), where no compliance is there at once."""
+    material, speed = rv.kelvin_voigt(1e6, 1e6 * TIME), 0.2
+    lost = modulus(material, WAVE * speed)
+    pressure, errors = 3 * AMPLITUDE * WAVE * abs(lost), []
+    for cells in (24, 48):
+        load = pressure * PERIOD * PERIOD / cells
+        program = rv.Program().load(load, over=5 * TIME).slide(6 * PERIOD, speed=speed)
+        found = scene(wave(cells), material, program)
+        last = list(march(found))[-1]
+        exact = WAVE**2 * AMPLITUDE**2 * lost.imag / (4 * pressure)
+        errors.append(force(found, last) / load / exact - 1)
+    assert abs(errors[1]) < 0.02
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.3)
+
+
+def full_contact_history(material, speed, strokes, instants):
+    """Tangential force along +x over the area of a wave in full contact, from a rest in which all was relaxed.
+
+    ``u = A cos(k (X - s(t)))`` in the body, so that ``p = (k / 2) int E(t - t') du(t')`` of each wave, with
+    ``E = E_inf + E_1 exp(-t / T)``; strokes are (end, speed) one after the other. [Pa]
+    """
+    final, at_once = 1 / float(material.contact_compliance(np.inf)), 1 / float(material.contact_compliance(0.0))
+    relaxed = TIME * final / at_once
+    forces, began, place, lag, number = [], 0.0, 0.0, 0j, 0
+    for time in instants:
+        while time > strokes[number][0] * (1 + 1e-12):
+            place, lag = _moved(place, lag, strokes[number][0] - began, strokes[number][1], relaxed)
+            began, number = strokes[number][0], number + 1
+        here, behind = _moved(place, lag, time - began, strokes[number][1], relaxed)
+        pressure = WAVE / 2 * AMPLITUDE * (final * np.exp(-1j * WAVE * here) + (at_once - final) * behind)
+        surface = AMPLITUDE * np.exp(-1j * WAVE * here)
+        forces.append(-0.5 * (np.conj(pressure) * 1j * WAVE * surface).real)
+    return np.array(forces)
+
+
+def _moved(place, lag, duration, speed, relaxed):
+    """Place, and ``int exp(-(t - t') / T) d exp(-i k s(t'))``, after a time at a speed."""
+    rate, turning = 1 / relaxed, -1j * WAVE * speed
+    ahead = np.exp(turning * duration) - np.exp(-rate * duration)
+    lag = lag * np.exp(-rate * duration) + np.exp(-1j * WAVE * place) * turning / (turning + rate) * ahead
+    return place + speed * duration, lag
+
+
+def test_start_stop_and_reversal__are_the_closed_form_of_full_contact():
+    """Friction against distance, to second order in the cell, through a start, a rest and a stroke back."""
+    material, speed, rest = rubber(), 0.3, 0.4 * TIME
+    stroke = 1.5 * PERIOD / speed
+    pressure, errors = 3 * AMPLITUDE * WAVE * 4e6, []
+    for cells in (24, 48):
+        program = rv.Program().pressure(pressure, over=0).hold(40 * TIME).slide(1.5 * PERIOD, speed=speed).hold(rest)
+        program = program.slide(0.75 * PERIOD, over=stroke, direction="-x").on_area(PERIOD**2 / cells)
+        found = scene(wave(cells), material, program, times=None, tolerance=1e-6)
+        steps = [step for step in march(found) if step.shown.time > 40 * TIME]
+        times = np.array([step.shown.time for step in steps]) - 40 * TIME
+        strokes = [(stroke, speed), (stroke + rest, 0.0), (np.inf, -speed / 2)]
+        exact = full_contact_history(material, speed, strokes, times) * area(found)
+        exact[times > (stroke + rest) * (1 + 1e-9)] *= -1  # against the motion
+        got = np.array([force(found, step) for step in steps])
+        errors.append(np.abs(got - exact).max() / np.abs(exact).max())
+    assert errors[1] < 1e-2
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.4)
+
+
+@pytest.mark.parametrize("speed", [0.16, *(pytest.param(one, marks=pytest.mark.long) for one in (0.02, 1.0))])
+def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
+    """0.5 % at 128 cells a wave; and the power that is dissipated is that of the force, within 1 %."""
+    material = rubber(4.4)
+    load = 0.25 * AMPLITUDE * WAVE * abs(modulus(material, WAVE * speed)) * PERIOD * PERIOD / 128
+    found, steps = settled(wave(128), material, speed, load, periods=3 if speed < 0.5 else 9)
+    exact = steady(found, material, speed, load)
+    assert 0.2 < np.mean(steps[-1].shown.pressure > 0) < 0.6
+    got = force(found, steps[-1])
+    assert got == pytest.approx(exact.power_force, rel=5e-3)
+    assert abs(got - exact.power_force) <= steps[-1].uncertainty.friction
+    before, after = steps[-129], steps[-1]
+    dissipated = (after.dissipated - before.dissipated) / (after.shown.time - before.shown.time)
+    assert dissipated == pytest.approx(got * speed, rel=0.01)
+    work = (after.state.slid.work - before.state.slid.work) / PERIOD
+    assert work == pytest.approx(exact.power_force, rel=2e-3)
+    assert slope_force(found.halfspace, after.shown.pressure, found.gap, Slide(1.0)) == pytest.approx(got, rel=5e-3)
+
+
+def test_work_of_the_friction_force__is_what_the_body_takes_up():
+    """The integral of the force over the distance against the balance of energy, from the start on."""
+    x, y = (2 * np.pi * (np.arange(n) + 0.5) / n for n in (40, 24))
+    height = AMPLITUDE * (np.cos(x)[:, None] + 0.5 * np.cos(2 * x[:, None] + y + 1) + 0.3 * np.cos(y))
+    found, steps = settled(height, rubber(), 0.1, 5e3 * PERIOD**2, periods=1.5, times=None)
+    assert 0.3 < np.mean(steps[-1].shown.pressure > 0) < 0.8
+    sliding = [step for step in steps if step.shown.time > 0]
+    distance = np.array([0.0] + [step.state.slid.distance for step in sliding])
+    forces = np.array([0.0] + [force(found, step) for step in sliding])
+    assert distance[-1] == pytest.approx(1.5 * PERIOD, rel=1e-12)
+    assert sliding[-1].state.slid.work == pytest.approx(np.trapezoid(forces, distance), rel=5e-3)
+
+
+def test_work_of_the_friction_force__is_known_of_the_direct_history_too():
+    found, steps = settled(wave(40), rubber(), 0.1, 5e3 * PERIOD**2 / 40, 0.8, times=None, memory=History(rubber()))
+    distance = np.array([step.state.slid.distance for step in steps[1:]])
+    forces = np.array([force(found, step) for step in steps[1:]])
+    integral = np.trapezoid(np.append(0.0, forces), np.append(0.0, distance))
+    assert steps[-1].state.slid.work == pytest.approx(integral, rel=0.04)
+
+
+@pytest.mark.parametrize("direction", ["-x", "y", pytest.param("-y", marks=pytest.mark.long)])
+def test_turned_surface__slides_as_well_in_the_turned_direction(direction):
+    height, material = rough((30, 24)), rubber()
+
+    def slid(height, direction):
+        program = rv.Program().load(2e-3, over=0).slide(0.4e-3, speed=0.1, direction=direction)
+        found = scene(height, material, program, tolerance=1e-6)
+        last = list(march(found))[-1]
+        return force(found, last) / 2e-3, last.shown.approach
+
+    turned = {"-x": height[::-1], "y": height.T, "-y": height.T[:, ::-1]}[direction]
+    assert slid(turned, direction) == pytest.approx(slid(height, "x"), rel=1e-5)
+
+
+def test_held_approach__keeps_it_and_finds_the_force():
+    program = rv.Program().load(2e-3, over=0).hold(1e-3, control="approach").slide(PERIOD, speed=0.1)
+    found = scene(rough((36, 30)), rubber(), program, times=None)
+    steps = list(march(found))
+    before = next(step for step in reversed(steps) if step.state.slid is None)
+    assert steps[-1].shown.approach == before.shown.approach
+    assert steps[-1].shown.force > 1.05 * before.shown.force, "the body has no time to give way"
+    assert steps[-1].control == "approach"
+    assert not steps[-1].given
+
+
+def test_elastic_body__has_no_friction():
+    found, steps = settled(rough((24, 20)), rv.elastic(1e6), 0.1, 2e-3, periods=0.5)
+    assert abs(force(found, steps[-1])) < 1e-12 * 2e-3
+    assert steps[-1].state.slid.work == pytest.approx(0, abs=1e-8 * steps[-1].work)
+
+
+def test_slow_slide__is_not_frozen_by_the_tolerance():
+    """At a speed at which a cell changes the pressure by less than the tolerance."""
+    forces = []
+    for tolerance in (1e-2, 1e-6):
+        found, steps = settled(rough((32, 24)), rubber(), 1e-4, 2e-3, periods=1, tolerance=tolerance)
+        forces.append(force(found, steps[-1]))
+    assert forces[0] == pytest.approx(forces[1], rel=1e-3)
+
+
+def test_direct_history__slides_as_the_series_does():
+    program = (
+        rv.Program().load(2e-3, over=0).slide(0.5e-3, speed=0.1).hold(1e-3).slide(0.25e-3, speed=0.1, direction="-y")
+    )
+    material, height = rubber(), rough((20, 21))
+    instants = (2e-3, 5e-3, program.duration)
+    found = [scene(height, material, program, instants, 1e-5, memory) for memory in (None, History(material))]
+    last = [list(march(one))[-1] for one in found]
+    assert force(found[1], last[1]) == pytest.approx(force(found[0], last[0]), rel=1e-4)
+    np.testing.assert_allclose(last[1].shown.pressure, last[0].shown.pressure, atol=1e-4 * last[0].shown.pressure.max())
+
+
+def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():
+    program = (
+        rv.Program().load(2e-3, over=0).slide(0.5e-3, speed=0.1).hold(1e-3).slide(0.35e-3, speed=0.1, direction="y")
+    )
+    found = scene(rough((20, 21)), rubber(), program, times=(1e-3, 2e-3, program.duration))
+    whole = list(march(found))
+    for at in (3, 4, 9, 15, len(whole) - 3):
+        again = list(march(found, whole[at].state))
+        assert len(again) == len(whole) - at - 1
+        assert [step.shown.time for step in again] == [step.shown.time for step in whole[at + 1 :]]
+        np.testing.assert_array_equal(again[-1].state.memory.modes, whole[-1].state.memory.modes)
+        assert again[-1].state.slid == whole[-1].state.slid
+        assert again[-1].uncertainty == whole[-1].uncertainty
+
+
+def test_two_strokes_in_a_row__are_one():
+    material, height = rubber(), rough((20, 20))
+    one, two = (rv.Program().load(2e-3, over=0) for _ in range(2))
+    one, two = one.slide(0.5e-3, speed=0.1), two.slide(0.2e-3, speed=0.1).slide(0.3e-3, speed=0.1)
+    found = [scene(height, material, program, tolerance=1e-7) for program in (one, two)]
+    last = [list(march(one))[-1] for one in found]
+    np.testing.assert_allclose(last[1].shown.pressure, last[0].shown.pressure, atol=1e-5 * last[0].shown.pressure.max())
+    assert last[1].state.slid.distance == pytest.approx(0.5e-3, rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [7, 8])
+def test_slope__is_that_of_the_wave(count):
+    x = 2 * np.pi * np.arange(count) / count
+    field = np.sin(x)[:, None] + np.cos(3 * x)[:, None] * np.ones((1, 3))
+    exact = np.cos(x)[:, None] - 3 * np.sin(3 * x)[:, None] * np.ones((1, 3))
+    np.testing.assert_allclose(slope(field, 2 * np.pi / count, 0), exact, atol=1e-12)
+    np.testing.assert_allclose(slope(field.T, 2 * np.pi / count, 1), exact.T, atol=1e-12)
+
+
+def test_slide__is_of_whole_cells_and_periodic():
+    assert Slide(1.04e-3).cells((1e-4, 1.0)) == 10
+    assert Slide(1.05e-3, "-y").cells((1.0, 1e-4)) == 11
+    with pytest.raises(InputError, match=r"a slide of 40 µm is less than half a cell of 100 µm"):
+        Slide(4e-5).cells((1e-4, 1e-4))
+    found = scene(wave(12), rubber(), rv.Program().load(1e-6, over=0).slide(PERIOD, speed=0.1))
+    free = replace(found, halfspace=HalfSpace((12, 1), (PERIOD / 12, PERIOD / 12), "free"), accept_edge=True)
+    with pytest.raises(InputError, match="periodic"):
+        list(march(free))
