@@ -4,6 +4,7 @@ from roughvisc.errors import ConvergenceError as ConvergenceError
 from roughvisc.errors import EdgeContactError as EdgeContactError
 from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
+from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.materials.models import PowerLaw as PowerLaw
 from roughvisc.mechanics.materials.models import Prony as Prony
@@ -21,6 +22,7 @@ from roughvisc.mechanics.materials.temperature import arrhenius_shift as arrheni
 from roughvisc.mechanics.materials.temperature import shifted as shifted
 from roughvisc.mechanics.materials.temperature import wlf_shift as wlf_shift
 from roughvisc.mechanics.stepping.program import Program as Program
+from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
@@ -47,6 +49,7 @@ from roughvisc.topography.conditioning import mirror as mirror
 from roughvisc.topography.conditioning import resample as resample
 from roughvisc.topography.conditioning import rotate90 as rotate90
 from roughvisc.topography.conditioning import taper as taper
+from roughvisc.topography.example import example_scan as example_scan
 from roughvisc.topography.fitting import fit_self_affine as fit_self_affine
 from roughvisc.topography.parameters import parameters as parameters
 from roughvisc.topography.readers import from_array as from_array
@@ -64,6 +67,7 @@ from roughvisc.views import observables as observables
 from roughvisc.views import plot as plot
 from roughvisc.views.export import deformed as deformed
 from roughvisc.views.export import to_csv as to_csv
+from roughvisc.views.observed import observe as observe
 from roughvisc.views.report.page import report as report
 
 __version__: str

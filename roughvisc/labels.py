@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Hashable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
-from roughvisc.variables import SLIDING, STATUS_MEANINGS, VARIABLES, Variable, of_step
+from roughvisc.variables import FLAGS, VARIABLES, Variable
+from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,12 +60,15 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
         variable.attrs.update(declared.attributes() | ({"cartesian_axis": declared.axis} if declared.axis else {}))
         if stated := " ".join(other for other in declared.ancillary if other in annotated):
             variable.attrs["ancillary_variables"] = stated
-    for name in {"status", of_step("status")} & set(annotated.variables):
-        annotated.variables[name].attrs.update(
-            flag_values=np.arange(len(STATUS_MEANINGS), dtype="int8"),
-            flag_meanings=" ".join(STATUS_MEANINGS),
-        )
+    for name in FLAGS.keys() & set(annotated.variables):
+        annotated.variables[name].attrs.update(_flags(name))
     return annotated
+
+
+def _flags(name: str) -> dict[str, Any]:
+    """CF attributes that say what the values of a status mean."""
+    meanings = FLAGS[name]
+    return {"flag_values": np.arange(len(meanings), dtype="int8"), "flag_meanings": " ".join(meanings)}
 
 
 def _is_label(dataset: xr.Dataset, name: Hashable) -> bool:
@@ -86,14 +90,25 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
         If a variable is not declared.
     ValueError
         If a variable's dimensions do not end in the declared ones.
+    InputError
+        If it lies over the speed of steady sliding.
     """
+    expect_history(dataset)
     described = dataset.copy()
     for name, variable in described.variables.items():
         if name in described.coords and (name not in VARIABLES or name not in described.dims):
             continue
         variable.attrs = _declared(str(name), variable.dims).attributes()
+        if name in FLAGS:
+            variable.attrs |= _flags(str(name))
     described.attrs = {}
     return described
+
+
+def expect_history(dataset: xr.Dataset) -> None:
+    """Refuse a curve of friction, where a history over time is needed."""
+    if "speed" in dataset.dims:
+        raise InputError("the result lies over the speed of steady sliding: expected a history over time")
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:
@@ -102,10 +117,14 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
     Raises
     ------
     InputError
-        If a declared variable states a unit that is not the declared one in other words.
+        If a declared variable states a unit that is not the declared one in other words, or holds a pint array.
     """
     for name, variable in dataset.variables.items():
         declared = VARIABLES[str(name)].units if name in VARIABLES else ""
+        if declared and "units" not in variable.attrs and hasattr(variable.data, "magnitude"):
+            raise InputError(
+                f"the result holds {name!r} as a pint array: expected numbers, as ds.pint.dequantify() gives"
+            )
         found = str(variable.attrs.get("units", declared))
         if declared and found != declared and not _same_unit(found, declared):
             raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
@@ -121,7 +140,7 @@ def _same_unit(found: str, declared: str) -> bool:
 
 
 def _vocabulary(dims: tuple[Hashable, ...]) -> dict[str, Variable]:
-    return SLIDING if "speed" in dims else VARIABLES
+    return VOCABULARIES[rows_of(dims)]
 
 
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:

@@ -4,11 +4,16 @@ The suite runs with the transforms that everybody has; test_transforms.py compar
 """
 
 import os
+import shutil
+import signal
+import subprocess
 
 import pytest
 from click.testing import CliRunner
 
 os.environ["ROUGHVISC_TRANSFORMS"] = "scipy"
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # a shell's background job, from which all runs would inherit it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import strategies  # noqa: F401  (loads the profile of the random examples)
 from matplotlib.figure import Figure
@@ -46,6 +51,22 @@ def invoke(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def small_disk(tmp_path):
+    """A mount of few kilobytes, and what mounts it anew with other options."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", folder]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("mounting is not permitted here")
+
+    def remount(options):
+        subprocess.run(["mount", "-o", f"remount,{options}", folder], check=True)
+
+    yield folder, remount
+    subprocess.run(["umount", "-l", folder], check=True)
+
+
+@pytest.fixture
 def coarse_pictures(monkeypatch):
     """Pictures are written with few points, where nobody looks at them."""
     save = Figure.savefig
@@ -55,11 +76,11 @@ def coarse_pictures(monkeypatch):
 @pytest.fixture
 def stubborn(monkeypatch):
     """Every run ends with a kept time, the second, that did not converge."""
-    press = run_module.press
+    press = run_module.carry_out
 
     def one_missed(*args, **settings):
         ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "press", one_missed)
+    monkeypatch.setattr(run_module, "carry_out", one_missed)

@@ -128,7 +128,7 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
 
 def test_help__summaries_of_commands_are_whole(invoke):
     listed = invoke("--help")[1].split("Commands:")[1].strip().splitlines()
-    assert len(listed) == 10
+    assert len(listed) == 11
     assert all(line.endswith(".") and not line.endswith("..") for line in listed)
 
 
@@ -164,7 +164,7 @@ def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
     def interrupted(*args, **settings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run_module, "press", interrupted)
+    monkeypatch.setattr(run_module, "carry_out", interrupted)
     status, _, err = invoke("run", write_study())
     assert status == 130
     assert err == "roughvisc: interrupted; what was finished is kept\n"

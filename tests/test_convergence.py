@@ -88,7 +88,10 @@ def orders(material, program, grid, counts):
     return fits
 
 
-@pytest.mark.parametrize("name", ["maxwell", "zener_equal", "power_law", "two_branches"])
+@pytest.mark.parametrize(
+    "name",
+    ["maxwell", "zener_equal", *(pytest.param(n, marks=pytest.mark.long) for n in ("power_law", "two_branches"))],
+)
 @pytest.mark.parametrize("program", ["triangle", "jump"])
 @pytest.mark.parametrize("grid", [uniform, pytest.param(random, marks=pytest.mark.long)], ids=["uniform", "random"])
 def test_instantaneous_compliance__second_order(name, program, grid):
@@ -102,7 +105,7 @@ def test_power_law_through_a_jump__second_order_on_graded_steps():
     assert min(orders(MATERIALS["power_law"], PROGRAMS["jump"], graded, (16, 32, 64))) > 1.7
 
 
-@pytest.mark.parametrize("name", ["maxwell", "power_law"])
+@pytest.mark.parametrize("name", ["maxwell", pytest.param("power_law", marks=pytest.mark.long)])
 def test_random_steps__second_order(name):
     counts = (16, 32, 64) if name == "maxwell" else (32, 64, 128)
     assert min(orders(MATERIALS[name], PROGRAMS["triangle"], random, counts)) > 1.7
@@ -118,7 +121,7 @@ def test_zener_1_to_100__second_order(program, grid):
 @pytest.mark.parametrize(
     ("name", "program"),
     [
-        ("kelvin_voigt", "triangle"),
+        pytest.param("kelvin_voigt", "triangle", marks=pytest.mark.long),
         pytest.param("kelvin_voigt", "jump", marks=pytest.mark.long),
         pytest.param("pure_power_law", "triangle", marks=pytest.mark.long),
         pytest.param("pure_power_law", "jump", marks=pytest.mark.long),

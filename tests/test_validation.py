@@ -48,6 +48,7 @@ def test_unloading_and_reloading__follow_the_element_reduction(profile, material
     assert ds.work.values == pytest.approx(exact.work, abs=4e-3 * np.max(exact.work))
 
 
+@pytest.mark.long
 def test_settled_cycles__dissipate_as_the_element_reduction_does():
     """W = 1 + 0.9 sin, period 3, on the Zener solid: work of a settled cycle."""
     program = rv.Program().load(1.0, over=0.5) + rv.Program.cycle(1.0, 0.9, period=3.0, cycles=4)

@@ -11,11 +11,6 @@ from roughvisc.cli.group import say
 from roughvisc.cli.reading import read_options, reading_options
 from roughvisc.errors import InputError, printable
 
-#: Scan that is written where none is named, and folders that hold it: of an installation, and of a checkout.
-EXAMPLE = "ground_steel.x3p"
-_PACKAGE = Path(__file__).parents[1]
-_HELD_IN = (_PACKAGE / "example", _PACKAGE.parent / "surfaces")
-
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
@@ -39,6 +34,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
 
     from roughvisc.study.statement.starter import starter_study
     from roughvisc.study.storage.store import whole_file
+    from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.scans import open_scan
     from roughvisc.views.console.scan_advice import advice_table
@@ -71,8 +67,9 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
 def _write_example(path: Path) -> None:
     """Write the scan that ships with roughvisc; one that is there already stays, and has to be the same."""
     from roughvisc.study.storage.store import whole_file
+    from roughvisc.topography.example import example_scan
 
-    held = next(folder / EXAMPLE for folder in _HELD_IN if (folder / EXAMPLE).exists())
+    held = example_scan()
     if not path.exists():
         with whole_file(path) as temporary:
             shutil.copyfile(held, temporary)

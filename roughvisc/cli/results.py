@@ -1,8 +1,9 @@
-"""Commands on results, ``plot`` and ``report``, and on this machine, ``validate``."""
+"""Commands on results, ``plot``, ``report`` and ``audit``, and on this machine, ``validate``."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -68,6 +69,44 @@ def report(results: Path, output: Path | None) -> None:
     from roughvisc.views.report.page import report as write
 
     say(Console(), "Report", write(results, output))
+
+
+@click.command()
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("--work-of-adhesion", metavar="W", help='Of the two surfaces: "50 mJ/m^2".')
+@click.option("--yield-strength", metavar="Y", help='In tension, of the body that yields first: "40 MPa".')
+@click.option("--thickness", metavar="H", help='True thickness of what was taken for a half-space: "5 mm".')
+@click.option("--base", help="What it lies on: bonded or slipping. [default: bonded]")
+@click.option("--density", metavar="RHO", help='Of the body: "1100 kg/m^3".')
+@click.option("--linear-strain", metavar="STRAIN", help='Up to which the material is linear: 0.05, or "5 %".')
+@click.option(
+    "--study", type=click.Path(path_type=Path), help="Study whose [audit] counts, in place of the result's own."
+)
+def audit(result: Path, study: Path | None, **stated: Any) -> None:
+    """Say what the model leaves out, and whether it matters.
+
+    For each assumption a number, a verdict (holds, doubtful, broken, not known) and a sentence. What is not given is
+    that of the table [audit] that the study had when it ran. Of a folder every result is told of.
+
+    \b
+    Example:
+      roughvisc audit results/ground_steel-study --work-of-adhesion "50 mJ/m^2"
+    """
+    from rich.console import Console
+
+    from roughvisc.study.audit.audit import audit as audited
+    from roughvisc.study.audit.given import from_options, of_study
+    from roughvisc.study.storage.store import no_results, open_result, result_files
+    from roughvisc.views.console.audit_table import audit_table
+
+    given = from_options(stated).over(of_study(study) if study is not None else {})
+    paths = result_files(result) if result.is_dir() else [result]
+    if not paths:
+        raise no_results(result)
+    console = Console()
+    for path in paths:
+        with open_result(path) as dataset:
+            console.print(audit_table(audited(dataset, **given.stated())))
 
 
 @click.command()

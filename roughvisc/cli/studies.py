@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 )
 @click.option("--no-plots", is_flag=True, help="Write no figures.")
 @click.option("--workers", type=click.IntRange(0), help="Processes; 0: none but this one. [default: one a core]")
+@click.option("--threads", type=click.IntRange(1), help="Threads of a case on a large grid. [default: all cores]")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
 @click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
 @click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
@@ -57,7 +58,9 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
         raise InputError("--profile: times this process only: expected no --scheduler, --scheduler-file or --workers")
     with _profile(console) if profile else nullcontext():
         if len(cases) == 1 and not elsewhere:
-            complaint = _run_one(cases[0], folder, study.stem, console, not no_plots, where["same_bits"])
+            complaint = _run_one(
+                cases[0], folder, study.stem, console, not no_plots, where["same_bits"], where["threads"]
+            )
             if complaint:
                 complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
@@ -76,20 +79,21 @@ def _profile(console: Console) -> Iterator[None]:
     console.print(profile_table(profile))
 
 
-def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool) -> str:
+def _run_one(
+    case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool, threads: int | None
+) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
-    from dask.system import CPU_COUNT
-    from scipy import fft
-
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
+    from roughvisc.study.execution.side_by_side import threads_each
     from roughvisc.study.progress import Bar
     from roughvisc.study.storage.store import open_result, result_path
-    from roughvisc.views.console.tables import reached, result_table
+    from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key)):
         console.print("Finished before: nothing has to be computed")
-    with Bar(console, label, reached) as bar, fft.set_workers(CPU_COUNT):
-        path = run_case(case, folder, progress=bar.reached, same_bits=same_bits)
+    with Bar(console, label, case.at) as bar:
+        path = run_case(case, folder, progress=bar.reached, same_bits=same_bits, threads=threads or threads_each(1))
+    missed = _observe([case], folder, console)
     with open_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
@@ -98,7 +102,21 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
 
             for figure in save_figures(dataset, folder, case.key):
                 say(console, "Figure", figure)
-        return unconverged(dataset)
+        return unconverged(dataset) or missed
+
+
+def _observe(cases: list[Case], folder: Path, console: Console) -> str:
+    """Add to the results what the study asks to be observed; what to complain of, empty if nothing."""
+    if all(case.settings.observe is None for case in cases):
+        return ""
+    from roughvisc.views.observed import observe
+
+    with console.status("observing") as status:
+        try:
+            observe(cases, folder, progress=lambda done, of: status.update(f"observing: {done} of {of} cases done"))
+        except InputError as error:
+            return str(error)
+    return ""
 
 
 def _run_all(
@@ -111,12 +129,14 @@ def _run_all(
     scheduler_file: Path | None,
     retry_failed: bool,
     same_bits: bool,
+    threads: int | None,
 ) -> None:
     """Compute and sum up a sweep."""
     from contextlib import ExitStack
 
     from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.sweep import LOG, run_cases
+    from roughvisc.study.execution.task import REFUSED
     from roughvisc.study.execution.watch import watcher
     from roughvisc.study.storage.table import CASES
     from roughvisc.views.console.tables import sweep_table
@@ -132,8 +152,11 @@ def _run_all(
             workers=workers,
             retry_failed=retry_failed,
             same_bits=same_bits,
+            threads=threads,
             watch=watcher(not console.quiet, console),
         )
+        with client.as_current() if client is not None else nullcontext():
+            missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     say(console, "Results", folder)
     say(console, "Table of the cases", folder / CASES)
@@ -144,10 +167,14 @@ def _run_all(
         again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
         where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
         complain(f"{where}: {outcome.message}")
-    if all(outcome.error in ("InputError", "EdgeContactError") for outcome in outcomes.values()):
+    if missed:
+        complain(missed)
+    if all(outcome.error in REFUSED for outcome in outcomes.values()):
         raise Failure("no case could be computed: the input is wrong", 2)
     if bad:
         raise Failure(f"{len(bad)} of {len(outcomes)} cases failed", 1)
+    if missed:
+        raise Failure("not all could be observed", 1)
 
 
 @click.command()

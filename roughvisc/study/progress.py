@@ -144,7 +144,10 @@ class Bar:
 
 @contextmanager
 def reporting(
-    progress: bool | Callable[..., None], label: str = "", console: Console | None = None
+    progress: bool | Callable[..., None],
+    label: str = "",
+    console: Console | None = None,
+    at: Callable[[float, float], str] | None = None,
 ) -> Iterator[Callable[..., None]]:
     """What a computation calls with the time it has reached and the time at its end [s]; a bar ends with the block.
 
@@ -156,13 +159,15 @@ def reporting(
         What is computed; where empty, the call begins with the name of what is computed at the time.
     console : rich.console.Console, optional
         Where to; None: the standard error.
+    at : callable, optional
+        As :class:`Bar` takes it.
     """
     if callable(progress):
         yield progress
     elif not progress:
         yield lambda *_: None
     else:
-        with Bar(console, label) as bar:
+        with Bar(console, label, at) as bar:
             yield bar.reached if label else bar.measured
 
 

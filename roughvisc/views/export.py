@@ -9,13 +9,14 @@ import xarray as xr
 
 from roughvisc.labels import heading
 from roughvisc.study.storage.store import whole_file
-from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.variables import FLAGS
+from roughvisc.variables.rows import rows_of
 from roughvisc.views.figures.axes import frame_at, require
 from roughvisc.views.figures.sections import deformed_surface
 
 
 def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
-    """Write everything over time to a CSV file, a row a kept time.
+    """Write everything over time to a CSV file, a row a kept time; of a curve of friction a row a speed.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     Returns
     -------
     pathlib.Path
-        The file. Its first row names each column with its unit, as in ``force [N]``; ``status`` is a word; what is
+        The file. Its first row names each column with its unit, as in ``force [N]``; a status is a word; what is
         not known is empty. Numbers have 17 significant digits at most, which give back the same value.
 
     Raises
@@ -39,12 +40,13 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     --------
     >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
     """
-    require(dataset, "time")
-    names = [name for name, variable in dataset.data_vars.items() if variable.dims == ("time",)]
+    rows = rows_of(dataset)
+    require(dataset, rows)
+    names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
     table = dataset[names].reset_coords(drop=True).to_dataframe().replace([np.inf, -np.inf], np.nan)
-    if "status" in table:
-        table["status"] = [STATUS_MEANINGS[value] for value in table["status"]]
-    headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in ("time", *names)]
+    for name in FLAGS.keys() & set(table):
+        table[name] = [FLAGS[name][value] for value in table[name]]
+    headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
     settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # the same on every system
     with whole_file(path) as temporary:
         table.to_csv(temporary, header=headings[1:], compression=None, **settings)

@@ -13,13 +13,19 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.variables.rows import rows_of
+from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.animate import animate, animation
 from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require
+from roughvisc.views.figures.conductance import conductance
 from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
 from roughvisc.views.figures.fields import maps
 from roughvisc.views.figures.friction import friction
+from roughvisc.views.figures.friction_distance import friction_against_distance
+from roughvisc.views.figures.friction_maps import friction_maps
 from roughvisc.views.figures.histories import history
+from roughvisc.views.figures.leakage import leakage
 from roughvisc.views.figures.loops import has_loop, hysteresis
 from roughvisc.views.figures.sections import section
 from roughvisc.views.figures.stability import stability_map
@@ -27,18 +33,24 @@ from roughvisc.views.figures.surfaces import surface
 from roughvisc.views.figures.trade import trade
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.files import save_sweep_figures, write_figure
+from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
 from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
     "animate",
     "animation",
     "area_against_load",
+    "conductance",
     "contact_clusters",
     "distributions",
     "friction",
+    "friction_against_distance",
+    "friction_maps",
+    "friction_of_cases",
     "histories_of_cases",
     "history",
     "hysteresis",
+    "leakage",
     "maps",
     "save_figures",
     "save_sweep_figures",
@@ -56,12 +68,17 @@ def __dir__() -> list[str]:
 
 #: What :func:`save_figures` draws: name -> (function, variables of which all, variables of which one is needed).
 FIGURES = {
-    "history": (history, (), ("force", "approach", "contact_area")),
-    "maps": (maps, ("x", "y"), ("pressure", "gap")),
-    "section": (section, ("height",), ("gap", "displacement")),
-    "distributions": (distributions, (), ("pressure", "gap")),
-    "clusters": (contact_clusters, ("x", "y"), ("pressure", "gap")),
-    "hysteresis": (hysteresis, ("force", "approach"), ()),
+    "friction": (friction, ("speed", "friction_coefficient", "contact_fraction"), ()),
+    "pressure_maps": (friction_maps, ("speed", "x", "y", "pressure"), ()),
+    "history": (history, ("time",), ("force", "approach", "contact_area")),
+    "maps": (maps, ("time", "x", "y"), ("pressure", "gap")),
+    "section": (section, ("time", "height"), ("gap", "displacement")),
+    "distributions": (distributions, ("time",), ("pressure", "gap")),
+    "clusters": (contact_clusters, ("time", "x", "y"), ("pressure", "gap")),
+    "hysteresis": (hysteresis, ("time", "force", "approach"), ()),
+    "leakage": (leakage, ("time", "leak_rate", "gap"), ()),
+    "conductance": (conductance, ("time",), CONDUCTANCES),
+    "slide": (friction_against_distance, ("time", "sliding_distance", "friction_coefficient"), ()),
     "surface": (surface, ("height",), ()),
 }
 
@@ -87,7 +104,8 @@ def save_figures(
 ) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
-    Clusters are drawn where the contact has three or more, hysteresis where the approach comes back.
+    Of a curve of friction these are the curve and maps of the pressure. Clusters are drawn where the contact has three
+    or more, hysteresis where the approach comes back.
 
     Parameters
     ----------
@@ -114,7 +132,7 @@ def save_figures(
     InputError
         If the Dataset is not one case's result or allows no figure.
     """
-    require(dataset)
+    require(dataset, rows_of(dataset))
     written = [
         write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title) for name, figure in figures_of(dataset)
     ]

@@ -56,6 +56,11 @@ def test_quantities_of_pint__from_a_whole_result(computed):
     pytest.importorskip("pint_xarray")
     quantities = computed.pint.quantify()
     assert str(quantities.contact_area.pint.units) == "meter ** 2"
+    for refusing in (rv.observables.clusters, rv.plot.maps, rv.plot.history):
+        with pytest.raises(
+            rv.InputError, match=r"^the result holds '\w+' as a pint array: expected numbers, as ds.pint"
+        ):
+            refusing(quantities)
     assert float(quantities.pressure.max().pint.to("kPa").pint.magnitude) == float(computed.pressure.max()) / 1e3
     xr.testing.assert_allclose(rv.observables.clusters(quantities.pint.dequantify()), rv.observables.clusters(computed))
 

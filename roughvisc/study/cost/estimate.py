@@ -15,15 +15,20 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import Choice
-from roughvisc.mechanics.hereditary.direct import History, history_bytes
+from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.study.cost.short_slides import shortened, slid_cells
+from roughvisc.study.simulation.footprint import PROCESS, march_bytes
+from roughvisc.study.simulation.kept_times import kept_times
+from roughvisc.study.simulation.rows import in_slide
 from roughvisc.study.simulation.scene import Ground, prepare
+from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.settings import Settings
-from roughvisc.topography.grid import axis_step
+from roughvisc.topography.grid import axis_step, spacing
 from roughvisc.variables import STEPPED
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
@@ -40,14 +45,10 @@ _CALIBRATION = 2.0
 _TIMED = 1024**2
 #: What the grid's error costs: the march again on a quarter of the cells and a sixteenth, which is dearer by the cell.
 _AGAIN = 1.5
-#: What the interpreter and the libraries take, measured. [bytes]
-_PROCESS = 230e6
 #: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
 _WRITE, _ROUNDED = 3e-9, 0.5
 #: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed.
 _CHUNK, _COMPRESSED = 8, 0.03
-#: Frames of a field that are in memory at once while the file is written.
-_FRAMES_TOGETHER = 8
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class March:
         Largest force. [N]
     kept : tuple of float
         Contact fraction at each kept time that a coarse march reached.
+    slid, slid_convolutions : float
+        Steps in slides and what they take, part of all.
     """
 
     steps: float
@@ -83,6 +86,8 @@ class March:
     level: float = math.inf
     force: float = math.nan
     kept: tuple[float, ...] = ()
+    slid: float = 0.0
+    slid_convolutions: float = 0.0
 
 
 def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
@@ -106,17 +111,23 @@ def march_of(case: Case, height: xr.DataArray) -> March:
     InputError
         If the case is impossible.
     """
+    program, settings = case.program(), case.solving()
+    check_slides(program, settings, spacing(height, "height"))
     found = [_march(case, coarse(height, side)) for side in _COARSE]
     octaves = math.log2(max(math.sqrt(height.size) / _COARSE[1], 1.0))
     first, second = found
+    pressed = [(one.steps - one.slid, one.convolutions - one.slid_convolutions) for one in found]
     grown = {
-        "steps": second.steps * _growth(first.steps, second.steps, _STEPS_GROW) ** octaves,
-        "convolutions": second.convolutions * _growth(first.convolutions, second.convolutions, _WORK_GROWS) ** octaves,
+        "steps": pressed[1][0] * _growth(pressed[0][0], pressed[1][0], _STEPS_GROW) ** octaves,
+        "convolutions": pressed[1][1] * _growth(pressed[0][1], pressed[1][1], _WORK_GROWS) ** octaves,
     }
-    settings = case.solving()
     if settings.time_step != "auto":
-        grown["steps"] = second.steps
-    rows = grown["steps"] if settings.times is None else second.rows
+        grown["steps"] = pressed[1][0]
+    if program.slides:
+        cells = slid_cells(program, height)
+        each = second.slid_convolutions / max(second.slid, 1.0)
+        grown = {"steps": grown["steps"] + cells, "convolutions": grown["convolutions"] + cells * each, "slid": cells}
+    rows = grown["steps"] if settings.times is None else float(len(kept_times(program, settings.times) or ()))
     return March(**{**vars(second), **grown, "rows": rows, "whole": first.whole and second.whole})
 
 
@@ -126,10 +137,13 @@ def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
 
 def _march(case: Case, height: xr.DataArray) -> March:
     settings, program = replace(case.solving(), missing="absent", edge="accept"), case.program()
+    if program.slides:  # its corners will do: the times that are kept lie elsewhere in a shorter program
+        program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
     scene, _ = prepare(Ground(height, settings.missing, kernel=settings.kernel), case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = level = force = 0.0
     work, instants = 0, [0.0]
+    slid = slid_work = 0
     kept, contacts = set(scene.times or ()), []
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
@@ -141,6 +155,8 @@ def _march(case: Case, height: xr.DataArray) -> March:
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, share)
         level, force = max(level, step.level), max(force, step.shown.force)
+        if in_slide(step):
+            slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
         work, reached = step.state.convolutions, now
         instants.append(now)
         if work > _MOST_CONVOLUTIONS or steps > _MOST_STEPS:
@@ -152,7 +168,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         pace = (reached - instants[half]) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
-    known = (part, contact, bool(whole), level, force, tuple(contacts))
+    known = (part, contact, bool(whole), level, force, tuple(contacts), slid, slid_work)
     return March(steps * stretch, kept_rows, work * stretch, *known)
 
 
@@ -241,20 +257,8 @@ def wall_time(
 
 def bytes_needed(settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
-    field = 8.0 * cells
-    surface, solver = 3.0, 14.0  # measured at 512 squared: together 13 to 18, as 5 to 45 % of the cells are in contact
-    companion = 0.0  # measured there: 8 fields with one exponential
-    transforms = 4.3 if settings.boundary == "free" else 1.4  # symbols, spectra
-    past = 0.0
-    if isinstance(choice.memory, Modes):
-        modes = len(choice.memory.material.times) + bool(choice.memory.material.fluidity)
-        past = (3 if "bdf2" in choice.memory.rules else 2) * modes * part * field
-        companion = 7.0 + modes if modes else 0.0
-    elif isinstance(choice.memory, History):
-        past = 1.5 * history_bytes(found.contact * cells, found.steps)
-        companion = 7.0
-    kept = min(found.rows, _FRAMES_TOGETHER) * field
-    return _PROCESS + (surface + (transforms + solver + companion) * part) * field + past + kept
+    counts = {"contact": found.contact, "steps": found.steps, "rows": found.rows, "part": part}
+    return PROCESS + march_bytes(settings, cells, choice.memory, **counts)
 
 
 def disk(case: Case, cells: int, found: March) -> float:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.simulation.scene import nominal_area
+from roughvisc.topography.grid import nominal_area
 
 
 def largest_pressure(height: xr.DataArray, program: Program, force: float) -> float:

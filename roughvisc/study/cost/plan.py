@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import shutil
+import math
 import time
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,56 +17,50 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, disk, march_of, solved_on, wall_time, windows
+from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.study.audit.audit import judged
+from roughvisc.study.audit.evidence import of_case
+from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.texture import Texture, texture_of
+from roughvisc.study.cost.columns import COLUMNS, attributes
+from roughvisc.study.cost.curve import curve_march, memory_of_curve
+from roughvisc.study.cost.estimate import (
+    March,
+    Stopwatch,
+    bytes_needed,
+    disk,
+    march_of,
+    solved_on,
+    wall_time,
+    windows,
+    work,
+)
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
+from roughvisc.study.cost.planned import Plan
+from roughvisc.study.cost.totals import totals
 from roughvisc.study.execution.run import result_folder
+from roughvisc.study.simulation.available import Available, memory_available
+from roughvisc.study.simulation.coarser import coarser
 from roughvisc.study.simulation.notes import body_note, left_out
+from roughvisc.study.simulation.refusal import PART, too_large
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
-from roughvisc.study.storage.parameters import parameters_of
-from roughvisc.topography.grid import spacing
+from roughvisc.study.storage.parameters import labels_of, parameters_of
+from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
-#: Part of the free memory and of the free disk that a sweep may take.
-_PART = 0.9
-
-#: variable of a plan -> unit and long name
-_COLUMNS = {
-    "boundary": ("", "boundary"),
-    "padded": ("", "whether transforms are padded to twice the grid"),
-    "memory_model": ("", "what models the material's memory"),
-    "exponentials": ("1", "exponentials of the series"),
-    "scheme": ("", "how time is stepped"),
-    "cells_x": ("1", "cells along x"),
-    "cells_y": ("1", "cells along y"),
-    "grows": ("", "whether the grid may grow"),
-    "left_out": ("", "what costs nothing, and why: it is not modelled, computed or kept"),
-    "steps": ("1", "accepted time steps expected"),
-    "rows": ("1", "kept times expected"),
-    "contact_fraction": (
-        "1",
-        "largest contact fraction on a coarse grid, which rounds the summits off: rather too much",
-    ),
-    "nominal_pressure": ("Pa", "largest nominal pressure, prescribed or of the coarse march: force over nominal area"),
-    "full_contact_pressure": ("Pa", "nominal pressure from which on contact takes 95 % of the area (Persson's theory)"),
-    "convolutions": ("1", "convolutions expected, one forward and one inverse transform each"),
-    "wall_time": ("s", "wall time expected, in one process with one thread"),
-    "memory": ("byte", "memory of the process at its peak"),
-    "disk": ("byte", "size of the result"),
-    "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
-    "body_note": ("", "what the base of a sheet does, by the coarse march; empty of a half-space"),
-    "program_note": ("", "how a measured history became segments"),
-    "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
-    "refusal": ("", "why it cannot run; empty if it can"),
-}
+#: Fewest cells a side of a surface of which half the resolution is thought of.
+_HALVED = 8
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, its :func:`windows` and its rms slope, or why it cannot be had."""
+    """A surface's height, its :func:`windows`, its rms slope and its textures, or why it cannot be had."""
 
     height: xr.DataArray | None
     grows: bool
@@ -74,11 +68,11 @@ class _Surface:
     windows: tuple[tuple[float, float], ...] = ()
     mirrored: bool = False
     slope: float = 0.0
+    half_slope: float = math.nan
+    textures: dict[str, Texture] = field(default_factory=dict)  # boundary -> what it says of the surface
 
 
-def plan(
-    cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None
-) -> xr.Dataset:
+def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None) -> Plan:
     """What will be modelled in each case, and what it will cost on this machine; nothing is computed or written.
 
     Parameters
@@ -88,14 +82,15 @@ def plan(
     out : path, optional
         Folder of the results, whose disk must hold them. Default: as in :func:`roughvisc.sweep`.
     workers : int, optional
-        Processes side by side. Default: one a core.
+        Processes side by side. Default: one a core, fewer where the memory does not hold so many.
 
     Returns
     -------
     xarray.Dataset
-        One row a case along ``case``, varied parameters as coordinates. Attributes: ``processes``, ``wall_time``
-        of the whole [s], ``memory`` of all processes [byte], ``disk`` [byte], what is free of both, and
-        ``refusal``, empty if all can run.
+        One row a case along ``case``, varied parameters as coordinates; a notebook shows it as a table. Attributes:
+        ``processes`` side by side and the ``threads`` that each may use, ``wall_time`` of the whole with one thread
+        each [s], ``memory`` of all processes [byte], ``disk`` [byte], what is free of both, and ``refusal``, empty if
+        all can run.
 
     Raises
     ------
@@ -107,10 +102,9 @@ def plan(
     The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
     tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
     that is timed for at most two seconds in all. Expect a quarter either way, and half where a soft material makes
-    the pressure jump with each cell that enters.
+    the pressure jump with each cell that enters. Curves of friction are computed at some of their speeds on grids of 24
+    and 48 cells; expect a factor of two.
     """
-    from dask.system import CPU_COUNT
-
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
     if not cases:
@@ -119,25 +113,24 @@ def plan(
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     marches, surfaces, problems = _marches(cases, stated, parameters)
-    stopwatch, choices = Stopwatch(), _Choices()
+    stopwatch, choices, there = Stopwatch(), _Choices(), memory_available()
     rows = []
     for number, case in enumerate(cases):
         like = _most_like(number, list(marches), parameters)
         surface = surfaces.get(_surface_name(cases[number], stated[number]))
+        kind = _KINDS[type(case.experiment())]
         rows.append(
-            _row(case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch)
+            kind.row(
+                case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch, there
+            )
         )
-    columns = {name: ("case", np.array([row[name] for row in rows]), _attributes(name)) for name in _COLUMNS}
+    columns = {name: ("case", np.array([row[name] for row in rows]), attributes(name)) for name in COLUMNS}
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
-    coords |= {key: ("case", values, {"long_name": key}) for key, values in parameters.items()}
-    dataset = xr.Dataset(columns, coords=coords)
-    dataset.attrs = {"title": cases[0].title} | _whole(dataset, folder, min(workers or CPU_COUNT, len(cases)))
+    labels = labels_of(parameters, stated[0], ("case",)).values()
+    coords |= dict(zip(parameters, labels, strict=True))
+    dataset = Plan(columns, coords=coords)
+    dataset.attrs = {"title": cases[0].title} | totals(dataset, folder, workers, there)
     return dataset
-
-
-def _attributes(name: str) -> dict[str, str]:
-    units, long_name = _COLUMNS[name]
-    return {"long_name": long_name} | ({"units": units} if units else {})
 
 
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
@@ -163,7 +156,7 @@ def _marches(
             problems[number] = surfaces[name].problem
         elif time.perf_counter() < until or not marches:
             try:
-                marches[number] = march_of(cases[number], height)
+                marches[number] = _KINDS[type(cases[number].experiment())].march(cases[number], height)
             except InputError as error:
                 problems[number] = str(error)
     return marches, surfaces, problems
@@ -185,7 +178,14 @@ def _surface(case: Case) -> _Surface:
         ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
-    return _Surface(height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height))
+    return _Surface(
+        height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height), _half_slope(height)
+    )
+
+
+def _half_slope(height: xr.DataArray) -> float:
+    """Root mean square slope on cells twice as long; missing where there are too few cells."""
+    return rms_slope(coarser(height, 2.0)) if min(height.shape) >= _HALVED else math.nan
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -221,17 +221,16 @@ def _row(
     problem: str,
     choices: _Choices,
     stopwatch: Stopwatch,
+    there: Available,
 ) -> dict[str, Any]:
     settings = case.solving()
-    row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in _COLUMNS.items()}
     free = settings.boundary == "free"
-    row |= {"boundary": settings.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
-    row |= {"exponentials": 0, "cells_x": 0, "cells_y": 0}
+    row = _blank(settings, marched, problem)
     if surface is None or surface.height is None:
         return row
     height, grows = surface.height, surface.grows and free and settings.edge == "error"
     window = len(surface.windows) > 1 and follows(settings)
-    mirrored = surface.mirrored and settings.method == "fast"
+    mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
         choice = choices.of(case, grows or window)
@@ -248,7 +247,12 @@ def _row(
     part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
+    quarter = work(cells / 4) / work(cells)
+    needed = partial(bytes_needed, settings, found=found, choice=choice, part=part)
+    if needed(cells) > PART * there.size:
+        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there, [])
     return row | {
+        "audit": _audit(case, surface, found) if marched else "",
         "body_note": body_note(settings.kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
@@ -256,7 +260,61 @@ def _row(
         "contact_fraction": found.contact,
         "convolutions": found.convolutions,
         "wall_time": wall_time(settings, cells, found, choice, convolution, part),
-        "memory": bytes_needed(settings, cells, found, choice, part),
+        "memory": needed(cells),
+        "half_wall_time": wall_time(settings, cells // 4, found, choice, convolution * quarter, part),
+        "half_memory": needed(cells // 4),
+        "rms_slope": surface.slope,
+        "half_rms_slope": surface.half_slope,
+        "disk": disk(case, cells, found),
+    }
+
+
+def _blank(settings: Settings, marched: bool, problem: str) -> dict[str, Any]:
+    """A row of a case of which nothing is known yet."""
+    row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
+    free = settings.boundary == "free"
+    row |= {"boundary": settings.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
+    return row | {"exponentials": 0, "cells_x": 0, "cells_y": 0}
+
+
+def _curve_row(
+    case: Case,
+    surface: _Surface | None,
+    found: March | None,
+    marched: bool,
+    problem: str,
+    _: _Choices,
+    stopwatch: Stopwatch,
+    there: Available,
+) -> dict[str, Any]:
+    """What a curve of friction will cost."""
+    settings, material = case.solving(), complete(case.material())
+    row = _blank(settings, marched, problem) | {"memory_model": "steady sliding: complex compliance of each wave"}
+    row |= {"scheme": "a fixed point of contact problems at each speed, begun with that of the last"}
+    if surface is None or surface.height is None:
+        return row
+    height = surface.height
+    row |= {"cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
+    if found is None or problem:
+        return row
+    cells, convolution = height.size, stopwatch.seconds(height, "periodic", settings.kernel)
+    nominal = found.force / nominal_area(height)
+    curve = case.experiment()
+    assert isinstance(curve, Curve), "a program has a row of its own"
+    passing = max(np.ptp(height[axis].values) for axis in ("x", "y")) / min(curve.asked)  # of the longest wave
+    relaxed = full_contact_pressure(surface.slope, material, passing)
+    needed = partial(memory_of_curve, settings=settings)
+    if needed(cells) > PART * there.size:
+        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there, [])
+    return row | {
+        "speeds": found.rows,
+        "nominal_pressure": nominal,
+        "full_contact_pressure": relaxed,
+        "warning": full_contact_warning(nominal, relaxed),
+        "contact_fraction": found.contact,
+        "convolutions": found.convolutions,
+        "wall_time": found.convolutions * convolution,
+        "memory": needed(cells),
         "disk": disk(case, cells, found),
     }
 
@@ -275,6 +333,16 @@ def _pressures(case: Case, surface: _Surface, choice: Choice, force: float) -> d
     }
 
 
+def _audit(case: Case, surface: _Surface, found: March) -> str:
+    """What an audit says before the run, by the load and the approach of a coarse march."""
+    assert surface.height is not None
+    height, boundary = surface.height, case.settings.solve.boundary
+    if boundary not in surface.textures:
+        surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
+    foreseen = {"force": found.force, "approach": found.level, "fraction": found.contact}
+    return judged(of_case(case, height, surface.textures[boundary], **foreseen), Given(), case.title).warning
+
+
 def _scheme(settings: Settings, choice: Choice, found: March) -> str:
     if settings.method == "seed":
         return "the seed paper's: rectangle rule, first order"
@@ -282,42 +350,16 @@ def _scheme(settings: Settings, choice: Choice, found: March) -> str:
     if choice.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"
     damped = f", the two-step rule (BDF2) in {100 * found.damped:.0f} % of the steps" if found.damped else ""
-    return f"piecewise-linear pressure{damped}, steps {steps}"
+    slid = f", {found.slid:.0f} of one cell in slides" if found.slid else ""
+    return f"piecewise-linear pressure{damped}, steps {steps}{slid}"
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# the whole
+@dataclass(frozen=True)
+class _Kind:
+    """How the cost of one kind of experiment is foretold: from coarse grids, and as a row."""
+
+    march: Callable[[Case, xr.DataArray], March]
+    row: Callable[..., dict[str, Any]]
 
 
-def _whole(dataset: xr.Dataset, folder: Path, processes: int) -> dict[str, Any]:
-    """Totals, what is free, and why it cannot fit."""
-    import psutil
-
-    there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
-    free_disk, free_memory = shutil.disk_usage(there).free, psutil.virtual_memory().available
-    seconds = np.nan_to_num(dataset["wall_time"].values)
-    largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    together = float(np.sum(largest[:processes]))
-    size = float(np.nansum(dataset["disk"].values))
-    total = dataset.sizes["case"]
-    refusals = Counter(str(text) for text in dataset["refusal"].values if text)
-    reasons = [f"{count} of {total} cases: {why}" if total > 1 else why for why, count in refusals.most_common(3)]
-    if together > _PART * free_memory:
-        fitting = int(np.searchsorted(np.cumsum(largest), _PART * free_memory, side="right"))
-        advice = f"use --workers {fitting}" if fitting else "use a coarser grid, or keep fewer times or fields"
-        needed = f"{processes} processes need {together:.3g} bytes of memory, {free_memory:.3g} are free"
-        reasons.append(f"{needed}: {advice}")
-    if size > _PART * free_disk:
-        reasons.append(
-            f"the results need {size:.3g} bytes of disk, {free_disk:.3g} are free in {there}: keep fewer times or "
-            "fields, or use another folder"
-        )
-    return {
-        "processes": processes,
-        "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds, initial=0.0))),
-        "memory": together,
-        "free_memory": free_memory,
-        "disk": size,
-        "free_disk": free_disk,
-        "refusal": "; ".join(reasons),
-    }
+_KINDS: dict[type, _Kind] = {Program: _Kind(march_of, _row), Curve: _Kind(curve_march, _curve_row)}

@@ -19,12 +19,16 @@ if TYPE_CHECKING:
 #: What a worker imports anyway, xarray's look for other kinds of arrays included.
 _PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
 
+#: Signals that the process of a sweep answers for its workers too.
+_OURS = (signal.SIGINT, signal.SIGTERM)
+
 
 @contextmanager
 def local_client(processes: int) -> Iterator[Client]:
     """Client of a cluster on this machine, seen from this machine only."""
     import dask
     from distributed import Client, LocalCluster
+    from distributed.system import MEMORY_LIMIT
 
     settings = {
         # a case merely queued on a dying worker is not to blame, and is not to die with it
@@ -46,6 +50,7 @@ def local_client(processes: int) -> Iterator[Client]:
             cluster = LocalCluster(
                 n_workers=processes,
                 threads_per_worker=1,
+                memory_limit=MEMORY_LIMIT // processes,  # fewer processes may take more each
                 processes=True,
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
@@ -70,13 +75,18 @@ def _interrupts_wait() -> Iterator[None]:
             raise KeyboardInterrupt
         seen.append(number)
 
-    before = signal.signal(signal.SIGINT, note)
+    # SIGTERM only where somebody takes it for an interrupt, as the command line does
+    before = {number: signal.getsignal(number) for number in _OURS}
+    before = {n: action for n, action in before.items() if n == signal.SIGINT or callable(action)}
+    for number in before:
+        signal.signal(number, note)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if seen:
-        raise KeyboardInterrupt
+        for number, action in before.items():
+            signal.signal(number, action)
+    for number in seen:
+        signal.raise_signal(number)
 
 
 def default_client() -> Client | None:
@@ -108,11 +118,12 @@ def _quick_start() -> dict[str, str]:
     with dask.config.set(settings):
         get_mp_context().set_forkserver_preload(_PRELOADED)  # as Dask asks for it, whose own list would import more
     if threading.current_thread() is threading.main_thread():  # a Ctrl-C meanwhile is this process's own
-        mine = signal.signal(signal.SIGINT, signal.SIG_IGN)  # which it, and all that it forks, begin with
+        mine = {number: signal.signal(number, signal.SIG_IGN) for number in _OURS}  # as it, and all it forks, begin
         try:
             forkserver.ensure_running()
         finally:
-            signal.signal(signal.SIGINT, mine)
+            for number, action in mine.items():
+                signal.signal(number, action)
     return settings
 
 
@@ -148,5 +159,6 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
 
 
 def _leave_interrupts_to_the_sweep() -> None:
-    """A terminal's Ctrl-C reaches all its processes: the sweep's own then tells the workers to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """A terminal's Ctrl-C, a batch system's SIGTERM reach all processes: the sweep's own tells the workers to stop."""
+    for number in _OURS:
+        signal.signal(number, signal.SIG_IGN)

@@ -166,7 +166,9 @@ def distribute(
             client.unsubscribe_topic(name)
 
 
-def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, same_bits: bool) -> Path:
+def run_on(
+    client: Client, case: Case, folder: Path, progress: bool | Progress, same_bits: bool, threads: int | None = None
+) -> Path:
     """Bring one case to its file on a worker, and give the file's path.
 
     Raises
@@ -177,7 +179,7 @@ def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, 
     watch = _Heard(progress) if callable(progress) else watcher(progress)
     book = Book(folder, {case.key: case}, {}, watch, [])
     try:
-        distribute({case.key: pack(case, folder / INPUTS)}, book, client, None, client.dashboard_link, same_bits)
+        distribute({case.key: pack(case, folder / INPUTS)}, book, client, threads, client.dashboard_link, same_bits)
     finally:
         watch.close()
     outcome = book.outcomes[case.key]

@@ -14,6 +14,8 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.window import Reach
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.sliding import steady
+from roughvisc.mechanics.sliding.steady import Sliding
 from roughvisc.mechanics.stepping import attempt
 from roughvisc.study.execution import run
 from roughvisc.study.simulation import rows, simulate
@@ -26,10 +28,15 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "transforms": (
         *((HalfSpace, name) for name in ("displacement", "displacement_single", "approximate_inverse")),
         (Reach, "spread"),
+        *((Sliding, name) for name in ("skew", "lagging", "slope")),
     ),
-    "vector work of the solver": ((attempt, "solve_contact"),),
+    "vector work of the solver": ((attempt, "solve_contact"), (steady, "solve_contact")),
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
-    "surface and kernels": ((Case, "height"), (simulate, "prepare"), (HalfSpace, "__init__"), (Reach, "__init__")),
+    "surface and kernels": (
+        (Case, "height"),
+        (simulate, "prepare"),
+        *((kind, "__init__") for kind in (HalfSpace, Reach, Sliding)),
+    ),
     "kept rows": ((rows.Rows, "add"), (RowFile, "append")),
     "files": ((run, "keep"), (Keeper, "save"), (Keeper, "resume")),
 }

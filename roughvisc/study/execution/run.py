@@ -8,8 +8,8 @@ import logging
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -18,16 +18,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError
+from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError, TooLargeError
+from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.study.simulation.experiment import carry_out
 from roughvisc.study.simulation.malloc import keep_memory
-from roughvisc.study.simulation.simulate import press
+from roughvisc.study.simulation.refusal import require_surface
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
 from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +43,13 @@ REFERENCES = (
 )
 
 Progress = Callable[[float, float], None]
+
+#: What was computed, and what tells its accuracy, by what the rows of the result lie over.
+_MODELS: dict[Rows, str] = {
+    "time": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space.",
+    "speed": "A rigid rough profile that slides steadily on a linear viscoelastic body, without shear or adhesion.",
+}
+_ACCURACY: dict[Rows, str] = {"time": "'stated_error'", "speed": "'pressure_residual' and 'friction_residual'"}
 
 #: Attributes of a surface that stay with the result: whence it came, and what was made up where it was missing.
 SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
@@ -67,7 +77,9 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     return folder
 
 
-def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | None = None) -> xr.Dataset:
+def compute(
+    case: Case, *, progress: bool | Progress = True, keeper: Keeper | None = None, threads: int | None = None
+) -> xr.Dataset:
     """Result of a case, with all that is needed to run it again in its attributes.
 
     With a keeper it goes on from what that has kept, and the fields of the result are read from there.
@@ -75,22 +87,44 @@ def compute(case: Case, *, progress: bool | Progress = True, keeper: Keeper | No
     Raises
     ------
     InputError, ConvergenceError
-        As :func:`roughvisc.simulate`, with the study's name in front.
+        As :func:`roughvisc.simulate` and :func:`roughvisc.friction`, with the study's name in front.
     """
+    with _named(case):
+        if case.made_shape is not None:
+            require_surface(case.made_shape)
     height = case.height()
-    try:
-        dataset = press(height, case.material(), case.program(), case.solving(), progress=progress, keeper=keeper)
-    except HinderedError:
-        raise
-    except (InputError, ConvergenceError) as error:
-        raise type(error)(f"{case.origin}: {error}" if case.origin else str(error)) from error
+    with _named(case):
+        dataset = carry_out(
+            case.experiment(),
+            height,
+            case.material(),
+            case.solving(),
+            progress=progress,
+            keeper=keeper,
+            threads=threads,
+        )
+    if "speed" in dataset:
+        reduced = case.settings.material.shift * dataset["speed"].values
+        dataset = annotate(dataset.assign(reduced_speed=("speed", reduced)))
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
-    transforms = transform_library() if keeper is None else keeper.saved.transforms
-    dataset.attrs = _provenance(case, dataset.attrs.pop("history", ""), transforms) | dataset.attrs | scan
+    transforms = transform_library() if keeper is None else keeper.latest.transforms
+    provenance = _provenance(case, rows_of(dataset), dataset.attrs.pop("history", ""), transforms)
+    dataset.attrs = provenance | dataset.attrs | scan
     return dataset.assign_coords(labels_of_case(json.loads(case.to_json()), case.key))
 
 
-def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
+@contextmanager
+def _named(case: Case) -> Iterator[None]:
+    """Put the study's name in front of what is wrong with a case."""
+    try:
+        yield
+    except (InputError, ConvergenceError) as error:
+        if case.origin is None or (isinstance(error, HinderedError) and not isinstance(error, TooLargeError)):
+            raise
+        raise type(error)(f"{case.origin}: {error}") from error
+
+
+def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[str, str]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -103,8 +137,8 @@ def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
         "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
-        "comment": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space. "
-        "Attribute 'case' states the whole computation (JSON, SI units); 'stated_error' how accurate it is; "
+        "comment": f"{_MODELS[rows]} Attribute 'case' states the whole computation (JSON, SI units); "
+        f"{_ACCURACY[rows]} how accurate it is; "
         "'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
         "case": case.to_json(),
         "case_key": case.key,
@@ -121,12 +155,13 @@ def run_case(
     checkpoint_seconds: float = 30.0,
     checkpoint_steps: int | None = None,
     same_bits: bool = False,
+    threads: int | None = None,
 ) -> Path:
     """Bring one case to its file in a folder, and give the file's path.
 
     Finished already: nothing is computed. Interrupted, by whatever means: it goes on from its last checkpoint, and
     ends with the same numbers, to the last bit, as if it had not been; ``wall_time`` leaves out what was lost. The
-    seed paper's method begins again.
+    seed paper's method begins again. A curve of friction goes on with the speed that was being computed.
 
     Parameters
     ----------
@@ -135,9 +170,11 @@ def run_case(
     folder : path
         Where the file goes; it is named by the case's key. What an unfinished run keeps is in hidden files beside it.
     progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length. [s]
+        A progress bar, or a function called with the time reached and the program's length [s], or with the speeds of
+        a curve that are done and their number.
     stop : callable, optional
-        Asked at every accepted step; if it says so, a checkpoint is written and :class:`KeyboardInterrupt` raised.
+        Asked at every accepted step, or speed; if it says so, a checkpoint is written and :class:`KeyboardInterrupt`
+        raised.
     checkpoint_seconds : float
         Time between checkpoints; longer where they would take a twentieth of the time. [s]
     checkpoint_steps : int, optional
@@ -145,6 +182,8 @@ def run_case(
     same_bits : bool
         Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
         digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
+    threads : int, optional
+        As :func:`roughvisc.simulate` has them.
 
     Raises
     ------
@@ -182,7 +221,7 @@ def run_case(
                     if path.exists() and not is_result_of(case, path):  # damaged, and not of other transforms
                         set_aside(path)
                     keeper.resume()
-                    _finish(case, folder, progress, keeper)
+                    _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
     except InUseError:
         if is_result_of(case, path, same_bits):  # the other run has just finished
@@ -200,10 +239,10 @@ def run_case(
     return path
 
 
-def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper) -> None:
+def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper, threads: int | None) -> None:
     """Compute what is missing of a case and write its file."""
     try:
-        dataset = compute(case, progress=progress, keeper=keeper)
+        dataset = compute(case, progress=progress, keeper=keeper, threads=threads)
         keeper.check()
         keep(dataset, case, folder)
     except HinderedError:
@@ -261,15 +300,22 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
 
 
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
-    """What to tell about steps that did not converge; empty if all did."""
+    """What to tell about times or speeds that did not converge; empty if all did."""
+    rows = rows_of(histories)
     status = np.asarray(histories["status"])
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
-    left = np.asarray(histories["residual"], dtype=float)[bad]
+    left = np.asarray(histories[RESIDUALS[rows]], dtype=float)[bad]
     known = left[np.isfinite(left)]  # the seed paper's algorithm estimates nothing
     by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
-    return (
-        f"{bad.size} of {status.size} kept times did not converge, first at "
-        f"t = {float(histories['time'][bad[0]]):.6g} s{by}: try a looser tolerance or shorter steps"
-    )
+    what, place, advice = _UNCONVERGED[rows]
+    first = place.format(float(histories[rows][bad[0]]))
+    return f"{bad.size} of {status.size} {what} did not converge, first at {first}{by}: try {advice}"
+
+
+#: What did not converge, where first, and what to try.
+_UNCONVERGED: dict[Rows, tuple[str, str, str]] = {
+    "time": ("kept times", "t = {:.6g} s", "a looser tolerance or shorter steps"),
+    "speed": ("speeds", "{:.6g} m/s", "a looser tolerance"),
+}

@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 
 def run(
-    case: Case | str | Path, out: str | Path | None = None, *, progress: bool | Progress = True, same_bits: bool = False
+    case: Case | str | Path,
+    out: str | Path | None = None,
+    *,
+    progress: bool | Progress = True,
+    same_bits: bool = False,
+    threads: int | None = None,
 ) -> xr.Dataset:
     """Compute one case and keep it in one file.
 
@@ -34,6 +39,8 @@ def run(
     same_bits : bool
         Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
         digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
+    threads : int, optional
+        Of a large grid; see :func:`roughvisc.simulate`. On a worker, by default as many as that has.
 
     Returns
     -------
@@ -46,6 +53,8 @@ def run(
     ------
     InputError
         If the input is wrong; nothing is written.
+    TooLargeError
+        If the case needs more memory than there is, before any is taken; nothing is recorded against it.
     ConvergenceError
         If a step did not converge. The result is written all the same, and the message says where.
     """
@@ -53,11 +62,11 @@ def run(
         case = read_study(case)
     folder, client = result_folder(case, out), default_client()
     if client is None:
-        path = run_case(case, folder, progress=progress, same_bits=same_bits)
+        path = run_case(case, folder, progress=progress, same_bits=same_bits, threads=threads)
     else:
         from roughvisc.study.execution.dispatch import run_on
 
-        path = run_on(client, case, folder.absolute(), progress, same_bits)
+        path = run_on(client, case, folder.absolute(), progress, same_bits, threads)
     dataset = open_result(path)
     complaint = unconverged(dataset)
     if complaint:

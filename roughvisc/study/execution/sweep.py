@@ -17,7 +17,9 @@ from roughvisc.study.execution.book import Book, Watcher
 from roughvisc.study.execution.cluster import default_client, local_client
 from roughvisc.study.execution.run import other_transforms, result_folder
 from roughvisc.study.execution.script import refuse_unguarded_script
-from roughvisc.study.execution.task import Outcome, bring, outcome_of
+from roughvisc.study.execution.side_by_side import side_by_side, threads_each
+from roughvisc.study.execution.task import REFUSED, Outcome, bring, outcome_of
+from roughvisc.study.simulation.available import cores
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of
@@ -42,6 +44,7 @@ def sweep(
     progress: bool = True,
     workers: int | None = None,
     same_bits: bool = False,
+    threads: int | None = None,
 ) -> xr.Dataset:
     """Compute many cases, one file each, and open them together.
 
@@ -58,8 +61,8 @@ def sweep(
         the study's name, beside the study.
     client : distributed.Client, optional
         Where to compute. Default: the client that you have made the default by making one (``Client()``); if there
-        is none, or `workers` is given, a cluster on this machine, one process a core, and for a single case this
-        process.
+        is none, or `workers` is given, a cluster on this machine, and for a single case this process. One process a
+        core, or fewer with more threads each where the memory does not hold so many cases.
     retry_failed : bool
         Compute cases again that failed before.
     progress : bool
@@ -68,6 +71,9 @@ def sweep(
         Processes of the default cluster; 0: this process.
     same_bits : bool
         Compute anew what other versions of the transforms or of NumPy have computed; see :func:`roughvisc.run`.
+    threads : int, optional
+        Of each case on a large grid. Default: the cores that the processes leave it; on a client's workers, as many
+        as these have.
 
     Returns
     -------
@@ -81,7 +87,8 @@ def sweep(
         times and grid in common.
     RoughviscError
         If no case could be finished. A case that failed beside others is recorded in the folder and logged as a
-        warning.
+        warning; one that needs more memory than there is where it would be computed is refused alone, and recorded
+        nowhere, since it may fit elsewhere.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -99,13 +106,14 @@ def sweep(
         workers=workers,
         retry_failed=retry_failed,
         same_bits=same_bits,
+        threads=threads,
         watch=watcher(progress),
     )
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     for outcome in bad:
         log.warning("%s: %s: %s", outcome.key, outcome.kind, outcome.message)
     if not any(outcome.entry for outcome in outcomes.values()):
-        kind = InputError if all(o.error in ("InputError", "EdgeContactError") for o in bad) else RoughviscError
+        kind = InputError if all(o.error in REFUSED for o in bad) else RoughviscError
         raise kind(f"none of {len(outcomes)} cases could be finished; the first: {bad[0].message}")
     return open_results(folder, cases=cases)
 
@@ -119,6 +127,7 @@ def run_cases(
     workers: int | None = None,
     retry_failed: bool = False,
     same_bits: bool = False,
+    threads: int | None = None,
 ) -> dict[str, Outcome]:
     """Bring all cases to their files; see :func:`sweep`.
 
@@ -151,7 +160,8 @@ def run_cases(
         index = index_of(folder)
         outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
-        if client is None and _processes(workers, len(todo)):
+        processes = 0 if client is not None else _processes(workers, list(todo.values()))
+        if processes:
             try:
                 refuse_unguarded_script()
             except InputError:
@@ -161,7 +171,7 @@ def run_cases(
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
-            _compute(todo, folder, book, client, workers, same_bits)
+            _compute(todo, folder, book, client, processes, same_bits, threads)
             told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
             if told:
                 book.tell(told)
@@ -198,35 +208,38 @@ def _known(
 
 
 def _compute(
-    todo: Mapping[str, Case], folder: Path, book: Book, client: Client | None, workers: int | None, same_bits: bool
+    todo: Mapping[str, Case],
+    folder: Path,
+    book: Book,
+    client: Client | None,
+    processes: int,
+    same_bits: bool,
+    threads: int | None,
 ) -> None:
-    from dask.system import CPU_COUNT
-
-    processes = _processes(workers, len(todo)) if client is None else 0
     if not todo or (client is None and not processes):
         book.begin()
         for case in todo.values():
-            book.ended(_here(case, folder, book, CPU_COUNT, same_bits))
+            book.ended(_here(case, folder, book, threads or cores(), same_bits))
         return
     from roughvisc.study.execution.dispatch import distribute
 
     if client is not None:
         texts = {key: pack(case, folder / INPUTS) for key, case in todo.items()}
-        distribute(texts, book, client, None, client.dashboard_link, same_bits)
+        distribute(texts, book, client, threads, client.dashboard_link, same_bits)
         return
     texts = {key: case.to_json() for key, case in todo.items()}
     with local_client(processes) as own:
         link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-        distribute(texts, book, own, max(1, CPU_COUNT // processes), link, same_bits)
+        distribute(texts, book, own, threads or threads_each(processes), link, same_bits)
 
 
-def _processes(workers: int | None, cases: int) -> int:
-    """Processes of the default cluster for so many cases; 0: this process."""
-    from dask.system import CPU_COUNT
-
-    if workers == 0 or (workers is None and cases <= 1):
+def _processes(workers: int | None, cases: Sequence[Case]) -> int:
+    """Processes of the default cluster for some cases; 0: this process."""
+    if workers is not None:
+        return min(workers, len(cases))
+    if len(cases) <= 1:
         return 0
-    return min(workers or CPU_COUNT, cases)
+    return side_by_side(cases, min(cores(), len(cases)))
 
 
 def _here(case: Case, folder: Path, book: Book, threads: int, same_bits: bool) -> Outcome:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Literal, TypedDict
 
 import numpy as np
-from scipy import fft
 
 from roughvisc.errors import DiskFullError, HinderedError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
@@ -29,6 +28,8 @@ Progress = Callable[[float, float], None]
 #: that was killed, another run that computes it), so the same command goes on from its checkpoint; ``failed`` is what
 #: would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
+#: Errors of a case that is refused as it stands.
+REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 #: Seconds between two reports of one case.
 _REPORT_EVERY = 0.5
 
@@ -103,14 +104,13 @@ def bring(
     stop : callable, optional
         Asked at every step.
     threads : int
-        Of the transforms.
+        Of a large grid.
     same_bits : bool
         As in :func:`roughvisc.study.execution.run.run_case`.
     """
     began = time.perf_counter()
     try:
-        with fft.set_workers(threads):
-            path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits)
+        path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits, threads=threads)
         outcome = outcome_of(read_entry(path))
     except RoughviscError as error:
         kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
@@ -152,7 +152,7 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
     sweep : str
         Name of the sweep: the topic of the reports, and what :func:`stop_sweep` is told.
     threads : int or None
-        Of the transforms; None: as many as the worker has.
+        Of a large grid; None: as many as the worker has.
     transforms : str
         The library whose bits are asked for; empty: any.
     """

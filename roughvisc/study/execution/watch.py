@@ -6,7 +6,7 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
@@ -51,6 +51,7 @@ class Watch:
     def __init__(self, console: Console | None) -> None:
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
+        self._at: dict[str, Callable[[float, float], str]] = {}
         self._running: dict[str, tuple[float, float]] = {}
         self._ended: dict[str, Outcome] = {}
         self._began = time.monotonic()
@@ -59,6 +60,7 @@ class Watch:
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
         """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
+        self._at = {case.key: case.at for case in cases}
         self._names = {case.key: _name(case, number, len(cases)) for number, case in enumerate(cases, 1)}
         self._began = time.monotonic()
         if link:
@@ -120,7 +122,7 @@ class Watch:
             running, ended = dict(self._running), len(self._ended)
         rows = [("stopping" if self._stopping else "cases", ended, len(self._names), "")]
         for key, (now, end) in list(running.items())[:_SHOWN]:
-            at = f"t = {now:.3g} of {end:.3g} s" if end else "starting"
+            at = self._at[key](now, end) if end and key in self._at else "starting"
             rows.append((self._names.get(key, key), now, end, at))
         more = len(running) - _SHOWN
         return [*rows, (f"and {more} more", 0.0, None, "")] if more > 0 else rows

@@ -29,5 +29,7 @@ def leave_in_order(worker: Worker) -> None:
 
 
 def _take_signals(worker: Worker) -> None:
-    if threading.current_thread() is threading.main_thread():  # else it is a thread of the user's own process
+    if threading.current_thread() is not threading.main_thread():  # a thread of the user's own process
+        return
+    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:  # else the process of the sweep answers for it
         signal.signal(signal.SIGTERM, lambda *_: worker.loop.add_callback(worker.close, nanny=False, reason="SIGTERM"))

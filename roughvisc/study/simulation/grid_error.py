@@ -17,9 +17,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import RoughviscError
+from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.study.simulation.coarser import coarser, pressure_distance
 from roughvisc.study.simulation.grid_convergence import grid_uncertainty
-from roughvisc.study.simulation.neighbours import neighbours
 from roughvisc.topography.indenters import grown
 
 log = logging.getLogger("roughvisc")
@@ -149,15 +149,20 @@ def _left_open(dataset: xr.Dataset, time: int) -> tuple[float, float]:
         return 0.0, 0.0
     present = np.isfinite(dataset["height"].values)
     at_edge, at_end, faces = _edge(contact, present & ~contact, dataset.attrs["boundary"] == "periodic")
+    counted = counting_error(contact, faces)
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
     hidden = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # all of it where no cell lies inside
     hidden += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
-    images = math.prod(2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis)))
-    counted = _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
     force = float(dataset["force"][time]) / _largest(dataset, "force")
     area = float(dataset["contact_area"][time]) / _largest(dataset, "contact_area_corrected")
     return hidden * force, counted * area
+
+
+def counting_error(contact: Mask, faces: int) -> float:
+    """Relative error of an area that is counted, from the number of faces to cells out of contact."""
+    images = math.prod(2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis)))
+    return _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
 
 
 def _edge(contact: Mask, free: Mask, periodic: bool) -> tuple[Mask, Mask, int]:

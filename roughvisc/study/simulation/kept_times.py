@@ -64,9 +64,9 @@ def spread_times(program: Program, count: int) -> Array:
 
     Notes
     -----
-    A hold takes three parts of the times between the corners where a ramp takes two and a cycle sixteen. In a hold they
-    lie evenly in the logarithm of the time since it began, between a third of the segment before it or a thousandth of
-    its own length, whichever is less, and its end; elsewhere evenly in time.
+    A hold takes three parts of the times between the corners where a ramp or a slide takes two and a cycle sixteen.
+    In a hold they lie evenly in the logarithm of the time since it began, between a third of the segment before it or
+    a thousandth of its own length, whichever is less, and its end; elsewhere evenly in time.
     """
     corners = np.unique(program.corners)
     if count <= len(corners):
@@ -76,7 +76,7 @@ def spread_times(program: Program, count: int) -> Array:
     found, before = [corners], math.inf
     for (began, segment), number in zip(lasting, shares, strict=True):
         parts = np.arange(1, number + 1) / (number + 1)
-        if _is_hold(segment) and number:
+        if segment.holds and number:
             shortest = min(_FIRST, before / (3 * segment.duration))
             parts = shortest ** (1 - parts)
         found.append(began + parts * segment.duration)
@@ -88,11 +88,7 @@ def _weight(segment: Segment) -> float:
     """How many of the kept times a segment takes, relative to others."""
     if segment.amplitude:
         return 16 * segment.duration / segment.period
-    return 3.0 if _is_hold(segment) else 2.0
-
-
-def _is_hold(segment: Segment) -> bool:
-    return segment.end is None and not segment.amplitude
+    return 3.0 if segment.holds else 2.0
 
 
 def _apportioned(weights: Sequence[float], count: int) -> list[int]:

@@ -65,6 +65,8 @@ def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
     missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
     if missed.size:
         fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
+        if scene.motions:
+            fixed += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
         says = "states" if missed.size == 1 else "state"
         notes.append(
             f"{missed.size} of {errors.size} rows {says} an error above the tolerance, {errors[missed].max():.2g} at "

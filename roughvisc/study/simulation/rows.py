@@ -11,14 +11,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.labels import annotate
+from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
+from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.scene import Scene, Step
+from roughvisc.study.simulation.friction_rows import friction_row
 from roughvisc.study.simulation.mirror import quarter, unfold
-from roughvisc.study.simulation.neighbours import staircase
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.variables import STATUS_MEANINGS, STEPPED, of_step
+from roughvisc.variables.slides import STEPPED_IN_SLIDES
 
 #: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
 #: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
@@ -102,6 +105,7 @@ class Rows:
             "contact_area_corrected": max(touching - _staircase(contact, step.scene), 0.0),
             "contact_fraction": touching / self._area(),
             "mean_gap": mean_gap,
+            **friction_row(step),
         }
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
         self._store.append({"row": row, "grid": grid, "kept": kept}, _of_their_own(arrays))
@@ -121,7 +125,7 @@ class Rows:
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         if len(kept) < len(rows):
-            for name in ("time", *STEPPED):
+            for name in ("time", *STEPPED, *(name for name in STEPPED_IN_SLIDES if name in columns)):
                 variables[of_step(name)] = (("step",), np.array([row[name] for row in rows]))
             variables["step"] = (("step",), np.arange(len(rows)))
         for name in self._settings.fields:
@@ -231,7 +235,7 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     are no rows; nor, under given approach, are those in which a cell has entered, since the force jumps with it.
     """
     scene, state = step.scene, step.state
-    if scene.time_step is not None:
+    if scene.time_step is not None or in_slide(step):  # the steps are as long as they are
         return True
     found = stated(step, series_error, 0.0)
     most = _AT_MOST * scene.tolerance
@@ -245,6 +249,12 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     if step.control == "approach" and _entered(step):
         return False
     return not found["approach_error"] > scene.tolerance * state.largest_approach
+
+
+def in_slide(step: Step) -> bool:
+    """Whether an accepted step is one of a slide."""
+    scene = step.scene
+    return bool(scene.motions) and scene.program.segments[segment_number(step.state)].slide is not None
 
 
 def tells_of_its_end(step: Step) -> bool:

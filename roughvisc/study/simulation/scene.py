@@ -27,8 +27,9 @@ from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
+from roughvisc.study.simulation.slides import check_slides, on_cells
 from roughvisc.study.statement.settings import Missing, Settings
-from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.grid import checked, nominal_area, spacing
 from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
@@ -155,11 +156,6 @@ class Ground:
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
-def nominal_area(height: xr.DataArray) -> float:
-    """Area that the nominal pressure on a surface refers to: of its whole grid, absent cells included. [m2]"""
-    return height.size * math.prod(spacing(height, "height"))
-
-
 def follows(settings: Settings) -> bool:
     """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
     return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
@@ -177,6 +173,7 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, settings.time_step)
+    check_slides(program, settings, ground.spacing)
     material = complete(material)
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), ground.gap[ground.present])
@@ -192,7 +189,7 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
         material=choice.material,
         memory=choice.memory,
         program=program,
-        times=kept_times(program, settings.times),
+        times=on_cells(program, kept_times(program, settings.times), ground.spacing),
         tolerance=settings.tolerance,
         time_step=None if settings.time_step == "auto" else settings.time_step,
         accept_edge=settings.edge == "accept",

@@ -6,8 +6,10 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import xarray as xr
+from scipy import fft
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.labels import annotate
@@ -18,18 +20,21 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.scene import Scene, State
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import expect_arrays
 from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, left_out, slope_note
+from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
-from roughvisc.study.simulation.scene import Ground, follows, nominal_area, prepare
-from roughvisc.study.statement.body import body
+from roughvisc.study.simulation.scene import Ground, follows, prepare
+from roughvisc.study.simulation.slides import slide_note
+from roughvisc.study.statement.body import body, not_one_body
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
-from roughvisc.topography.grid import checked
+from roughvisc.topography.grid import checked, nominal_area
 
 log = logging.getLogger("roughvisc")
 
@@ -54,6 +59,7 @@ def simulate(
     thickness: float | None = None,
     base: Base | None = None,
     kernel: Kernel = Settings.kernel,
+    threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
     """Press a rigid profile on a linear viscoelastic half-space, or on a sheet on a rigid base.
@@ -101,6 +107,10 @@ def simulate(
         Whether the sheet sticks to its base, as it does unless said otherwise, or slides on it without friction.
     kernel : Kernel
         Of any other body: see :class:`roughvisc.mechanics.halfspace.kernel.Kernel`.
+    threads : int, optional
+        Of a large grid; the bits are the same with any number. Default: as ``scipy.fft.set_workers`` has it; where
+        nobody has set that, all cores the process may use, but one beside other threads or in a process that was
+        started by another one.
     progress : bool or callable
         A progress bar, or a function called with the time reached and the program's length. [s]
 
@@ -113,6 +123,8 @@ def simulate(
     ------
     InputError
         If the input is wrong; the message says what was found and what was expected.
+    TooLargeError
+        If it needs more memory than there is, before any is taken.
     EdgeContactError
         If contact reached the border of a free-space domain.
     ConvergenceError
@@ -143,7 +155,7 @@ def simulate(
         grid_error=grid_error,
         kernel=body(material, thickness, base, kernel),
     )
-    return press(height, material, program, settings, progress=progress)
+    return press(height, material, program, settings, progress=progress, threads=threads)
 
 
 def press(
@@ -154,6 +166,7 @@ def press(
     *,
     progress: bool | Progress,
     keeper: Keeper | None = None,
+    threads: int | None = None,
 ) -> xr.Dataset:
     """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
 
@@ -162,14 +175,17 @@ def press(
     height = checked(height, "simulate", least=1)
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
-    dataset = _press(height, material, program, with_needed, progress, keeper)
+    count = threads_for(threads)
+    with fft.set_workers(count):
+        dataset = _press(height, material, program, with_needed, progress, keeper)
     if not settings.grid_error:
         return dataset
 
     loads = program.on_area(nominal_area(height))  # coarser grids may be of other sizes
 
     def again(few: xr.DataArray, times: list[float]) -> xr.Dataset:
-        return _press(few, material, loads, replace(settings, times=times, fields=("pressure",)), False, None)
+        with fft.set_workers(count):
+            return _press(few, material, loads, replace(settings, times=times, fields=("pressure",)), False, None)
 
     return annotate(with_grid_error(dataset, height, again)).drop_vars(needed)
 
@@ -183,15 +199,16 @@ def _press(
     keeper: Keeper | None,
 ) -> xr.Dataset:
     began = time.perf_counter()
-    ground = Ground(
-        height, settings.missing, follow=follows(settings), mirror=settings.method == "fast", kernel=settings.kernel
-    )
+    shape, area, held = (height.sizes["x"], height.sizes["y"]), nominal_area(height), keeper is None
+    require_memory(shape, settings, material, program, in_memory=held, heights=height.values, area=area)
+    mirror = settings.method == "fast" and not program.slides
+    ground = Ground(height, settings.missing, follow=follows(settings), mirror=mirror, kernel=settings.kernel)
     expect_arrays(ground.gap.nbytes)
     scene, choice = prepare(ground, material, program, settings)
     followed = not ground.window.whole
     log.info("memory: %s", choice.note)
     if keeper is not None:
-        scene = _grown(scene, ground, keeper.saved.growths)
+        scene = _grown(scene, ground, keeper.latest.growths)
     rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
     from roughvisc.study.progress import reporting  # slow to import
 
@@ -207,13 +224,26 @@ def _press(
         "body_note": _body_note(ground, scene, settings, dataset),
         "material_note": complete(material).note,
         "program_note": program.note,
+        "slide_note": slide_note(program, ground.spacing),
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
         "border_note": _border_note(ground, settings, dataset),
         "left_out": left_out(choice, settings, followed, ground.mirrored),
+        **_for_the_audit(scene, height, material),
     }
     dataset.attrs |= {name: value for name, value in described.items() if value != ""}
     return dataset
+
+
+def _for_the_audit(scene: Scene, height: xr.DataArray, material: Material) -> dict[str, Any]:
+    """What an audit asks that the variables do not say, so that a result without a study can be audited too."""
+    return {
+        "compliance_at_once": scene.compliance(0.0),
+        "compliance_at_end": scene.final,
+        "poisson": "" if not_one_body(material) else complete(material).poisson,
+        "time_scale": scene.program.time_scale,
+        "recipe": str(height.attrs.get("recipe", "")),
+    }
 
 
 def _grown(scene: Scene, ground: Ground, growths: int) -> Scene:
@@ -235,7 +265,8 @@ def _march(
     keeper: Keeper | None,
 ) -> None:
     """March to the end of the program; the rows take up what is kept, the keeper how far it has come."""
-    reached = Reached() if keeper is None else keeper.saved
+    reached = Reached() if keeper is None else keeper.latest
+    assert reached.state is None or isinstance(reached.state, State), "the key tells a program from a curve"
     spent = reached.wall_time - began
     every = scene.times is None
     kept = set(scene.program.corners if scene.times is None else scene.times)

@@ -42,7 +42,7 @@ def body(material: Material, thickness: float | None, base: Base | None = None, 
         return kernel
     if kernel != HALF_SPACE:
         raise InputError(f"thickness is {thickness!r} beside the kernel {kernel!r}: expected one of them")
-    amiss = _not_one_body(material)
+    amiss = not_one_body(material)
     if amiss:
         raise InputError(
             f"thickness is {thickness!r}, and the material is {amiss}: expected one body, Poisson's ratio constant"
@@ -52,7 +52,8 @@ def body(material: Material, thickness: float | None, base: Base | None = None, 
     return HALF_SPACE if endless else sheet
 
 
-def _not_one_body(material: Any) -> str:
+def not_one_body(material: Any) -> str:
+    """What a material stands for that is no one body of a constant Poisson ratio; empty if it is one."""
     while material is not None:
         amiss: str = getattr(material, "stands_for", "")
         if amiss:

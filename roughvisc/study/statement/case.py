@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from roughvisc.mechanics.halfspace.kernel import Kernel
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
+    from roughvisc.study.statement.curve import Curve
     from roughvisc.study.statement.settings import Settings
 
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
@@ -32,7 +33,7 @@ __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
 @dataclass(frozen=True)
 class Case:
-    """One simulation: a surface, a material, a program, and how it is computed.
+    """One simulation: a surface, a material, a program or a curve of friction, and how it is computed.
 
     Made by :func:`read_study`, :func:`read_cases` or :meth:`from_json`, which check it; changed by :func:`vary`.
 
@@ -105,6 +106,12 @@ class Case:
         problem = f"{named}: was changed after the study was read: expected the heights that the case's key stands for"
         return ChangedError(line(self.origin, "surface", f"{problem}; run the study again for the new ones"))
 
+    @property
+    def made_shape(self) -> tuple[int, int] | None:
+        """Cells of a surface that a recipe makes, before it is made; None of any other."""
+        shape = getattr(self.settings.surface, "shape", None)
+        return None if shape is None else (int(shape[0]), int(shape[1]))
+
     def material(self) -> Material:
         """The material."""
         return self.settings.material.build()
@@ -114,8 +121,25 @@ class Case:
         return self.settings.material.kernel()
 
     def program(self) -> Program:
-        """The loading program."""
-        return self.settings.loading()
+        """The loading program.
+
+        Raises
+        ------
+        InputError
+            If the case asks for friction, which has none.
+        """
+        try:
+            return self.settings.loading()
+        except InputError as error:
+            raise InputError(f"{self.origin}: {error}" if self.origin else str(error)) from error
+
+    def experiment(self) -> Program | Curve:
+        """What is done with the surface: the program that presses it, or the curve of speeds at which it slides."""
+        return self.settings.experiment()
+
+    def at(self, now: float, end: float) -> str:
+        """How far a run is of how much, as one reads it: a time [s] of a program, a speed of a curve by its number."""
+        return self.settings.at(now, end)
 
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
@@ -130,7 +154,7 @@ class Case:
             *((name, self.written.get(name) or str(value)) for name, value in self.varied.items()),
             ("surface", Path(surface["file"]).name if "file" in surface else str(surface.get("generate", ""))),
             ("material", _told(lambda: repr(self.material()))),
-            ("program", _told(lambda: repr(self.program()).removeprefix("Program: "))),
+            _experiment(self.settings),
             *((name, str(value)) for name, value in stated.get("solve", {}).items()),
         ]
         return table(self.title or "untitled", [row for row in rows if row[1]])
@@ -218,6 +242,10 @@ def read_cases(path: str | Path) -> list[Case]:
         return InputError(line(path, key, found))
 
     changes = expand(with_files(data.pop("sweep", {}), path.parent, refusal), refusal)
+    for key in dict.fromkeys(key for change in changes for key in change):
+        if key.partition(".")[0] == "observe":
+            found = "cannot be varied: what is observed changes no result: expected one value, in [observe]"
+            raise refusal(f"sweep: {key}", found)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
     for number, change in enumerate(changes):
@@ -287,6 +315,11 @@ def _told(what: Callable[[], str]) -> str:
         return what()
     except InputError as error:
         return str(error)
+
+
+def _experiment(settings: Study) -> tuple[str, str]:
+    kind, _, words = _told(lambda: repr(settings.experiment())).partition(": ")
+    return {"Curve": "friction"}.get(kind, "program"), words or kind
 
 
 def _stated(settings: Study) -> dict[str, Any]:

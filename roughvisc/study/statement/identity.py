@@ -14,7 +14,7 @@ from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
-NUMERICS_REVISION = 8
+NUMERICS_REVISION = 9
 
 #: Keys of ``[solve]`` that always count. Any other came later, and its usual value leaves a case's key as it was.
 _FROM_THE_START = {"boundary", "tolerance", "time_step", "method", "edge"}
@@ -37,20 +37,27 @@ def identity(settings: Study) -> tuple[str, str]:
     """Digest of all that determines the numbers, sixteen hexadecimal digits, and that of the surface's file or recipe.
 
     Both come from one reading of the file. The surface counts by the content of its file and not by its path, as do
-    tables of a material; the program by its segments and not by how they were written, and no title counts. Nor does
-    the library of the transforms, which changes the last digits: a result says what it was made with.
+    tables of a material; the program by its segments and not by how they were written. No title counts, nothing that is
+    observed of the result, and nothing that an audit is told; nor does the library of the transforms, which changes the
+    last digits: a result says what it was made with.
     """
     stated = settings.model_dump(
-        mode="json", exclude={"title", "program", "surface", "material"}, serialize_as_any=True
+        mode="json",
+        exclude={"title", "audit", "observe", "program", "friction", "surface", "material"},
+        serialize_as_any=True,
     )
     usual = type(settings.solve)().model_dump(mode="json")
     stated["solve"] = {
         key: value for key, value in stated["solve"].items() if key in _FROM_THE_START or value != usual[key]
     }
-    stated["program"] = [
-        [segment.control, segment.duration, segment.end, segment.amplitude, segment.period]
-        for segment in settings.loading().segments
-    ]
+    if settings.friction is None:
+        stated["program"] = [
+            [one.control, one.duration, one.end, one.amplitude, one.period]
+            + ([one.slide.distance, one.slide.direction] if one.slide else [])
+            for one in settings.loading().segments
+        ]
+    else:
+        stated["friction"] = settings.friction.model_dump(mode="json", exclude_defaults=True)
     stated["material"] = settings.material.content()
     surface = surface_content(settings.surface)
     stated["surface"] = surface

@@ -41,7 +41,7 @@ def treatment(dataset: xr.Dataset) -> Treatment:
     """
     lines = str(dataset.attrs.get("history", "")).splitlines()
     steps = tuple(line for line in lines if line and ": run of " not in line)
-    return Treatment(steps, _measured(dataset), dataset["height"].load())
+    return Treatment(steps, _measured(dataset), dataset["height"].copy(deep=False).load())  # not kept by the result
 
 
 def _measured(dataset: xr.Dataset) -> xr.DataArray | None:

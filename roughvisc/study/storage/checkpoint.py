@@ -15,13 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
-from roughvisc.mechanics.stepping.scene import Instant, State, Step, Uncertainty
+from roughvisc.mechanics.stepping.scene import Instant, State, Step
+from roughvisc.mechanics.stepping.slide import Slid
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
 from roughvisc.study.storage.store import whole_file
@@ -32,7 +35,8 @@ log = logging.getLogger("roughvisc")
 _SHARE = 0.05
 #: Between two libraries in the account of what a run was computed with.
 _THEN = "; then "
-_TYPES = {kind.__name__: kind for kind in (State, Pace, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)}
+_KINDS = (State, Pace, Slid, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)
+_TYPES = {kind.__name__: kind for kind in _KINDS}
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,8 @@ class Reached:
 
     Attributes
     ----------
-    state : State or None
-        Of the march; None at the start.
+    state : State, tuple or None
+        Of the march; of a curve of friction the pressures that the next speed begins with; None at the start.
     converged : bool
         Whether all steps since the last kept row are.
     rows, growths : int
@@ -53,7 +57,7 @@ class Reached:
         Libraries that it was computed with, one after the other.
     """
 
-    state: State | None = None
+    state: State | tuple[NDArray[np.float64] | None, ...] | None = None
     converged: bool = True
     rows: int = 0
     growths: int = 0
@@ -62,13 +66,22 @@ class Reached:
 
     @property
     def time(self) -> float:
-        """Of the program. [s]"""
-        return 0.0 if self.state is None else self.state.now.time
+        """Of the program; zero of a curve of friction. [s]"""
+        return self.state.now.time if isinstance(self.state, State) else 0.0
+
+    @property
+    def place(self) -> str:
+        """Where it goes on, as the log says it."""
+        return f"t = {self.time:.6g} s" if isinstance(self.state, State) else f"speed {self.rows + 1}"
 
     def after(self, step: Step, growths: int, wall_time: float) -> Reached:
         """How far it has come with another step, what is bad of it folded in."""
         converged = self.converged and step.converged
         return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
+
+    def at_speed(self, state: tuple[NDArray[np.float64] | None, ...], wall_time: float) -> Reached:
+        """How far it has come with another speed of a curve of friction."""
+        return replace(self, state=state, rows=self.rows + 1, wall_time=wall_time)
 
     def going_on_here(self) -> Reached:
         """The same, to be gone on from with the transforms that are here."""
@@ -174,12 +187,13 @@ class Keeper:
     ) -> None:
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows", check)
-        self.saved = Reached()
+        #: How far the run has come: no state of an earlier step is held.
+        self.latest = Reached()
         self._folder = folder
         self._key = key
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
-        self._latest, self._same_bits = self.saved, same_bits
+        self._same_bits = same_bits
         self._pending, self._last_save = 0, time.monotonic()
 
     def resume(self) -> None:
@@ -195,8 +209,8 @@ class Keeper:
                 )
                 continue
             if self.rows.keep_first(reached.rows):
-                log.info("%s: goes on from t = %.6g s", path, reached.time)
-                self.saved = self._latest = here
+                log.info("%s: goes on from %s", path, reached.place)
+                self.latest = here
                 if path == self._paths[0]:
                     self._paths.reverse()
                 return
@@ -213,7 +227,7 @@ class Keeper:
         KeyboardInterrupt
             If the run is to stop; a checkpoint has then been written.
         """
-        self._latest = reached
+        self.latest = reached
         self._pending += 1
         if self._stop is not None and self._stop():
             self.save()
@@ -224,14 +238,14 @@ class Keeper:
 
     def save(self) -> None:
         """Write a checkpoint, if anything has been computed since the last one."""
-        if self._latest is self.saved or self._latest.state is None:
+        if not self._pending:
             return
         began = time.monotonic()
         self.check()
         self.rows.sync()  # first: a checkpoint counts on its rows
-        save_checkpoint(self._paths[0], self._latest, self._key)
+        save_checkpoint(self._paths[0], self.latest, self._key)
         self._paths.reverse()
-        self.saved, self._pending, self._last_save = self._latest, 0, time.monotonic()
+        self._pending, self._last_save = 0, time.monotonic()
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 
     def remove(self) -> None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.study.storage.seal import seal, unsealed
 from roughvisc.study.storage.store import NETCDF, require_whole, result_files, whole_file
-from roughvisc.variables import VARIABLES
+from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
 
 log = logging.getLogger("roughvisc")
 
@@ -37,9 +37,14 @@ _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, Val
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
-#: Histories over the kept times, and over the accepted steps, with the times themselves.
+#: Histories over the rows, and over the accepted steps, with the times or speeds themselves.
 _HISTORIES = tuple(
-    name for name, variable in VARIABLES.items() if variable.dims in (("time",), ("step",)) and name != "step"
+    dict.fromkeys(
+        name
+        for rows, known in VOCABULARIES.items()
+        for name, variable in known.items()
+        if variable.dims in ((rows,), ("step",)) and name != "step"
+    )
 )
 
 
@@ -58,7 +63,7 @@ class Entry:
     fields : dict
         dtype of each variable over x and y.
     histories : dict
-        Everything over the kept times, ``time`` too, and over the accepted steps.
+        Everything over the rows, ``time`` or ``speed`` too, and over the accepted steps.
     x, y : ndarray
         Positions of the cells. [m]
     """
@@ -77,9 +82,14 @@ class Entry:
         return str(self.attributes.get("case_key", Path(self.file).stem))
 
     @property
+    def along(self) -> Rows:
+        """What its rows lie over."""
+        return rows_of(self.histories)
+
+    @property
     def rows(self) -> int:
-        """Number of kept times."""
-        return len(self.histories["time"])
+        """Number of kept times, or of speeds."""
+        return len(self.histories[self.along])
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -118,7 +128,8 @@ def read_entry(path: Path) -> Entry:
         raise InputError(
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
-    absent = [name for name in ("time", "force", "status", "residual") if name not in histories]
+    along = rows_of(histories)
+    absent = [name for name in (along, "force", "status", RESIDUALS[along]) if name not in histories]
     if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}

@@ -1,4 +1,4 @@
-"""Many results seen as one: a lazy Dataset over (case, time, x, y), or a tree where they do not fit one grid."""
+"""Many results seen as one: a lazy Dataset over case, time or speed, x and y; or a tree where grids differ."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from roughvisc.study.storage.index import LATEST, NETCDF, Entry, index_of, save_
 from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
 from roughvisc.study.storage.store import no_results
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.rows import VOCABULARIES
 
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
 #: Attributes that all results of a sweep share.
-_SHARED = ("Conventions", "source", "references", "comment", "boundary", "tolerance", "method")
+_SHARED = ("Conventions", "source", "references", "comment", "boundary", "tolerance", "method", "direction")
 
 
 @overload
@@ -47,15 +48,15 @@ def open_results(out, *, cases="last", ragged=False):
         The finished cases of the sweep that ran last in this folder; all results in it; or those of some cases, in
         their order. A folder that no sweep ran in has no last one, and gives all.
     ragged : bool
-        Give a tree with one result a node, which need not have their times and grids in common.
+        Give a tree with one result a node, which need not have their times, or speeds, and grids in common.
 
     Returns
     -------
     xarray.Dataset or xarray.DataTree
-        Variables as in a single result with a dimension ``case`` in front; ``height`` only where it differs. Varied
-        parameters are coordinates on ``case``, numbers in SI or strings, each under two names: its dotted key, and
-        the identifier that it has in the files, ``program_0_load``. A tree has the parameters as scalar coordinates
-        of each node, whose name is the case's key.
+        Variables as in a single result, over ``time`` or ``speed``, with a dimension ``case`` in front; ``height`` only
+        where it differs. Varied parameters are coordinates on ``case``, numbers in SI or strings, each under two names:
+        its dotted key, and the identifier that it has in the files, ``program_0_load``. A tree has the parameters as
+        scalar coordinates of each node, whose name is the case's key.
 
     Raises
     ------
@@ -98,8 +99,13 @@ def _chosen(entries: Mapping[str, Entry], last: Sequence[str], cases: Any) -> li
 def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
     first = entries[0]
     for entry in entries[1:]:
+        if entry.along != first.along:
+            raise InputError(
+                f"{folder}: {first.file} lies over {first.along}, {entry.file} over {entry.along}: open them with "
+                "ragged=True, which gives a tree"
+            )
         for what, one, other in (
-            ("times", first.histories["time"], entry.histories["time"]),
+            (f"{first.along}s", first.histories[first.along], entry.histories[first.along]),
             ("grid", first.x, entry.x),
             ("grid", first.y, entry.y),
         ):
@@ -113,21 +119,22 @@ def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
 
 def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
     first = entries[0]
+    known = VOCABULARIES[first.along]
     variables: dict[str, Any] = {
-        name: (("case", *VARIABLES[name].dims), _side_by_side([entry.histories[name] for entry in entries]))
+        name: (("case", *known[name].dims), _side_by_side([entry.histories[name] for entry in entries]))
         for name in first.histories
-        if name != "time" and all(name in entry.histories for entry in entries)
+        if name != first.along and all(name in entry.histories for entry in entries)
     }
     one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
     for name, dtype in first.fields.items():
-        if name in VARIABLES and all(name in entry.fields for entry in entries):
-            dims = VARIABLES[name].dims
-            if dims[0] == "time" or not one_surface:
+        if name in known and all(name in entry.fields for entry in entries):
+            dims = known[name].dims
+            if dims[0] == first.along or not one_surface:
                 dtype = np.result_type(*(entry.fields[name] for entry in entries)).str
                 variables[name] = (("case", *dims), _lazy(folder, entries, name, dtype))
             else:
                 variables[name] = (dims, _lazy(folder, entries[:1], name, dtype)[0])
-    coords = {"time": first.histories["time"], "x": first.x, "y": first.y}
+    coords = {first.along: first.histories[first.along], "x": first.x, "y": first.y}
     dataset = xr.Dataset(variables, coords=coords, attrs=_attributes(entries))
     if "step" in dataset.dims:
         dataset = dataset.assign_coords(step=np.arange(dataset.sizes["step"]))
@@ -160,27 +167,27 @@ def _attributes(entries: Sequence[Entry]) -> dict[str, Any]:
 
 
 def _lazy(folder: Path, entries: Sequence[Entry], name: str, dtype: str) -> Any:
-    """Dask array over (case, ...) of one variable; a block is one case's, some times of it."""
+    """Dask array over (case, ...) of one variable; a block is one case's, some rows of it."""
     import dask.array as da
 
     first = entries[0]
     grid = (len(first.x), len(first.y))
-    over_time = VARIABLES[name].dims[0] == "time"
+    in_rows = VOCABULARIES[first.along][name].dims[0] == first.along
     frames = max(1, _BLOCK // (grid[0] * grid[1] * np.dtype(dtype).itemsize))
-    starts = range(0, first.rows, frames) if over_time else range(1)
-    counts = (tuple(min(frames, first.rows - start) for start in starts),) if over_time else ()
+    starts = range(0, first.rows, frames) if in_rows else range(1)
+    counts = (tuple(min(frames, first.rows - start) for start in starts),) if in_rows else ()
     paths = np.array([str(folder / entry.file) for entry in entries])
-    blocks = paths.reshape(-1, *(1,) * (2 + over_time))
-    if over_time:
+    blocks = paths.reshape(-1, *(1,) * (2 + in_rows))
+    if in_rows:
         blocks = np.repeat(blocks, len(starts), axis=1)
     return da.map_blocks(
         _read,
         da.from_array(blocks, chunks=1),
         variable=name,
-        frames=frames if over_time else 0,
+        frames=frames if in_rows else 0,
         dtype=np.dtype(dtype),
         chunks=((1,) * len(entries), *counts, (grid[0],), (grid[1],)),
-        meta=np.empty((0,) * (3 + over_time), dtype),
+        meta=np.empty((0,) * (3 + in_rows), dtype),
     )
 
 

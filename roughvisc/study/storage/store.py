@@ -8,11 +8,9 @@ from __future__ import annotations
 import errno
 import json
 import logging
-import math
 import os
 import secrets
 import shutil
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,47 +21,17 @@ import numpy as np
 
 from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
+from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.study.storage.seal import flaw, seal
 from roughvisc.units import shown
-from roughvisc.variables import VARIABLES, of_step
+from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 log = logging.getLogger("roughvisc")
 
-_MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area"}) | {
-    "stated_error",
-    "time_error",
-    "residual",
-    "residual_bound",
-    "pressure_error",
-    "approach_error",
-    "stored_energy",
-    "dissipated_energy",
-    "work_error",
-    "dissipated_energy_error",
-    "contact_area_lower",
-    "contact_area_upper",
-}
-#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
-#: algorithm states no accuracy, the direct history no energies; of steps between kept times the mean gap is not known
-#: over a grid that has grown since.
-MAY_BE_MISSING = _MAY_BE_MISSING | {of_step(name) for name in (*_MAY_BE_MISSING, "mean_gap")}
-#: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
-#: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
-#: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.
-_CHUNK = (8, 64, 64)
-#: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
-_LONGEST_CHUNK = 1024
-#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
-#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
-#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
-#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms.
-_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.04, 0.5
-_SMALL = 1 << 16  # compressed in any case [bytes]
-_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
 #: Free space below which a write that failed is put down to a full disk. [bytes]
 _NEARLY_FULL = 1 << 20
 
@@ -185,8 +153,13 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
                 for written, variable in zip(declared, dataset.variables.values(), strict=True):
                     _write(written, variable)
             seal(temporary)
-        except RuntimeError as error:  # "NetCDF: HDF error", whatever the reason
+        except (
+            RuntimeError,
+            PermissionError,
+        ) as error:  # "NetCDF: HDF error", "Permission denied": whatever the reason
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
+            if not full and isinstance(error, PermissionError):
+                raise
             number = errno.ENOSPC if full else errno.EIO
             raise OSError(number, os.strerror(number), str(path)) from error
     return Path(path)
@@ -233,69 +206,24 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
 
 def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None) -> netCDF4.Variable:
     """Make room for a variable, with its attributes."""
-    encoding = _encoding(name, variable, precision)  # outside the lock, which reading a sample may need
+    encoding = encoding_of(name, variable, precision)  # outside the lock, which reading a sample may need
     with NETCDF:
         declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
         declared.set_auto_maskandscale(False)
         declared.setncatts(plain_attributes(variable.attrs))
-        if (bits := _bits(variable, precision)) is not None:
+        if (bits := bits_kept(variable, precision)) is not None:
             declared.relative_precision = precision
             declared.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
     return declared
 
 
 def _write(written: netCDF4.Variable, variable: xr.Variable) -> None:
-    """Write a variable; a field over (time, x, y) one layer of chunks after the other: no more of it is in memory."""
-    together = _chunks(variable.shape)[0] if _is_field(variable) else 0
+    """Write a variable; a field over its rows, x and y a layer of chunks at a time: no more of it is in memory."""
+    together = chunks(variable.shape)[0] if is_field(variable) else 0
     for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
         values = variable[layer].values  # outside the lock, too
         with NETCDF:
             written[layer] = values
-
-
-def _is_field(variable: xr.Variable) -> bool:
-    return variable.dims == ("time", "x", "y")
-
-
-def _bits(variable: xr.Variable, precision: float | None) -> int | None:
-    """Bits of a double's fraction to keep of a field, so that rounding changes it by less than that part; None: all."""
-    if precision is None or not _is_field(variable):
-        return None
-    return min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
-
-
-def _encoding(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
-    encoding: dict[str, Any] = {"fill_value": False}
-    if variable.dtype.kind == "f" and name in MAY_BE_MISSING:
-        encoding["fill_value"] = variable.dtype.type(np.nan)
-    bits = _bits(variable, precision)
-    if bits is not None:
-        encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
-    if variable.nbytes > _TINY:
-        encoding["chunksizes"] = _chunks(variable.shape)
-        encoding |= _filters(variable, bits)
-    return encoding
-
-
-def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
-    """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
-    middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
-    sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
-    if bits is not None:
-        sample = (sample.view(np.int64) & -(1 << (52 - bits))).view(float)  # cut off compresses as rounded
-    shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
-    size, shuffle = min(
-        (len(zlib.compress(text.tobytes(), 1)), shuffle) for shuffle, text in enumerate((sample, shuffled))
-    )
-    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
-        return {}
-    return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
-
-
-def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Sides of the chunks: as equal as they can be, since a chunk that sticks out takes its whole space."""
-    longest = _CHUNK[-len(shape) :] if len(shape) == 3 else (_LONGEST_CHUNK,) * len(shape)
-    return tuple(math.ceil(n / math.ceil(n / most)) for n, most in zip(shape, longest, strict=True))
 
 
 def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
@@ -374,12 +302,14 @@ def open_result(path: str | Path) -> xr.Dataset:
 
 def _foreign(dataset: xr.Dataset) -> str:
     """What shows that a file is no result, whoever wrote it; empty if nothing."""
-    if absent := [name for name in ("time", "force", "approach") if name not in dataset.variables]:
+    rows = rows_of(dataset)
+    if absent := [name for name in NEEDED[rows] if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
+    known = VOCABULARIES[rows]
     for name, variable in dataset.variables.items():
-        if name in VARIABLES and variable.dtype.kind not in ("U" if VARIABLES[name].dtype == "str" else "fiub"):
+        if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
             return f"holds {name} as {variable.dtype}"
-    if odd := [name for name in ("force", "approach") if dataset[name].dims != ("time",)]:
+    if odd := [name for name in NEEDED[rows] if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
         return f"has the tolerance {shown(dataset.attrs['tolerance'])}"

@@ -1,4 +1,4 @@
-"""The table of a sweep: what was varied in each case, how it ended, and its numbers at the end."""
+"""The table of a sweep: what was varied in each case, how it ended, and its numbers at the end or at its peak."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results, whole_file
 from roughvisc.units import number_and_unit, quantity
-from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables.rows import VOCABULARIES, Rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,20 +26,47 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 CASES = "cases.csv"
-#: Histories of which the table has the value at the end.
-_AT_THE_END = (
-    "time",
-    "force",
-    "nominal_pressure",
-    "approach",
-    "contact_area_corrected",
-    "contact_area_lower",
-    "contact_area_upper",
-    "contact_fraction",
-    "mean_gap",
-)
-#: Histories of which the table has the largest value.
-_LARGEST = ("stated_error", "time_error", "residual", "grid_error")
+#: What the table has of one row of each case: of the last time, or of the speed at which friction is largest.
+_TOLD: dict[Rows, tuple[str, ...]] = {
+    "time": (
+        "time",
+        "force",
+        "nominal_pressure",
+        "approach",
+        "contact_area_corrected",
+        "contact_area_lower",
+        "contact_area_upper",
+        "contact_fraction",
+        "mean_gap",
+        "sliding_distance",
+        "friction_force",
+        "friction_coefficient",
+        "leak_rate",
+        "transmissivity",
+        "hydraulic_aperture",
+        "thermal_conductance",
+        "electrical_conductance",
+    ),
+    "speed": (
+        "speed",
+        "friction_coefficient",
+        "friction_force",
+        "force",
+        "nominal_pressure",
+        "approach",
+        "contact_area_corrected",
+        "contact_fraction",
+        "mean_gap",
+        "grid_error_friction",
+        "last_octave_friction",
+    ),
+}
+#: What it has the largest value of.
+_LARGEST: dict[Rows, tuple[str, ...]] = {
+    "time": ("stated_error", "time_error", "residual", "grid_error"),
+    "speed": ("pressure_residual", "friction_residual"),
+}
+_ROWS_IN_WORDS: dict[Rows, str] = {"time": "times", "speed": "speeds"}
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
@@ -55,7 +83,9 @@ def to_table(out: str | Path) -> pd.DataFrame:
     pandas.DataFrame
         Indexed by the number of the case. Columns: title; what was varied, under its dotted key, in the unit that the
         study states; at the last kept time force, approach, contact area corrected for the grid with its bounds,
-        fraction, mean gap; the largest stated error and its parts; status, message and file. Units stand in brackets.
+        fraction, mean gap, friction where the profile slides, and what was observed; of a curve of friction the same
+        where friction is largest, with that speed; the largest stated error and its parts; status, message and file.
+        Units stand in brackets.
 
     Raises
     ------
@@ -105,10 +135,14 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]]) -
     stated = [known[key] for key in keys]
     entries = [index.entries.get(key) for key in keys]
     columns: dict[str, Any] = {"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)}
-    for name in _AT_THE_END:
-        columns[heading(name, VARIABLES[name].units)] = _from_each(entries, name, lambda values: values[-1])
-    for name in _LARGEST:
-        columns[f"largest {heading(name, VARIABLES[name].units)}"] = _from_each(entries, name, _largest)
+    for rows in dict.fromkeys(entry.along for entry in entries if entry):
+        mine = [entry if entry and entry.along == rows else None for entry in entries]
+        for name in _TOLD[rows]:
+            column = columns.setdefault(heading(name, VOCABULARIES[rows][name].units), [np.nan] * len(keys))
+            column[:] = _filled(column, mine, name, _telling)
+        for name in _LARGEST[rows]:
+            column = columns.setdefault(f"largest {name}", [np.nan] * len(keys))
+            column[:] = _filled(column, mine, name, _largest)
     table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
     records = [failures.get(key) or {} for key in keys]
     return table.assign(
@@ -139,19 +173,30 @@ def _as_written(key: str, values: list[float], si: str, stated: Sequence[Mapping
     return unit, numbers
 
 
-def _from_each(entries: Sequence[Entry | None], name: str, take: Callable[[np.ndarray], float]) -> list[float]:
-    """A number from a history of each case; NaN where there is none."""
-    histories = [entry.histories.get(name, ()) if entry else () for entry in entries]
-    return [float(take(np.asarray(one))) if len(one) else np.nan for one in histories]
+def _filled(
+    column: list[float], entries: Sequence[Entry | None], name: str, take: Callable[[Entry, str], float]
+) -> list[float]:
+    """A column with a number from a history of each of some cases; as it was where there is none."""
+    return [
+        take(entry, name) if entry and len(entry.histories.get(name, ())) else before
+        for before, entry in zip(column, entries, strict=True)
+    ]
 
 
-def _largest(values: np.ndarray) -> float:
+def _telling(entry: Entry, name: str) -> float:
+    """The value at the end; of a curve of friction where that is largest."""
+    row = -1 if entry.along == "time" else int(np.argmax(entry.histories["friction_coefficient"]))
+    return float(entry.histories[name][row])
+
+
+def _largest(entry: Entry, name: str) -> float:
+    values = entry.histories[name]
     known = values[np.isfinite(values)]
-    return known.max() if known.size else np.nan
+    return float(known.max()) if known.size else np.nan
 
 
 def _status(entry: Entry | None, failed: bool) -> str:
     if entry is None:
         return "failed" if failed else "not computed"
     bad = int((entry.histories["status"] == NOT_CONVERGED).sum())
-    return f"{bad} of {entry.rows} times not converged" if bad else "converged"
+    return f"{bad} of {entry.rows} {_ROWS_IN_WORDS[entry.along]} not converged" if bad else "converged"

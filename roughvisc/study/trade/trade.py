@@ -64,7 +64,8 @@ def trade(
     Raises
     ------
     InputError
-        If the study is wrong or holds a sweep, or its reference would take longer than half the budget.
+        If the study is wrong, holds a sweep or asks for friction, or its reference would take longer than half the
+        budget.
 
     Notes
     -----
@@ -78,6 +79,11 @@ def trade(
         raise InputError(f"budget is {budget!r}: expected a positive number of seconds")
     if reference not in ("auto", "run"):
         raise InputError(f"reference is {reference!r}: expected 'auto' or 'run'")
+    if case.program().slides:  # a curve of friction has no program
+        raise InputError(
+            "the program slides, by whole cells: on other grids it comes to other instants, where nothing can be "
+            "compared; expected a program without slides"
+        )
     case = _comparable(case)
     height = case.height()
     shape = (height.sizes["x"], height.sizes["y"])

@@ -1,4 +1,4 @@
-"""Tables on the command line: results, plans, scans, validation."""
+"""Tables on the command line: sweeps, plans, scans, validation."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 #: What is stated of accuracy, and its parts, each at its worst.
 _ERRORS = {
     "stated_error": "worst stated error",
+    "pressure_residual": "pressure, worst residual",
+    "friction_residual": "friction, worst residual",
     "time_error": "time steps, worst",
     "residual": "contact solver, estimated",
 }
@@ -33,43 +35,6 @@ _ERRORS = {
 def readable(value: float, unit: str) -> str:
     """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
     return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
-
-
-def reached(now: float, end: float) -> str:
-    """The time reached and the time at the end [s], as one reads them."""
-    unit = unit_for(end, "s")
-    return f"t = {unit(now):.3g} of {unit.text(end)}"
-
-
-def result_table(dataset: xr.Dataset) -> Group:
-    """Summary of a result: what came out, how accurate it is, what it cost."""
-    last = dataset.isel(time=-1)
-    end = float(last["time"])
-    steps = dataset.sizes["time"]
-    rows = [
-        ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
-        ("Kept times", f"{steps}, up to t = {readable(end, 's')}"),
-        ("Force at the end", readable(float(last["force"]), "N")),
-        *_nominal_pressure(dataset),
-        ("Approach at the end", readable(float(last["approach"]), "m")),
-        (
-            "Contact area at the end",
-            f"{readable(float(last['contact_area_corrected']), 'm^2')} corrected for the grid, "
-            f"{readable(float(last['contact_area']), 'm^2')} counted"
-            f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
-        ),
-        *_accuracy([dataset], dataset.attrs.get("tolerance")),
-        *(
-            (f"Accuracy: worst {label}", _number(dataset[name]))
-            for name, label in (("grid_error", "grid error"), ("grid_error_area", "grid error of the area"))
-            if name in dataset
-        ),
-        *((label, dataset.attrs[note]) for note, label in _NOTES.items() if note in dataset.attrs),
-        ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
-        ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
-        ("Cost: wall time", readable(float(last["wall_time"]), "s")),
-    ]
-    return _two_columns(rows, dataset.attrs.get("title"))
 
 
 def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
@@ -93,10 +58,10 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
     for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
-    rows += _accuracy([entry.histories for entry in entries])
+    rows += accuracy_rows([entry.histories for entry in entries])
     if spent:
         rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
-    return _two_columns(rows, title)
+    return two_columns(rows, title)
 
 
 def plan_tables(costs: xr.Dataset) -> Group:
@@ -110,20 +75,21 @@ def plan_tables(costs: xr.Dataset) -> Group:
     total, attrs = costs.sizes["case"], costs.attrs
     varied = [str(name) for name in costs.coords if name != "case_key"]
     whole = [
-        ("Cases", f"{total}, {attrs['processes']} side by side"),
+        ("Cases", f"{total}, {_side_by_side(attrs['processes'], attrs['threads'], costs)}"),
         *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
         ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
         ("Nominal pressure at most", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
         ("Contact at most", _contact(costs)),
-        ("Steps a case", _span(costs["steps"], "")),
+        *((f"{name.capitalize()} a case", _span(costs[name], "")) for name in _counts(costs)),
         ("Convolutions a case", _span(costs["convolutions"], "")),
         ("Wall time a case", _span(costs["wall_time"], "s")),
         ("Wall time of all", f"about {readable(attrs['wall_time'], 's')}"),
         ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
         ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
+        ("At half the resolution", _at_half(costs)),
         ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
     ]
-    parts: list[Any] = [_two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
     parts += [Text(f"Warning: {text}", style="bold red") for text in _warnings(costs)]
     if total > 1:
         parts += [Text(), _case_table(costs, varied)]
@@ -166,15 +132,20 @@ def print_validation(console: Console, found: Sequence[Comparison]) -> None:
 
 
 #: What a result and a plan say in words.
-_NOTES = {"body_note": "Body", "program_note": "Program"}
+NOTES = {"body_note": "Body", "program_note": "Program"}
 #: What is modelled, shown once if it is the same in all cases.
 _MODELLED = {
     "boundary": "Boundary",
     "memory_model": "Memory of the material",
     "scheme": "Time",
     "left_out": "Savings",
-    **_NOTES,
+    **NOTES,
+    "audit": "Assumptions",
 }
+#: Cells of a grid on which several threads are used.
+_THREADED = 1024**2
+#: Memory of a case from which a plan tells what half the resolution takes. [byte]
+_LARGE = 1e9
 #: Cases that a plan lists one by one.
 _LISTED = 20
 
@@ -211,6 +182,24 @@ def _contact(costs: xr.Dataset) -> str:
     return f"about {span} % {by}"
 
 
+def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
+    """How many cases at once, and how many threads each may use."""
+    large = bool(((costs["cells_x"] * costs["cells_y"]) >= _THREADED).any())
+    return f"{processes} side by side" + (f", {threads} threads each" if large and threads > 1 else "")
+
+
+def _at_half(costs: xr.Dataset) -> str:
+    """What a case on cells twice as long takes, where that is worth a thought; and what tells how wrong it is."""
+    if not bool((costs["memory"] >= _LARGE).any()):
+        return ""
+    kept = float((costs["half_rms_slope"] / costs["rms_slope"]).min())
+    lost = f"the rms slope falls by {100 * (1 - kept):.2g} %; " if kept < 1 else ""
+    return (
+        f"{_span(costs['half_wall_time'], 's')} and {size(float(costs['half_memory'].max()))} a case; {lost}"
+        "roughvisc trade measures what is lost"
+    )
+
+
 def _warnings(costs: xr.Dataset) -> list[str]:
     """What is foreseen in some cases, once, where most is foreseen; and in how many."""
     warned = np.flatnonzero(costs["warning"].values != "")
@@ -243,9 +232,15 @@ def _span(values: xr.DataArray, unit: str) -> str:
     return f"about {ends[0]}" if ends[0] == ends[1] else f"about {ends[0]} to {ends[1]}"
 
 
+def _counts(costs: xr.Dataset) -> list[str]:
+    """What is counted: steps of programs, speeds of curves of friction."""
+    return [name for name in ("steps", "speeds") if np.isfinite(costs[name].values).any()] or ["steps"]
+
+
 def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
     table = Table(box=None, pad_edge=False)
-    for heading in (*varied, "steps", "convolutions", "wall time", "memory", "disk"):
+    counted = [*_counts(costs), "convolutions"]
+    for heading in (*varied, *counted, "wall time", "memory", "disk"):
         table.add_column(heading, justify="right")
     for i in range(min(costs.sizes["case"], _LISTED)):
         row = costs.isel(case=i)
@@ -253,7 +248,7 @@ def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
         if row["refusal"].item():
             table.add_row(*cells, Text("cannot run"))
             continue
-        counts = [f"{float(row[name]):.0f}" for name in ("steps", "convolutions")]
+        counts = [f"{float(row[name]):.0f}" for name in counted]
         sizes = [size(float(row[name])) for name in ("memory", "disk")]
         table.add_row(*cells, *counts, readable(float(row["wall_time"]), "s"), *sizes)
     if costs.sizes["case"] > _LISTED:
@@ -310,7 +305,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     for parameter, label in named.items():
         unit = str(measures[parameter].attrs["units"])
         rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
-    return _two_columns([row for row in rows if row[1]], name)
+    return two_columns([row for row in rows if row[1]], name)
 
 
 def _channel_row(channel: Any) -> tuple[str, str]:
@@ -320,33 +315,26 @@ def _channel_row(channel: Any) -> tuple[str, str]:
     return f"Channel {channel.index}", described
 
 
-def _nominal_pressure(dataset: xr.Dataset) -> list[tuple[str, str]]:
-    """At the end, and the largest where that is another; none of a result that was kept without it."""
-    if "nominal_pressure" not in dataset:
-        return []
-    end, most = float(dataset["nominal_pressure"][-1]), float(dataset["nominal_pressure"].max())
-    largest = f", at most {readable(most, 'Pa')}" if most > end * (1 + 1e-6) else ""
-    return [("Nominal pressure at the end", readable(end, "Pa") + largest)]
-
-
-def _accuracy(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
+def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
     """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
     rows = []
     for name, label in _ERRORS.items():
         values = [np.ravel(one[name]) for one in found if name in one]
         if values:
             asked = f", tolerance {tolerance:g}" if tolerance and name == "stated_error" else ""
-            rows.append((f"Accuracy: {label}", _number(np.concatenate(values)) + asked))
+            rows.append((f"Accuracy: {label}", number(np.concatenate(values)) + asked))
     return rows
 
 
-def _number(values: Any) -> str:
+def number(values: Any) -> str:
+    """The largest of some numbers that are known."""
     found = np.asarray(values)
     found = found[np.isfinite(found)]
     return f"{found.max():.2g}" if found.size else "not known"
 
 
-def _two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
+def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
+    """A title and rows of a label and a value."""
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")

@@ -20,15 +20,18 @@ from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     TimeAxis,
+    Unit,
     fullest_frame,
     letter_panels,
     new_figure,
     require,
+    spread_axis,
     spread_frames,
     styled,
     time_text,
     unit_for,
 )
+from roughvisc.views.figures.coarsened import note, present, touching
 from roughvisc.views.figures.fields import (
     draw_map,
     draw_outline,
@@ -37,15 +40,17 @@ from roughvisc.views.figures.fields import (
     outline_colour,
     plane_ratio,
     plane_unit,
-    present,
     value_scale,
 )
-from roughvisc.views.figures.sections import cut_position, deformed_surface
+from roughvisc.views.figures.leakage import draw_flux, flux_of, rate_unit, visible, with_leak_rate
+from roughvisc.views.figures.sections import cut_position, deformed_line
 from roughvisc.views.observables import contact, history
 
 #: A map's side along y over that along x from which the map takes the whole height.
 _TALL = 1.2
 _HISTORIES = ("force", "approach", "contact_area_corrected")
+#: The same of a program that slides.
+_OF_SLIDES = ("friction_coefficient", "approach", "contact_area_corrected")
 
 
 def _writer(path: Path, rate: float):
@@ -71,8 +76,9 @@ def animate(
         One case's result; of fields on Dask one frame is in memory at a time.
     path : path-like
         File to write: ``.gif`` or ``.webp``, or ``.mp4`` where ffmpeg is installed. It appears only when complete.
-    field : {"pressure", "gap", "displacement"}, optional
-        What the map shows; by default pressure, or gap where that was not kept.
+    field : {"pressure", "gap", "displacement", "flux"}, optional
+        What the map shows; by default pressure, or gap where that was not kept. ``"flux"``: the fluid that leaks, as
+        :func:`roughvisc.plot.leakage` draws it, derived frame by frame, and the leak rate in place of the force.
     frames : int
         At most so many kept times are shown, even on the time axis that suits them.
     rate : float
@@ -145,25 +151,33 @@ def _moving(
     """Figure, what draws a frame into it, and the frames."""
     require(dataset, "time", "x", "y")
     field = field or ("pressure" if "pressure" in dataset else "gap")
-    if field not in FIELDS:
-        raise InputError(f"field is {field!r}: expected 'pressure', 'gap' or 'displacement'")
-    require(dataset, field)
-    dataset = measured_part(dataset)
+    if field not in (*FIELDS, "flux"):
+        raise InputError(f"field is {field!r}: expected 'pressure', 'gap', 'displacement' or 'flux'")
+    require(dataset, "gap" if field == "flux" else field)
     chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
-    histories = [name for name in _HISTORIES if name in dataset]
+    slides = "sliding_distance" in dataset
+    histories = [name for name in (_OF_SLIDES if slides else _HISTORIES) if name in dataset]
+    if field == "flux":
+        dataset = with_leak_rate(dataset)
+        dataset = dataset.assign(flux=flux_of(dataset))
+        histories = ["leak_rate", *histories[1:]]
+    else:
+        dataset = measured_part(dataset)
     sectioned = "height" in dataset and ("gap" in dataset or "displacement" in dataset)
     figure, on_map, cuts, right = _panels(plane_ratio(dataset), sectioned, len(histories))
     movers = [
-        _moving_map(figure, on_map, dataset, field, chosen),
+        (_moving_flow if field == "flux" else _moving_map)(figure, on_map, dataset, field, chosen),
         *(_moving_section(ax, dataset, chosen) for ax in cuts),
         *(_moving_history(ax, dataset, name, ax is right[-1]) for ax, name in zip(right, histories, strict=True)),
     ]
     letter_panels((on_map, *cuts, *right))
     figure.align_ylabels(right)
-    title = figure.suptitle("", fontsize=9)
+    title, coarse = figure.suptitle("", fontsize=9), note(dataset, field)
+    if coarse:
+        figure.supxlabel(coarse, fontsize=6.5)
 
     def draw(frame: int) -> list[Artist]:
-        title.set_text(time_text(float(dataset["time"][frame])))
+        title.set_text(_heading(dataset, frame))
         for move in movers:
             move(frame)
         return [title]
@@ -172,6 +186,15 @@ def _moving(
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the first picture's layout holds for all
     return figure, draw, chosen
+
+
+def _heading(dataset: xr.Dataset, frame: int) -> str:
+    """Time of a frame, and the distance that is behind."""
+    text = time_text(float(dataset["time"][frame]))
+    if "sliding_distance" not in dataset:
+        return text
+    distance = dataset["sliding_distance"].values
+    return f"{text}, {unit_for(distance, 'm').text(float(distance[frame]), 3)} slid"
 
 
 def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes, list[Axes], list[Axes]]:
@@ -221,8 +244,28 @@ def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chose
             outline[0].remove()
         outline[0] = None
         if "pressure" in dataset or "gap" in dataset:
-            touching = contact(dataset.isel(time=frame)).load()
-            outline[0] = draw_outline(ax, touching, plane, outline_colour(field))
+            outline[0] = draw_outline(ax, touching(dataset, frame), plane, outline_colour(field))
+
+    return move
+
+
+def _moving_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
+    """Map of the flux over its largest at each time: over all times the last frames would show nothing."""
+    plane = plane_unit(dataset)
+
+    def part(frame: int) -> xr.DataArray:
+        flux = dataset[field].isel(time=frame).load()
+        highest = float(np.nan_to_num(flux.values).max())
+        return visible(flux / (highest or 1.0), 1.0).rename(field)
+
+    image = draw_flux(ax, part(chosen[0]), Unit(1.0, ""), plane, 1.0)
+    side = "right" if plane_ratio(dataset) > 0.4 else "top"
+    bar = figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18, extend="min")
+    bar.set_label("Flux over its largest at that time")
+    label_plane(ax, dataset, plane)
+
+    def move(frame):
+        image.set_data(np.ma.masked_invalid(part(frame).transpose("y", "x")))
 
     return move
 
@@ -231,7 +274,7 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
-    surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
+    surfaces = [deformed_line(dataset, frame, "y", index) for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
     plane, unit = plane_unit(dataset), unit_for(np.ptp(known), "m")
@@ -255,26 +298,32 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
         surface = unit(by_frame[frame])
         line.set_ydata(surface)
         body.set_data(x, surface, top)
-        touching = contact(dataset.isel(time=frame)).isel(y=index).values
-        marked.set_ydata(np.where(touching, unit(height), np.nan))
+        on_line = contact(dataset.isel(time=frame, y=index)).values
+        marked.set_ydata(np.where(on_line, unit(height), np.nan))
 
     return move
 
 
 def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     steps = history(dataset)
-    axis, unit = TimeAxis.of(steps["time"]), unit_for(steps[name].values, VARIABLES[name].units)
+    clock = steps["time"]
+    steps = steps if name in steps else dataset[[name]]
+    axis, (unit, spans) = TimeAxis.of(clock), rate_unit(steps[name])
     times, shown = axis.unit(steps["time"]), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
     (run,) = ax.plot([], [], color=BLUE, lw=1.4)
     (now,) = ax.plot([], [], "o", color=VERMILION, ms=5)
-    axis.apply(ax, steps["time"])
+    axis.apply(ax, clock)
     ax.minorticks_off()  # each costs time in every picture
     if not lowest:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
     top = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
-    ax.set_ylim(min(float(np.nanmin(shown, initial=0.0)) * 1.1, -0.05 * top), 1.15 * top)
+    if spans:
+        spread_axis(ax.yaxis, shown)
+        ax.set_ylim(shown[shown > 0].min() / 3, 3 * top)
+    else:
+        ax.set_ylim(min(float(np.nanmin(shown, initial=0.0)) * 1.1, -0.05 * top), 1.15 * top)
     ax.set_ylabel(unit.label(VARIABLES[name].label))
     ax.grid(color="0.9", lw=0.5)
 

@@ -19,8 +19,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError, printable
-from roughvisc.labels import expect_declared_units
+from roughvisc.labels import expect_declared_units, expect_history
 from roughvisc.units import Unit, unit_for
+from roughvisc.variables.rows import rows_of
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
@@ -212,13 +213,15 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     """Refuse a Dataset that is not one case's result, or lacks variables; say how to get them."""
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
-    extra = [dim for dim in dataset.dims if dim not in ("time", "step", "x", "y")]
+    if "time" in names and "case" not in dataset.dims:
+        expect_history(dataset)
+    extra = [dim for dim in dataset.dims if dim not in (rows_of(names), "step", "x", "y")]
     if extra:
         raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
     for name in names:
         if name not in dataset.variables:
             stored = ", ".join(str(known) for known in dataset.data_vars)
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
-    if "time" in dataset.sizes and dataset.sizes["time"] == 0:
+    if dataset.sizes.get("time", 1) == 0:
         raise InputError("the result holds no time at all: nothing to draw")
     expect_declared_units(dataset)

@@ -26,6 +26,7 @@ from roughvisc.views.figures.axes import (
     time_text,
     unit_for,
 )
+from roughvisc.views.figures.coarsened import row_parts
 from roughvisc.views.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
 
 _MOST_LINES = 24
@@ -96,7 +97,8 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
 
 def _bin_count(field: xr.DataArray) -> int:
     """As many bins as the fullest frame has values to fill."""
-    return int(np.clip(np.sqrt(float((field > 0).sum(("x", "y")).max())) / 2, 6, 50))
+    counts = [sum(np.count_nonzero(part > 0) for _, part in row_parts(frame)) for frame in field]
+    return int(np.clip(np.sqrt(float(max(counts))) / 2, 6, 50))
 
 
 def _no_contact(ax: Axes, text: str = "no contact") -> None:

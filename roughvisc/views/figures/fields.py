@@ -28,10 +28,11 @@ from roughvisc.views.figures.axes import (
     time_text,
     unit_for,
 )
-from roughvisc.views.observables import contact
+from roughvisc.views.figures.coarsened import note, present, stride, touching
 
-#: Perceptually even maps, the same order of lightness in grey: pressure darkens as it rises, gap as it closes.
+#: Perceptually even maps, the same order of lightness in grey: pressure, flux darken as they rise, gap as it closes.
 COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
+COLOUR_MAPS["flux"] = "YlGnBu"
 _MOST_MAPS = 24
 #: Colour of cells in contact on maps of the gap that have no outline; values from which some may lie beyond a scale.
 _TOUCHING, _MANY = VERMILION, 1_000
@@ -118,13 +119,13 @@ def label_plane(
     ax.tick_params(direction="out", labelbottom=x, labelleft=y)
 
 
-def draw_outline(ax: Axes, touching: xr.DataArray, plane: Unit, colour: str):
+def draw_outline(ax: Axes, spots: xr.DataArray, plane: Unit, colour: str):
     """Outline of the cells in contact; None where there is nothing to outline."""
-    mask = touching.transpose("y", "x").values
+    mask = spots.transpose("y", "x").values
     if mask.all() or not mask.any() or not can_be_outlined(mask):
         return None
     # a rim out of contact closes the outline at the border of the map
-    x, y = (plane(_with_rim(touching[name].values)) for name in ("x", "y"))
+    x, y = (plane(_with_rim(spots[name].values)) for name in ("x", "y"))
     lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=_line_width(mask))
     lines.set_gid("contact outline")
     return lines
@@ -153,12 +154,6 @@ def outline_colour(name: str) -> str:
     return "k" if name == "pressure" else "w"
 
 
-def present(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
-    """One frame of a field in memory, missing where the profile is absent."""
-    field = dataset[name].isel(time=frame).load()
-    return field.where(dataset["height"].notnull()) if "height" in dataset else field
-
-
 def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
     if times is None:
         return telling_frames(dataset, 4)
@@ -172,6 +167,8 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
     """Maps of fields at chosen times, with the outline of the contact; one colour scale a field for all times.
 
+    Of more than 1024 cells a side a cell drawn stands for a block of them: for their largest pressure, their smallest
+    gap, and contact if any of them touches; the figure says so. One frame is read at a time, some rows at a time.
     Contact that is too ragged for an outline has a colour of its own on maps of the gap. The scale holds all but two of
     a thousand values: an arrow says that there are higher ones. Of a surface that repeats by its mirror images the
     part that was measured is drawn.
@@ -205,16 +202,18 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
         require(dataset, *fields)
     whole, dataset = dataset, measured_part(dataset)
     frames = _chosen_frames(dataset, times)
-    figure, axes = _map_panels(dataset, len(frames), len(stored))
+    figure, axes = map_panels(dataset, len(frames), len(stored))
     for name, panels in zip(stored, axes, strict=True):
-        _draw_field(figure, panels, dataset, name, frames)
-    _label_maps(axes, dataset, frames)
-    if dataset is not whole:
-        figure.suptitle("The part that was measured; its mirror images are not drawn", fontsize=7)
+        draw_field(figure, panels, dataset, name, frames)
+    label_maps(axes, dataset, [_frame_text(dataset, frame) for frame in frames])
+    notes = ["The part that was measured; its mirror images are not drawn"] if dataset is not whole else []
+    notes += [coarse] if (coarse := note(dataset, *stored)) else []
+    if notes:
+        figure.suptitle("\n".join(notes), fontsize=7)
     return figure
 
 
-def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
+def map_panels(dataset: xr.Dataset, frames: int, fields: int):
     """Figure and axes [field, row, column]; frames fill the rows of each field, a long strip of a map alone in its."""
     ratio = float(np.clip(plane_ratio(dataset), 0.05, 3.0))
     rows = frames if ratio < 0.4 else -(-frames // (4 if ratio < 2 else 8))
@@ -228,7 +227,8 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int):
     return figure, axes.reshape(fields, rows, columns)
 
 
-def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
+def draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
+    """One field in its panels, on one colour scale, with the outline of the contact."""
     shown = [present(dataset, name, frame) for frame in frames]
     low, high, beyond = value_scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
     unit, plane = unit_for([high], VARIABLES[name].units), plane_unit(dataset)
@@ -238,9 +238,9 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
         limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
     images = [draw_map(ax, one, unit, plane, **limits) for ax, one in zip(axes.ravel(), shown, strict=False)]
     known = "pressure" in dataset or "gap" in dataset
-    touching = [contact(dataset.isel(time=frame)).load() for frame in frames] if known else []
-    outlined = all(can_be_outlined(one.values) for one in touching)
-    for image, one in zip(images, touching, strict=False):
+    spots = [touching(dataset, frame) for frame in frames] if known else []
+    outlined = all(can_be_outlined(one.values) for one in spots)
+    for image, one in zip(images, spots, strict=False):
         if outlined:
             draw_outline(image.axes, one, plane, outline_colour(name))
         elif name == "gap":
@@ -249,8 +249,10 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
     extend = "max" if beyond else "neither"
     across = {"pad": 0.02, "aspect": max(15, 15 * len(axes)), "fraction": 0.06}
     bar = figure.colorbar(images[0], ax=list(axes.ravel()), extend=extend, **across)
-    note = "" if outlined or name != "gap" else "contact in orange\n"
-    bar.set_label(note + unit.label(VARIABLES[name].label))
+    above = "" if outlined or name != "gap" else "contact in orange\n"
+    if beyond and name == "pressure" and stride(dataset) > 1:
+        above = f"at most {unit.text(max(float(one.max()) for one in shown))}\n"
+    bar.set_label(above + unit.label(VARIABLES[name].label))
     bar.locator = (
         MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
     )
@@ -268,19 +270,19 @@ def value_scale(name: str, values: np.ndarray) -> tuple[float, float, bool]:
     return low, high, highest > high
 
 
-def _label_maps(axes: np.ndarray, dataset: xr.Dataset, frames: list[int]) -> None:
-    """Times above, coordinates on the outer panels only; panels without a frame removed."""
+def label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> None:
+    """Titles above, coordinates on the outer panels only; panels without a frame removed."""
     plane = plane_unit(dataset)
     fields, rows, columns = axes.shape
     for (field, row, column), ax in np.ndenumerate(axes):
         number = row * columns + column
-        if number >= len(frames):
+        if number >= len(titles):
             ax.remove()
             continue
-        lowest = field == fields - 1 and number + columns >= len(frames)
+        lowest = field == fields - 1 and number + columns >= len(titles)
         label_plane(ax, dataset, plane, 4, x=lowest, y=column == 0)
         if field == 0 or rows > 1:
-            ax.set_title(_frame_text(dataset, frames[number]), pad=3)
+            ax.set_title(titles[number], pad=3)
 
 
 def _frame_text(dataset: xr.Dataset, frame: int) -> str:

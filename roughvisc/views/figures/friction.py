@@ -4,30 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
-from roughvisc.variables import NOT_CONVERGED, SLIDING
-from roughvisc.views.figures.axes import CYCLE, new_figure, styled, unit_for
+from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables.sliding import SLIDING
+from roughvisc.views.figures.axes import CYCLE, Unit, new_figure, styled, unit_for
 
-#: What is drawn: on the left and on the right; of the solution, and by Persson's theory.
+#: What is drawn on the left and on the right: of the solution, by Persson's theory, the grid's error of it, and what
+#: the last octave of waves adds to it.
 _DRAWN = (
-    ("friction_coefficient", "persson_friction_coefficient"),
-    ("contact_fraction", "persson_contact_fraction"),
+    ("friction_coefficient", "persson_friction_coefficient", "grid_error_friction", "last_octave_friction"),
+    ("contact_fraction", "persson_contact_fraction", "grid_error_area", "last_octave_area"),
 )
-_TOLD = ("computed", "Persson (2001): waves stressed as in full contact")
+_TOLD = {
+    "computed": "computed",
+    "theory": "Persson (2001): waves stressed as in full contact",
+    "grid": "error of the grid",
+    "octave": "without the shortest octave of waves",
+}
+#: Part that the shortest octave may add, of friction or of area, before it is drawn.
+_MUCH = 0.05
 
 
 @styled
 def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
-    Speeds whose iteration did not converge are drawn as open circles.
+    Speeds whose iteration did not converge are drawn as open circles. Bands show the error of the grid, where the
+    result states it; dashed lines what is left without the shortest octave of waves, where that is 5 % less or more.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.friction`.
+        Of :func:`roughvisc.friction`, or of a study of friction.
     persson : bool
         Whether to draw Persson's theory of the same waves too, as dotted lines.
 
@@ -40,29 +53,53 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     InputError
         If the Dataset is not one of friction over the speed.
     """
-    for name in [one for solved, theory in _DRAWN for one in (solved, theory)[: 1 + persson]]:
+    for name in [one for solved, theory, *_ in _DRAWN for one in (solved, theory)[: 1 + persson]]:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
             raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")
-    ordered = dataset.sortby("speed")
+    ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
     across = unit_for(ordered["speed"].values, "m/s")
-    speed, settled = across(ordered["speed"].values), ordered["status"].values != NOT_CONVERGED
-    figure = new_figure(3.8, 3.2 if persson else 3.0)
+    told = {"computed": Line2D([], [], color="0.3")}
+    figure = new_figure(3.8, 3.0)
     ax = figure.add_subplot()
-    for axes, (name, theory), colour in zip((ax, ax.twinx()), _DRAWN, CYCLE, strict=False):
-        values = ordered[name].values
-        axes.plot(speed, values, "-", color=colour, label=SLIDING[name].label)
-        axes.plot(speed[settled], values[settled], "o", ms=3, color=colour)
-        axes.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)
-        if persson:
-            axes.plot(speed, ordered[theory].values, ":", color=colour, label=SLIDING[theory].label)
-            values = np.append(values, ordered[theory].values)
-        axes.set_ylabel(SLIDING[name].label, color=colour)
-        axes.tick_params(axis="y", colors=colour)
-        axes.set_ylim(0, 1.08 * float(np.max(values)) or 1.0)
-    if persson:
-        handles = [ax.plot([], [], dashes, color="0.3")[0] for dashes in ("-", ":")]
-        figure.legend(handles, _TOLD, loc="outside upper center")
+    for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, CYCLE, strict=False):
+        told |= _draw(axes, ordered, names, across, colour, persson)
+    if len(told) > 1:
+        known = [name for name in _TOLD if name in told]
+        figure.set_figheight(3.0 + 0.16 * len(known))
+        figure.legend([told[name] for name in known], [_TOLD[name] for name in known], loc="outside upper center")
     ax.set_xscale("log")
     ax.set_xlabel(across.label(SLIDING["speed"].label))
     ax.grid(color="0.9", lw=0.5)
     return figure
+
+
+def _draw(
+    axes: Axes, ordered: xr.Dataset, names: tuple[str, str, str, str], across: Unit, colour: str, persson: bool
+) -> dict[str, Line2D | Patch]:
+    """One quantity on its axis; entries of a legend for what is drawn beside the solution."""
+    solved, theory, grid, octave = names
+    speed, settled = across(ordered["speed"].values), ordered["status"].values != NOT_CONVERGED
+    values = ordered[solved].values
+    told: dict[str, Line2D | Patch] = {}
+    most = [values]
+    axes.plot(speed, values, "-", color=colour, label=SLIDING[solved].label)
+    axes.plot(speed[settled], values[settled], "o", ms=3, color=colour)
+    axes.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)
+    if grid in ordered and np.isfinite(ordered[grid]).any():
+        error = ordered[grid].values * values
+        axes.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
+        told["grid"] = Patch(color="0.3", alpha=0.25, lw=0)
+        most.append((values + error)[np.isfinite(error)])
+    if octave in ordered and float(np.nanmax(np.abs(ordered[octave].values), initial=0.0)) > _MUCH:
+        left = values * (1 - ordered[octave].values)
+        axes.plot(speed, left, "--", color=colour, lw=0.9, label=f"{SLIDING[solved].label}, {_TOLD['octave']}")
+        told["octave"] = Line2D([], [], color="0.3", ls="--", lw=0.9)
+        most.append(left[np.isfinite(left)])
+    if persson:
+        axes.plot(speed, ordered[theory].values, ":", color=colour, label=SLIDING[theory].label)
+        told["theory"] = Line2D([], [], color="0.3", ls=":")
+        most.append(ordered[theory].values)
+    axes.set_ylabel(SLIDING[solved].label, color=colour)
+    axes.tick_params(axis="y", colors=colour)
+    axes.set_ylim(0, 1.08 * float(np.max(np.concatenate(most))) or 1.0)
+    return told

@@ -27,6 +27,7 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
+from roughvisc.views.observables import area_by_theory
 from roughvisc.views.observables import history as over_steps
 
 _PANELS = (
@@ -38,7 +39,10 @@ _PANELS = (
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
-    "contact_area_corrected": (("contact_area", "counted", "k", (0, (4, 2))),),
+    "contact_area_corrected": (
+        ("contact_area", "counted", "k", (0, (4, 2))),
+        ("persson_contact_area", "Persson", "0.5", (0, (1, 1.5))),
+    ),
     "work": (
         ("stored_energy", "stored", SKY, (0, (4, 2))),
         ("dissipated_energy", "dissipated", VERMILION, (0, (1, 1.5))),
@@ -159,7 +163,7 @@ def _draw_cost(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
 
 
 @styled
-def history(dataset: xr.Dataset) -> Figure:
+def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     """Force, approach, contact area, mean gap and work at every accepted step; cost and accuracy at kept times.
 
     Kept times are dots, where these are few. What the result does not hold is left out. The time axis is linear or
@@ -171,6 +175,9 @@ def history(dataset: xr.Dataset) -> Figure:
     ----------
     dataset : xarray.Dataset
         One case's result.
+    persson : bool
+        Whether to draw the contact area by Persson's theory too, up to where the load falls: see
+        :func:`~roughvisc.views.observables.area_by_theory`.
 
     Returns
     -------
@@ -179,10 +186,13 @@ def history(dataset: xr.Dataset) -> Figure:
     Raises
     ------
     InputError
-        If the Dataset is not one case's result, or holds none of the histories.
+        If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
     """
     require(dataset, "time")
     steps = over_steps(dataset)
+    if persson:
+        theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
+        steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
     panels = [panel for panel in _PANELS if panel[0] in steps]
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -22,6 +24,7 @@ from roughvisc.views.figures.axes import (
     time_text,
     unit_for,
 )
+from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
 from roughvisc.views.figures.fields import measured_part, plane_unit
 from roughvisc.views.observables import contact
 
@@ -34,11 +37,11 @@ def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
     """
     along = "x" if across == "y" else "y"
     if "pressure" in dataset:
-        carried = dataset["pressure"].isel(time=frame).sum(along).values
+        carried = summed(dataset["pressure"].isel(time=frame), along)
         carried = carried * _inner(dataset, len(carried))
         if carried.max() > 0:
             return int(carried.argmax())
-    peaks = dataset["height"].max(along).values
+    peaks = largest(dataset["height"], along)
     peaks = np.where(_inner(dataset, len(peaks)), peaks, np.nan)
     return int(np.nanargmax(peaks)) if np.isfinite(peaks).any() else len(peaks) // 2
 
@@ -53,21 +56,40 @@ def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
     return inner
 
 
-def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
-    """Height of the half-space's surface over the profile, in the frame of the profile. [m]
+def deformed_line(dataset: xr.Dataset, frame: int, across: str, index: int) -> np.ndarray:
+    """Height of the half-space's surface over one line of the profile, in the frame of the profile. [m]
 
     From the displacement where it is stored, which is known above absent cells too; else the height plus the gap.
     """
-    height = dataset["height"]
+    frame_of = dataset.isel(time=frame)
+    height = dataset["height"].isel({across: index}).values
+    if "displacement" not in dataset:
+        require(dataset, "gap")
+        return height + frame_of["gap"].isel({across: index}).values
+    return frame_of["displacement"].isel({across: index}).values + _offset(frame_of)
+
+
+def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
+    """The whole of what :func:`deformed_line` gives a line of. [m]"""
+    frame_of = dataset.isel(time=frame)
     if "displacement" in dataset:
-        displacement = dataset["displacement"].isel(time=frame).load()
-        if "gap" in dataset:
-            offset = (height + dataset["gap"].isel(time=frame) - displacement).median()
-        else:
-            offset = (height - displacement).max()
-        return displacement + offset
+        return frame_of["displacement"].load() + _offset(frame_of)
     require(dataset, "gap")
-    return height + dataset["gap"].isel(time=frame).load()
+    return dataset["height"] + frame_of["gap"].load()
+
+
+def _offset(frame_of: xr.Dataset) -> float:
+    """What the displacement of one frame is less than the height of the surface, everywhere. [m]"""
+    fields = [_parts(frame_of, name) for name in ("height", "gap", "displacement") if name in frame_of]
+    if "gap" not in frame_of:
+        return float(np.nanmax([np.fmax.reduce(h - u, axis=None) for h, u in zip(*fields, strict=True)]))
+    offsets = (h + g - u for h, g, u in zip(*fields, strict=True))
+    return next((float(np.nanmedian(one)) for one in offsets if np.isfinite(one).any()), np.nan)
+
+
+def _parts(frame_of: xr.Dataset, name: str) -> Iterator[np.ndarray]:
+    """Values of a map, the same rows at a time of every map of a result."""
+    return (values for _, values in row_parts(frame_of[name], rows_of_chunk(frame_of["displacement"])))
 
 
 @styled
@@ -137,9 +159,10 @@ def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
 
 def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, limits: np.ndarray) -> Unit:
     height = dataset["height"].isel({across: index}).values
-    surface = deformed_surface(dataset, frame).isel({across: index}).values
+    surface = deformed_line(dataset, frame, across, index)
     x = (limits[1:] + limits[:-1]) / 2
-    highest = float(dataset["height"].attrs.get("highest", dataset["height"].max()))
+    stated = dataset["height"].attrs.get("highest")
+    highest = float(largest(dataset["height"]) if stated is None else stated)
     level = highest - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
     known = np.concatenate([height, surface])
     known = known[np.isfinite(known)]
@@ -155,7 +178,7 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.fill_between(wide, np.pad(s, 1, "edge"), high + 2 * margin, color=BLUE, alpha=0.16, lw=0, label="half-space")
     ax.plot(x, h, color="0.25", lw=1)
     ax.plot(x, s, color=BLUE, lw=1)
-    touching = contact(dataset.isel(time=frame)).isel({across: index}).values
+    touching = contact(dataset.isel({"time": frame, across: index})).values
     marked = np.where(touching, h, np.nan)
     ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
     if low - margin < unit(level) < high + 2 * margin:

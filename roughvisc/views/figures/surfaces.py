@@ -12,6 +12,15 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.blocks import (
+    count_of,
+    deviation_of,
+    extremes_of,
+    known_values,
+    mean_of,
+    percentiles_of,
+    row_blocks,
+)
 from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.variables import VARIABLES
@@ -25,6 +34,7 @@ from roughvisc.views.figures.axes import (
     styled,
     unit_for,
 )
+from roughvisc.views.figures.coarsened import drawn, stride
 from roughvisc.views.figures.fields import COLOUR_MAPS, draw_map, label_plane, plane_ratio, plane_unit
 
 #: Missing points: a colour that the map of heights has not, in grey print neither.
@@ -53,13 +63,19 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
     tuple of float
         The lowest and the highest height where no point is beyond. [m]
     """
-    known = values[np.isfinite(values)]
-    lower, median, upper = np.percentile(known, (25, 50, 75))
+    lower, median, upper = percentiles_of(values, (25, 50, 75))
     reach = _REACH * (upper - lower) / 1.349  # the quartiles of the normal distribution are 1.349 deviations apart
-    lowest, highest = float(known.min()), float(known.max())
+    lowest, highest = extremes_of(values)
     if not reach > 0:
         return lowest, highest
     return max(lowest, float(median - reach)), min(highest, float(median + reach))
+
+
+def _beyond(values: np.ndarray, low: float, high: float) -> tuple[float, float]:
+    """Share of the points below and above limits."""
+    below = sum(np.count_nonzero(values[rows] < low) for rows in row_blocks(values.shape))
+    above = sum(np.count_nonzero(values[rows] > high) for rows in row_blocks(values.shape))
+    return below / values.size, above / values.size
 
 
 def _label(height: xr.DataArray) -> str:
@@ -90,27 +106,31 @@ def surface(height: xr.DataArray) -> Figure:
     """
     height = _checked(height)
     low, high = robust_limits(height.values)
-    unit, plane = unit_for([high - height.mean(), low - height.mean()], "m"), plane_unit(height)
+    mean = mean_of(height.values)
+    unit, plane = unit_for([high - mean, low - mean], "m"), plane_unit(height)
     figure, panels = _panels(plane_ratio(height))
     on_map = panels["map"]
-    image = draw_map(on_map, height, unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
+    image = draw_map(on_map, drawn(height), unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
     image.set_cmap(matplotlib.colormaps[COLOUR_MAPS["height"]].with_extremes(bad=MISSING))
     flat = plane_ratio(height) < 0.4
-    beyond = (float((height < low).mean()), float((height > high).mean()))
+    beyond = _beyond(height.values, low, high)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     where = "top" if flat else "right"
     arrows = extend[beyond[0] > 0, beyond[1] > 0]
     bar = figure.colorbar(image, ax=on_map, location=where, pad=0.02, aspect=50 if flat else 20, extend=arrows)
     bar.set_label(unit.label(_label(height)))
     label_plane(on_map, height, plane)
-    missing = float(height.isnull().mean())
+    missing = (height.size - count_of(height.values)) / height.size
     notes = [f"{100 * missing:.2g} % of the points are missing (red)"] if missing else []
     notes += [f"{100 * sum(beyond):.2g} % lie beyond the scale of heights"] if sum(beyond) else []
+    if (every := stride(height)) > 1:
+        ends = " to ".join(unit.text(one) for one in extremes_of(height.values))
+        notes += [f"\nThe map is of means of {every} × {every} points; heights are {ends}"]
     if notes:
-        figure.suptitle(", ".join(notes), fontsize=8.5)
+        figure.suptitle(", ".join(notes).removeprefix("\n").replace(", \n", "\n"), fontsize=8.5)
     _draw_profile(panels["profile"], on_map, height, unit, plane)
-    levelled = off_plane(height)
-    _draw_heights(panels["heights"], levelled, unit_for(levelled, "m"))
+    levelled = height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
+    _draw_heights(panels["heights"], levelled, unit_for(extremes_of(levelled.values), "m"))
     _draw_spectrum(panels["spectrum"], levelled)
     letter_panels(list(panels.values()))
     return figure
@@ -146,29 +166,28 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
 
 
 def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
-    values = unit(levelled.values[np.isfinite(levelled.values)])
+    count = count_of(levelled.values)
     low, high = (float(unit(limit)) for limit in robust_limits(levelled.values))
-    deviation = float(values.std())
-    bins = int(np.clip(math.sqrt(values.size) / 1.5, 8, 100))
+    mean, deviation = float(unit(mean_of(levelled.values))), float(unit(deviation_of(levelled.values)))
+    bins = int(np.clip(math.sqrt(count) / 1.5, 8, 100))
     if deviation == 0:
         ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
         ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
-    inside = values[(values >= low) & (values <= high)]
-    weights = np.full(inside.shape, bins / ((high - low) * values.size))
+    edges = np.linspace(low, high, bins + 1)
+    found = sum(np.histogram(unit(known), bins, (low, high))[0] for known in known_values(levelled.values))
     ax.hist(
-        inside,
-        bins=bins,
-        range=(low, high),
-        weights=weights,
+        edges[:-1],
+        bins=edges,
+        weights=found * bins / ((high - low) * count),
         color=BLUE,
         alpha=0.45,
         histtype="stepfilled",
         label="measured",
     )
     shown = np.linspace(low, high, 200)
-    bell = np.exp(-(((shown - values.mean()) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
+    bell = np.exp(-(((shown - mean) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
     ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
     ax.legend(loc="upper right", handlelength=1.2)
@@ -181,7 +200,8 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     ax.set_ylabel("Power spectral density [m⁴]")
     drawn = False
     if min(levelled.shape) >= 8:
-        spectrum = psd(levelled.fillna(0.0), window="hann")
+        levelled.values[np.isnan(levelled.values)] = 0.0  # of this figure alone
+        spectrum = psd(levelled, window="hann")
         spectrum = spectrum.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings that are seen whole
         wavevector, density = spectrum["wavevector"].values, spectrum["psd"].values
         scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}

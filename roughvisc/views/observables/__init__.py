@@ -10,23 +10,34 @@ from __future__ import annotations
 
 import xarray as xr
 
+from roughvisc.views.observables.area_theories import area_by_theory
+from roughvisc.views.observables.conductance import conductance
 from roughvisc.views.observables.cycles import cycle_energy
 from roughvisc.views.observables.densities import gap_distribution, gap_statistics, pressure_distribution
-from roughvisc.views.observables.response import area_growth, history, stiffness, work
+from roughvisc.views.observables.frozen import incremental_stiffness
+from roughvisc.views.observables.leakage import leakage
+from roughvisc.views.observables.response import area_growth, history, older_name, secant_stiffness, stiffness, work
 from roughvisc.views.observables.spots import cluster_areas, clusters, contact, percolation
+from roughvisc.views.observables.tables import asked
 
 __all__ = [
+    "area_by_theory",
     "area_growth",
+    "asked",
     "cluster_areas",
     "clusters",
+    "conductance",
     "contact",
     "cycle_energy",
     "gap_distribution",
     "gap_statistics",
     "history",
+    "incremental_stiffness",
+    "leakage",
     "observe",
     "percolation",
     "pressure_distribution",
+    "secant_stiffness",
     "stiffness",
     "work",
 ]
@@ -47,7 +58,7 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Clusters, percolation, gap statistics, growth exponent, stiffness and work over time, each with its unit;
+        Clusters, percolation, gap statistics, growth exponent, secant stiffness and work over time, each with its unit;
         ``xarray.merge([dataset, observe(dataset)])`` holds them beside the result.
 
     Raises
@@ -63,5 +74,6 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     if "contact_area" in dataset or "contact_area_corrected" in dataset:
         found.append(area_growth(dataset))
     if "force" in dataset and "approach" in dataset:
-        found += [stiffness(dataset), work(dataset)]
+        secant = secant_stiffness(dataset)
+        found += [secant, older_name(secant), work(dataset)]
     return xr.merge(found, compat="equals", join="exact")

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import ndimage, sparse
 
 from roughvisc.errors import InputError
+from roughvisc.topography.blocks import row_blocks
 
 _STRUCTURES = {4: ndimage.generate_binary_structure(2, 1), 8: ndimage.generate_binary_structure(2, 2)}
 
@@ -41,37 +42,32 @@ def label_clusters(mask: np.ndarray, periodic: bool = False, connectivity: int =
     labels, count = ndimage.label(mask, _STRUCTURES[connectivity])
     if not periodic or count < 2:
         return labels, count
-    # a rim of copies on all four sides, labelled anew, tells which clusters are one across the borders
-    rim = np.pad(labels, 1, mode="wrap")
-    around, _ = ndimage.label(rim > 0, _STRUCTURES[connectivity])
-    pairs = np.stack([rim[rim > 0] - 1, around[rim > 0] - 1 + count])
-    pairs = np.unique(pairs, axis=1)
-    nodes = count + int(around.max())
-    graph = sparse.coo_array((np.ones(pairs.shape[1]), pairs), shape=(nodes, nodes))
-    merged = sparse.csgraph.connected_components(graph, directed=False)[1][:count]
-    _, merged = np.unique(merged, return_inverse=True)
-    return np.where(labels > 0, np.append(0, merged + 1)[labels], 0), int(merged.max()) + 1
+    links = _border_links(labels, connectivity)[:, :2] - 1
+    graph = sparse.coo_array((np.ones(len(links)), links.T), shape=(count, count))
+    merged = sparse.csgraph.connected_components(graph, directed=False)[1]
+    return np.append(0, merged + 1).astype(labels.dtype)[labels], int(merged.max()) + 1
 
 
 def cluster_sizes(mask: np.ndarray, periodic: bool = False, connectivity: int = 4) -> np.ndarray:
     """Number of cells of each cluster of one map, largest first; parameters as for :func:`label_clusters`."""
-    labels, _ = label_clusters(mask, periodic, connectivity)
-    return np.sort(np.bincount(labels.ravel())[1:])[::-1]
+    labels, count = label_clusters(mask, periodic, connectivity)
+    sizes = np.zeros(count + 1, int)
+    for rows in row_blocks(labels.shape):  # counting takes a copy
+        sizes += np.bincount(labels[rows].ravel(), minlength=count + 1)
+    return np.sort(sizes[1:])[::-1]
 
 
 def _border_links(labels: np.ndarray, connectivity: int) -> np.ndarray:
     """Links between clusters across the borders of a periodic map: rows (from, to, turns in x, turns in y)."""
-    rim = np.pad(labels, 1, mode="wrap")
     reach = (-1, 0, 1) if connectivity == 8 else (0,)
-    nx, ny = labels.shape
     found = []
-    for shift in reach:
-        here, there = rim[nx, 1:-1], rim[nx + 1, 1 + shift : 1 + shift + ny]
-        turns = (np.arange(ny) + shift) // ny
-        found.append(np.stack([here, there, np.ones(ny, int), turns], axis=1))
-        here, there = rim[1:-1, ny], rim[1 + shift : 1 + shift + nx, ny + 1]
-        turns = (np.arange(nx) + shift) // nx
-        found.append(np.stack([here, there, turns, np.ones(nx, int)], axis=1))
+    for axis, turn in ((0, (1, 0)), (1, (0, 1))):
+        last, first = np.take(labels, -1, axis), np.take(labels, 0, axis)
+        for shift in reach:
+            there = np.arange(last.size) + shift
+            turns = [np.full(last.size, one) for one in turn]
+            turns[1 - axis] = there // last.size
+            found.append(np.stack([last, first[there % last.size], *turns], axis=1))
     links = np.concatenate(found)
     return np.unique(links[(links[:, 0] > 0) & (links[:, 1] > 0)], axis=0)
 

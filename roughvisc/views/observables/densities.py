@@ -7,6 +7,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.topography.blocks import count_of, mean_of, median_of, row_blocks
 from roughvisc.views.observables.derived import frame_by_frame, need
 
 
@@ -16,7 +17,7 @@ def _bin_edges(field: xr.DataArray, bins) -> np.ndarray:
         if given.ndim != 1 or len(given) < 2 or not np.all(np.diff(given) > 0):
             raise InputError("bin edges must increase, and be two or more")
         return given
-    largest = float(field.max())
+    largest = float(frame_by_frame(lambda values: np.fmax.reduce(values, axis=None), field).max())
     return np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
 
 
@@ -24,22 +25,16 @@ def _density(field: xr.DataArray, bins, name: str) -> xr.Dataset:
     """Probability density of the positive values of a field, frame by frame."""
     limits = _bin_edges(field, bins)
 
-    def measure(values):
-        values = values[values > 0]
-        inside = np.histogram(values, limits)[0]
-        return inside / (max(len(values), 1) * np.diff(limits)) if len(values) else np.full(len(limits) - 1, np.nan)
+    def measure(frame):
+        inside, count = np.zeros(len(limits) - 1, int), 0
+        for rows in row_blocks(frame.shape):
+            values = frame[rows]
+            values = values[values > 0]
+            inside, count = inside + np.histogram(values, limits)[0], count + len(values)
+        return inside / (count * np.diff(limits)) if count else np.full(len(limits) - 1, np.nan)
 
     dim = f"{name}_bin"
-    density = xr.apply_ufunc(
-        measure,
-        field,
-        input_core_dims=[["x", "y"]],
-        output_core_dims=[[dim]],
-        vectorize=True,
-        dask="parallelized",
-        output_dtypes=[float],
-        dask_gufunc_kwargs={"allow_rechunk": True, "output_sizes": {dim: len(limits) - 1}},
-    )
+    density = frame_by_frame(measure, field, over=(dim, len(limits) - 1))
     return describe(
         xr.Dataset({f"{name}_density": density}).assign_coords({dim: (dim, (limits[1:] + limits[:-1]) / 2)})
     )
@@ -116,8 +111,7 @@ def gap_statistics(dataset: xr.Dataset) -> xr.Dataset:
     need(dataset, "gap")
 
     def measure(gap):
-        present = gap[~np.isnan(gap)]
-        return (present.mean(), np.median(present)) if present.size else (np.nan, np.nan)
+        return (mean_of(gap), median_of(gap)) if count_of(gap) else (np.nan, np.nan)
 
     mean, median = frame_by_frame(measure, dataset["gap"], outputs=2)
     return describe(xr.Dataset({"gap_mean": mean, "gap_median": median}))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.variables import STEPPED, of_step
+from roughvisc.variables.slides import STEPPED_IN_SLIDES
 from roughvisc.views.observables.derived import along_time, need
 
 
@@ -33,7 +36,7 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     need(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
-    names = [name for name in STEPPED if name in dataset]
+    names = [name for name in (*STEPPED, *STEPPED_IN_SLIDES) if name in dataset]
     if of_step("time") not in dataset:
         return dataset[names]
     steps = dataset[[of_step(name) for name in names if of_step(name) in dataset]]
@@ -93,8 +96,10 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     return describe(xr.Dataset({"area_growth_exponent": along_time(measure, dataset[name], dataset["time"])}))
 
 
-def stiffness(dataset: xr.Dataset) -> xr.Dataset:
-    """Contact stiffness: the slope of force over approach along the history.
+def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
+    """Slope of force over approach along the history, with the creep between kept times in it.
+
+    The stiffness of the contact itself at a time is :func:`~roughvisc.views.observables.incremental_stiffness`.
 
     Parameters
     ----------
@@ -104,7 +109,7 @@ def stiffness(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``contact_stiffness`` over time: central differences where the approach runs on, the last secant where it
+        ``secant_stiffness`` over time: central differences where the approach runs on, the last secant where it
         turns; missing while it stands still. [N/m]
 
     Raises
@@ -113,7 +118,39 @@ def stiffness(dataset: xr.Dataset) -> xr.Dataset:
         If the result holds no force or no approach.
     """
     need(dataset, "force", "approach")
-    return describe(xr.Dataset({"contact_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
+    return describe(xr.Dataset({"secant_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
+
+
+def stiffness(dataset: xr.Dataset) -> xr.Dataset:
+    """:func:`secant_stiffness` under its older name, which the second minor release from now may drop.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``contact_stiffness`` over time. [N/m]
+
+    Raises
+    ------
+    InputError
+        If the result holds no force or no approach.
+    """
+    warnings.warn(
+        "observables.stiffness is now secant_stiffness, and its variable contact_stiffness is secant_stiffness: it is "
+        "the slope of the history; incremental_stiffness is that of the contact at a time",
+        FutureWarning,
+        stacklevel=2,
+    )
+    return older_name(secant_stiffness(dataset))
+
+
+def older_name(dataset: xr.Dataset) -> xr.Dataset:
+    """The secant stiffness as the variable that it was before."""
+    return describe(dataset.rename(secant_stiffness="contact_stiffness"))
 
 
 def work(dataset: xr.Dataset) -> xr.Dataset:

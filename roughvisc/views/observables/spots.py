@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
@@ -29,16 +30,26 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray of bool, dims (time, x, y)
+        On Dask, a frame a block, if the result was opened and several frames of it are not read yet.
 
     Raises
     ------
     InputError
         If the result holds neither ``pressure`` nor ``gap``.
     """
+    field, touches = _telling(dataset)
+    if field.ndim > 2 and not field.chunks and not field.variable._in_memory:
+        field = field.chunk(dict.fromkeys(set(field.dims) - {"x", "y"}, 1))  # or all frames would be read here
+    return touches(field)
+
+
+def _telling(dataset: xr.Dataset) -> tuple[xr.DataArray, Callable]:
+    """The field that tells where the contact is, and how it tells."""
     if "pressure" in dataset:
-        return dataset["pressure"] > 0
+        need(dataset, "pressure")
+        return dataset["pressure"], lambda pressure: pressure > 0
     need(dataset, "gap")
-    return dataset["gap"] <= 0
+    return dataset["gap"], lambda gap: gap <= 0
 
 
 def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
@@ -64,12 +75,14 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
         If the result holds neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
     """
 
-    def measure(mask):
-        sizes = cluster_sizes(mask, _is_periodic(dataset), connectivity)
+    field, touches = _telling(dataset)
+
+    def measure(frame):
+        sizes = cluster_sizes(touches(frame), _is_periodic(dataset), connectivity)
         return (len(sizes), sizes.mean(), sizes[0]) if len(sizes) else (0.0, np.nan, np.nan)
 
     cell = math.prod(spacing(dataset, "clusters"))
-    count, mean, largest = frame_by_frame(measure, contact(dataset), outputs=3)
+    count, mean, largest = frame_by_frame(measure, field, outputs=3)
     return describe(
         xr.Dataset(
             {
@@ -101,12 +114,12 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     InputError
         If the result holds neither ``pressure`` nor ``gap``, or is not of one case.
     """
-    touching = contact(dataset)
-    if touching.dims != ("time", "x", "y"):
-        raise InputError(f"the result has dimensions {touching.dims}: choose one case first")
+    field, touches = _telling(dataset)
+    if field.dims != ("time", "x", "y"):
+        raise InputError(f"the result has dimensions {field.dims}: choose one case first")
     sizes = [
-        cluster_sizes(touching.isel(time=frame).values, _is_periodic(dataset), connectivity)
-        for frame in range(touching.sizes["time"])
+        cluster_sizes(touches(field.isel(time=frame).values), _is_periodic(dataset), connectivity)
+        for frame in range(field.sizes["time"])
     ]
     areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
     for row, found in zip(areas, sizes, strict=True):
@@ -135,9 +148,10 @@ def percolation(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     InputError
         If the result holds neither ``pressure`` nor ``gap``.
     """
+    field, touches = _telling(dataset)
     along_x, along_y = frame_by_frame(
-        lambda touching: percolates(~touching, _is_periodic(dataset), connectivity),
-        contact(dataset),
+        lambda frame: percolates(~touches(frame), _is_periodic(dataset), connectivity),
+        field,
         outputs=2,
         dtype=bool,
     )

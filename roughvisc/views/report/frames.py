@@ -15,9 +15,11 @@ from PIL import Image
 
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
-from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, present, value_scale
-from roughvisc.views.figures.sections import cut_position, deformed_surface
+from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
+from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, value_scale
+from roughvisc.views.figures.sections import cut_position, deformed_line
 from roughvisc.views.observables import contact, history
 
 #: Frames a case and cells along the longer side of a map, the richest first.
@@ -89,11 +91,11 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
     whole, dataset = dataset, measured_part(dataset)
     fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
     scales, maps, chosen, block = [], [], [], 1
-    fullest = fullest_frame(dataset)
+    fullest, every = fullest_frame(dataset), stride(dataset)
     trial = [_scale(dataset, name, [fullest]) for name in fields]
     for count, side in _LADDER:
         chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
-        block = max(1, -(-max(dataset.sizes["x"], dataset.sizes["y"]) // side))
+        block = max(1, -(-max(dataset.sizes["x"], dataset.sizes["y"]) // (side * every)))
         one = sum(len(_map(dataset, scale, fullest, block)) for scale in trial)
         if one * len(chosen) > 1.1 * budget and (count, side) != _LADDER[-1]:
             continue
@@ -103,7 +105,8 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
             break
     return {
         "kept": dataset.sizes["time"],
-        "block": block,
+        "block": block * every,
+        "extremes": every > 1,
         "ratio": plane_ratio(dataset),
         "plane": _extent(dataset) + ("" if dataset is whole else ", as measured, without its mirror images"),
         "fields": [_scale_text(scale) for scale in scales],
@@ -118,11 +121,14 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
 
 
 def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
-    shown = [present(dataset, name, frame) for frame in chosen]
-    known = [one.values[np.isfinite(one.values)] for one in shown]
-    ends = [value_scale(name, values) for values in known]
+    ends, highest = [], -np.inf
+    for frame in chosen:
+        values = present(dataset, name, frame).values
+        values = values[np.isfinite(values)]
+        ends.append(value_scale(name, values))
+        highest = max(highest, values.max(initial=ends[0][0]))
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    beyond = any(values.max(initial=low) > high for values in known)
+    beyond = highest > high
     return _Scale(name, unit_for([low, high], VARIABLES[name].units), low, high if high > low else low + 1.0, beyond)
 
 
@@ -144,9 +150,10 @@ def _extent(dataset: xr.Dataset) -> str:
 def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
     """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, orange of others."""
     field = present(dataset, scale.name, frame)
-    touching = contact(dataset.isel(time=frame)) if {"pressure", "gap"} & set(dataset) else field < -np.inf
-    values = _in_blocks(field.transpose("y", "x").values, block)
-    share = _in_blocks(touching.transpose("y", "x").values.astype(float), block)
+    spots = touching(dataset, frame) if {"pressure", "gap"} & set(dataset) else field < -np.inf
+    extremes = stride(dataset) > 1  # what was coarsened for its extremes keeps them
+    values = in_blocks(field.transpose("y", "x").values, block, scale.name if extremes else "")
+    share = in_blocks(spots.transpose("y", "x").values.astype(float), block, "contact" if extremes else "")
     level = np.nan_to_num((values - scale.low) / (scale.high - scale.low))
     index = 2 + np.clip((level * _LEVELS).astype(int), 0, _LEVELS - 1)
     index[share == 0 if scale.name == "pressure" else share > 0.5] = _MARKED
@@ -154,19 +161,6 @@ def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
     picture = Image.fromarray(np.ascontiguousarray(index[::-1].astype(np.uint8)))
     picture.putpalette(_palette(scale.name))
     return _png(picture)
-
-
-def _in_blocks(values: np.ndarray, block: int) -> np.ndarray:
-    """Means over blocks of cells; missing cells take no part."""
-    if block == 1:
-        return values
-    widths = [(0, -n % block) for n in values.shape]
-    padded = np.pad(values, widths, constant_values=np.nan)
-    cells = padded.reshape(padded.shape[0] // block, block, padded.shape[1] // block, block)
-    known = np.isfinite(cells)
-    count = known.sum(axis=(1, 3))
-    total = np.where(known, cells, 0.0).sum(axis=(1, 3))
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _palette(name: str) -> bytes:
@@ -196,8 +190,8 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
         return None
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
-    surfaces = [deformed_surface(dataset, frame).isel(y=index).values for frame in chosen]
-    touching = [contact(dataset.isel(time=frame)).isel(y=index).values for frame in chosen]
+    surfaces = [deformed_line(dataset, frame, "y", index) for frame in chosen]
+    on_line = [contact(dataset.isel(time=frame, y=index)).values for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
     if not known.size:
@@ -215,7 +209,7 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
     return {
         "profile": _path(x[::every], up(height)[::every]),
         "surfaces": [_path(x[::every], up(one)[::every]) for one in surfaces],
-        "contacts": [_runs(x, up(height), one) for one in touching],
+        "contacts": [_runs(x, up(height), one) for one in on_line],
         "where": f"y = {plane.text(float(dataset['y'][index]))}",
         "label": f"Height: {unit.text(high - low)} from bottom to top",
     }
@@ -345,6 +339,10 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
             "contact_area",
             "mean_gap",
             "work",
+            "sliding_distance",
+            "friction_coefficient",
+            "leak_rate",
+            *CONDUCTANCES,
         )
         if name in dataset
     ]

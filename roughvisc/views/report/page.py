@@ -16,16 +16,20 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
-from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables.rows import rows_of
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
+from roughvisc.views.figures.coarsened import drawn
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
 from roughvisc.views.plot import area_against_load, figures_of, surface
+from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
-from roughvisc.views.sweep_figures.case_names import case_words, names_of, varied_texts
-from roughvisc.views.sweep_figures.case_text import material_words, program_words, study_text
+from roughvisc.views.sweep_figures.case_names import case_words, names_of
+from roughvisc.views.sweep_figures.case_text import friction_words, material_words, program_words, study_text
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 #: Size that all maps may have together. [bytes]
@@ -39,7 +43,17 @@ _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes in which a result speaks of its limits.
-_NOTES = ("material_note", "program_note", "accuracy_note", "slope_note", "border_note", "body_note")
+_NOTES = (
+    "model_note",
+    "material_note",
+    "program_note",
+    "slide_note",
+    "accuracy_note",
+    "octave_note",
+    "slope_note",
+    "border_note",
+    "body_note",
+)
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -117,7 +131,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 @contextmanager
 def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
     if isinstance(source, xr.Dataset):
-        require(source, "time", "x", "y")
+        require(source, rows_of(source), "x", "y")
         yield source
     else:
         with open_result(source) as dataset:
@@ -134,27 +148,36 @@ def _swept(folder: Path) -> list[dict[str, str]]:
 def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
+    curves: list[dict[str, Any]] = []  # studies of friction, which have no time to pick
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
     rows, views, figures, surfaces, studies, everything = [], [], [], {}, [], {}
+    names: set[str] = set()
     for number, source in enumerate(sources):
         with _opened(source) as dataset:
-            row = _row(dataset, source, number)
+            row = table_row(dataset, source, number) | {"study": _study(dataset)}
             rows.append(row)
-            if row["name"] in everything:
+            if row["name"] in names:
                 row["name"] += f" ({row['key'] or number + 1})"
-            everything[row["name"]] = _histories(dataset)
+            names.add(row["name"])
+            if "time" in dataset.dims:
+                everything[row["name"]] = _histories(dataset)
             if number not in pictured:
                 continue
-            row["view"] = len(views)
-            views.append({"number": number + 1, "title": row["name"], "key": row["key"], **frames_of(dataset, budget)})
-            studies.append(row["study"])
+            if "time" in dataset.dims:
+                row["view"] = len(views)
+                told = {"number": number + 1, "title": row["name"], "key": row["key"]}
+                views.append({**told, **frames_of(dataset, budget)})
+                studies.append(row["study"])
+            elif len(curves) < _DRAWN:
+                curves.append(row["study"])
             if len(sources) <= _DRAWN:
                 figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
             what = row["surface"]
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
     if len(everything) > 1:
-        figures = [_overview(everything), *swept, *figures]
+        figures = [_overview(everything), *figures]
+    figures = [*swept, *figures] if len(rows) > 1 else figures
     environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
     environment.lstrip_blocks = True
     return environment.get_template("report.html.jinja").render(
@@ -165,7 +188,9 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         varied=names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
         views=views,
-        studies=studies,
+        studies=[*studies, *curves],
+        curves=len(curves),
+        audited=any(study["audit"] for study in studies),
         bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
         figures=figures,
         surfaces=list(surfaces.values()),
@@ -203,88 +228,57 @@ def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
     """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
     of = f": {name}" if name else ""
     return [
-        {"title": kind.capitalize() + of, "src": figure_uri(figure)}
+        {"title": kind.capitalize().replace("_", " ") + of, "src": figure_uri(figure)}
         for kind, figure in figures_of(dataset, leave="surface")
     ]
 
 
-# ------------------------------------------------------------------------------------------------------- table
-
-
-def _row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
-    """One case in the table, and what reproduces it."""
-    case = json.loads(dataset.attrs.get("case", "{}"))
-    title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
-    words = case_words(case)
-    last = dataset.isel(time=-1)
-    status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
-    bad = int((status == NOT_CONVERGED).sum())
-    return {
-        "title": title,
-        "name": words or title,
-        "words": words,
-        "file": Path(source).name if isinstance(source, Path) else "",
-        "key": str(dataset.attrs.get("case_key", "")),
-        "varied": varied_texts(case),
-        "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
-        "times": dataset.sizes["time"],
-        "force": _largest(dataset, "force", "N"),
-        "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
-        "approach": _last(last, "approach", "m"),
-        "area": _last(last, "contact_area_corrected", "m^2"),
-        "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
-        "stated_error": _worst(dataset, "stated_error"),
-        "time_error": _worst(dataset, "time_error"),
-        "residual": _worst(dataset, "residual"),
-        "missed": _missed(dataset),
-        "status": f"{bad} of {len(status)} times not converged" if bad else "converged" if len(status) else "",
-        "bad": bool(bad),
-        "convolutions": f"{int(dataset['convolutions'].sum())}" if "convolutions" in dataset else "",
-        "wall_time": _last(last, "wall_time", "s"),
-        "surface": json.dumps(case.get("surface", {})) + str(dataset.attrs.get("surface_sha256", number)),
-        "study": _study(dataset, case),
-        "view": None,
-    }
-
-
-def _largest(dataset: xr.Dataset, name: str, si: str) -> str:
-    if name not in dataset:
-        return ""
-    value = float(dataset[name].max())
-    return unit_for([value], si).text(value)
-
-
-def _last(last: xr.Dataset, name: str, si: str) -> str:
-    return unit_for([float(last[name])], si).text(float(last[name])) if name in last else ""
-
-
-def _worst(dataset: xr.Dataset, name: str) -> str:
-    if name not in dataset or not np.isfinite(dataset[name]).any():
-        return "not known"
-    return f"{float(dataset[name].max()):.2g}"
-
-
-def _missed(dataset: xr.Dataset) -> bool:
-    """Whether the stated error is above the tolerance asked for."""
-    tolerance = dataset.attrs.get("tolerance")
-    if tolerance is None or "stated_error" not in dataset:
-        return False
-    return bool((dataset["stated_error"] > float(tolerance)).any())
-
-
-def _study(dataset: xr.Dataset, case: dict[str, Any]) -> dict[str, Any]:
+def _study(dataset: xr.Dataset) -> dict[str, Any]:
     """What was run and whence it came, for one case."""
-    told = ("source", "boundary", "tolerance", "method", "memory", "series_error", "transforms", "case_key")
+    case = json.loads(dataset.attrs.get("case", "{}"))
+    told = (
+        "source",
+        "direction",
+        "boundary",
+        "tolerance",
+        "method",
+        "memory",
+        "series_error",
+        "transforms",
+        "case_key",
+    )
     files = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
     return {
         "material": material_words(case["material"]) if "material" in case else "",
         "program": program_words(case["program"]) if "program" in case else [],
+        "friction": friction_words(case["friction"]) if "friction" in case else "",
         "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
         "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
         "notes": [str(dataset.attrs[key]) for key in _NOTES if key in dataset.attrs],
+        "audit": _audit(dataset),
         "history": str(dataset.attrs.get("history", "")).splitlines(),
         "toml": study_text(case) if case else "",
     }
+
+
+def _audit(dataset: xr.Dataset) -> list[dict[str, str]]:
+    """Rows of the table of assumptions; none of a Dataset that lacks what an audit starts from."""
+    try:
+        found = audit(dataset)
+    except InputError:
+        return []
+    return [
+        {
+            "name": one.name,
+            "assumed": one.limit.assumption,
+            "verdict": one.verdict,
+            "number": one.shown,
+            "limits": f"{one.limit.doubtful:g}, {one.limit.broken:g}",
+            "what": one.limit.number,
+            "sentence": one.sentence,
+        }
+        for one in found
+    ]
 
 
 # ----------------------------------------------------------------------------------------------------- surface
@@ -303,20 +297,25 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
         rows.append([name.replace("_", " "), attrs["long_name"], *text])
     filled = int(dataset["filled"].sum()) if "filled" in dataset else 0
     pictures = [figure_uri(_before_and_after(found, dataset, filled))] if before is not None else []
+    steps = found.steps
+    del found  # of a big surface no more is held than the next figure needs
     return {
         "name": str(dataset.attrs.get("source_file") or dataset.attrs.get("title", "surface")),
-        "steps": found.steps,
+        "steps": steps,
         "filled": filled,
         "method": str(dataset.attrs.get("fill_method", "")),
         "measured": before is not None,
         "unchanged": unchanged,
         "parameters": rows,
-        "pictures": [*pictures, figure_uri(surface(found.after))],
+        "pictures": [*pictures, figure_uri(surface(dataset))],
     }
 
 
 def _alike(before: xr.DataArray, after: xr.DataArray) -> bool:
-    return before.shape == after.shape and bool(np.allclose(before, after, rtol=1e-12, atol=0, equal_nan=True))
+    one, other = before.values, after.values
+    return one.shape == other.shape and all(
+        np.allclose(one[rows], other[rows], rtol=1e-12, atol=0, equal_nan=True) for rows in row_blocks(one.shape)
+    )
 
 
 def _parameter(value: xr.DataArray) -> str:
@@ -335,19 +334,21 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
     axes = figure.subplots(1, 2)
     heights = (found.before, found.after)
     for ax, height, title in zip(axes, heights, ("before", "as pressed"), strict=True):
-        height = (height - height.mean()).rename("height")
-        unit, plane = unit_for(height.quantile([0.005, 0.995]), "m"), plane_unit(height)
-        low, high = unit(height.quantile([0.005, 0.995]).values)
+        missing = height.size - count_of(height.values)
+        ends = np.array(percentiles_of(height.values, (0.5, 99.5))) - (mean := mean_of(height.values))
+        height = (drawn(height.rename("height")) - mean).rename("height")
+        unit, plane = unit_for(ends, "m"), plane_unit(height)
+        low, high = unit(ends)
         image = draw_map(ax, height, unit, plane, vmin=low, vmax=high if high > low else low + 1)
         figure.colorbar(image, ax=ax, aspect=18, pad=0.02, shrink=0.8, extend="both").set_label(unit.label("Height"))
         label_plane(ax, height, plane)
         ax.tick_params(direction="out")
-        missing = int(height.isnull().sum())
         ax.set_title(title + (f": {missing} points missing (grey)" if missing else ""))
     if filled:
-        places = np.argwhere(dataset["filled"].values)
+        marks = drawn(dataset["filled"].rename("contact"))  # a block of cells is marked where any of them is
+        places = np.argwhere(marks.values)
         plane = plane_unit(dataset)
-        x, y = plane(dataset["x"].values[places[:, 0]]), plane(dataset["y"].values[places[:, 1]])
+        x, y = plane(marks["x"].values[places[:, 0]]), plane(marks["y"].values[places[:, 1]])
         axes[1].plot(x, y, ".", color="#d55e00", ms=1.5, mew=0)
         axes[1].set_title(f"as pressed: {filled} points filled in (orange)")
     return figure

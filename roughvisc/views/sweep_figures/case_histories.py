@@ -12,7 +12,15 @@ from matplotlib.figure import Figure
 
 from roughvisc.views.figures.axes import TimeAxis, Unit, new_figure, styled
 from roughvisc.views.observables import history
-from roughvisc.views.sweep_figures.cases import Parameter, cases_of, combined, label_of, named_texts, quantity_unit
+from roughvisc.views.sweep_figures.cases import (
+    Parameter,
+    cases_of,
+    combined,
+    label_of,
+    named_texts,
+    quantity_unit,
+    without_zeros,
+)
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
 
 _MOST_PANELS = 9
@@ -113,7 +121,8 @@ def _outer_labels(panels: np.ndarray, count: int, columns: int) -> None:
 def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
     """A quantity over every accepted step, or over the kept times if it is known at these alone."""
     steps = history(member)
-    return steps[quantity] if quantity in steps else member[quantity]
+    line = steps[quantity] if quantity in steps else member[quantity]
+    return line.copy(data=without_zeros(quantity, line.values))
 
 
 def _numbered(count: int) -> Parameter:

@@ -98,6 +98,16 @@ def material_words(material: Mapping[str, Any]) -> str:
     return ", ".join([str(material.get("model", "?")).replace("_", " "), *rest, *tables])
 
 
+def friction_words(friction: Mapping[str, Any]) -> str:
+    """What a case asks of steady sliding, in one line."""
+    speeds = friction.get("speeds", [])
+    ends = [unit_for([one], "m/s").text(one, 4) for one in (speeds[0], speeds[-1])] if speeds else []
+    said = [f"{len(speeds)} speeds, {' to '.join(dict.fromkeys(ends))}"]
+    for key in ("load", "pressure"):
+        said += [f"{key} {readable_setting(f'friction.{key}', friction[key])}"] if key in friction else []
+    return ", ".join([*said, f"along {friction.get('direction', 'x')}"])
+
+
 def program_words(segments: list[Mapping[str, Any]]) -> list[str]:
     """Loading program of a case, a line a segment."""
     return [

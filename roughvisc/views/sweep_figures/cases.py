@@ -16,10 +16,13 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_names import names_of
 from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, setting_unit
 
+#: Quantities that span decades, and of which zero means that there is none.
+_SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")
 _NO_PARAMETERS = ("case", "case_key")
 
 
@@ -124,7 +127,7 @@ class Cases:
     Parameters
     ----------
     members : list of xarray.Dataset
-        Histories of each case over its own times, and over its steps.
+        Histories of each case over its own times and over its steps, or over its speeds.
     parameters : list of Parameter
         What was varied, but what says the same as one before it.
     """
@@ -189,7 +192,7 @@ def cases_of(results: Any) -> Cases:
         columns = {name: found for name, found in columns.items() if len(found) == len(members)}
         parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
-        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "step"}]
+        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "speed", "step"}]
         table = results[held].load()
         members = [table.isel(case=i) for i in range(results.sizes["case"])]
         on_case = [one for one in results.coords.values() if one.dims == ("case",) and one.name not in _NO_PARAMETERS]
@@ -203,7 +206,7 @@ def cases_of(results: Any) -> Cases:
     found = [
         (key, values, str(source.attrs.get("units") or unit_of(key))) for key, (values, source) in parameters.items()
     ]
-    return Cases(members, list(_independent(found)))
+    return Cases([_finite(member) for member in members], list(_independent(found)))
 
 
 def _key(coordinate: xr.DataArray) -> str:
@@ -213,9 +216,15 @@ def _key(coordinate: xr.DataArray) -> str:
 
 
 def _histories(dataset: xr.Dataset) -> xr.Dataset:
-    """What a case has over time and over its steps, in memory."""
-    held = [name for name in dataset.data_vars if dataset[name].dims in (("time",), ("step",))]
+    """What a case has over time or speed, and over its steps, in memory."""
+    held = [name for name in dataset.data_vars if dataset[name].dims in (("time",), ("speed",), ("step",))]
     return dataset[held].load()
+
+
+def _finite(member: xr.Dataset) -> xr.Dataset:
+    """A case in which what is infinite, the conductance of full contact, is missing: it has no place on an axis."""
+    known = {name: member[name].where(np.isfinite(member[name])) for name in CONDUCTANCES if name in member}
+    return member.assign(known) if known else member
 
 
 def middle_of_decades(values: np.ndarray) -> np.ndarray:
@@ -270,6 +279,11 @@ def quantity_unit(cases: Cases, quantity: str, values) -> Unit:
         return Unit(0.01, "%")
     declared = VARIABLES[quantity].units if quantity in VARIABLES else ""
     return unit_for(middle_of_decades(np.ravel(values)), str(cases.members[0][quantity].attrs.get("units", declared)))
+
+
+def without_zeros(quantity: str, values: np.ndarray) -> np.ndarray:
+    """Values as they are drawn: a leak rate spans decades, and where nothing leaks it has no place among them."""
+    return np.where(values > 0, values, np.nan) if quantity in _SPANNING else values
 
 
 def label_of(cases: Cases, quantity: str, unit: Unit) -> str:

@@ -17,10 +17,13 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result, whole_file
+from roughvisc.variables.rows import rows_of
+from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import verbatim
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.case_names import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
+from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
 from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of
 
 
@@ -58,13 +61,19 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
     """
     cases = cases_of(results)
     loading = "force" if cases.alike_in_size else "nominal_pressure"
-    held = [name for name in (cases.area, "approach", loading) if _holds(cases, name)]
+    observed = ("leak_rate", *CONDUCTANCES)
+    held = [name for name in (cases.area, "approach", loading, *observed) if _holds(cases, name)]
     for name in held:
         if cases.parameters and not _known_before(cases, name):
             yield _FILES.get(name, name), f"{_word(name)} against what was varied", sweep(results, name)
-    if held:
-        first = held[0]
-        yield "histories", f"{_word(first)} over time, a line a case", histories_of_cases(results, first)
+    for name in (*held[:1], *(one for one in held if one in observed)):
+        kind = "histories" if name == held[0] else f"{name}-histories"
+        yield kind, f"{_word(name)} over time, a line a case", histories_of_cases(results, name)
+    if all(rows_of(member) == "speed" for member in cases.members):
+        yield "friction", "Friction and contact area against the speed, a line a case", friction_of_cases(results)
+        if _is_shifted(cases):
+            title = "The same against the speed times the shift factor: a master curve"
+            yield "master", title, friction_of_cases(results, reduced=True)
 
 
 def _word(name: str) -> str:
@@ -73,6 +82,13 @@ def _word(name: str) -> str:
 
 def _holds(cases: Cases, name: str) -> bool:
     return all(name in member and member[name].dims == ("time",) for member in cases.members)
+
+
+def _is_shifted(cases: Cases) -> bool:
+    """Whether the materials of curves of friction are shifted in time, by a temperature."""
+    told = [member for member in cases.members if "reduced_speed" in member]
+    shifted = any(not np.allclose(member["reduced_speed"], member["speed"]) for member in told)
+    return shifted and len(told) == len(cases.members)
 
 
 def _known_before(cases: Cases, name: str) -> bool:
@@ -87,7 +103,10 @@ def _known_before(cases: Cases, name: str) -> bool:
 def save_sweep_figures(
     results: xr.Dataset | xr.DataTree, folder: Any, *, suffix: str = ".png", dpi: float = 200.0
 ) -> list[Path]:
-    """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``.
+    """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``,
+    and what was observed alike.
+
+    Of curves of friction ``sweep-friction.png`` and, where temperatures shift them, ``sweep-master.png``.
 
     Where the surfaces differ in size, areas are fractions of theirs, and forces nominal pressures.
 

@@ -21,7 +21,15 @@ from roughvisc.views.figures.axes import (
     styled,
     time_text,
 )
-from roughvisc.views.sweep_figures.cases import Cases, Parameter, cases_of, combined, label_of, quantity_unit
+from roughvisc.views.sweep_figures.cases import (
+    Cases,
+    Parameter,
+    cases_of,
+    combined,
+    label_of,
+    quantity_unit,
+    without_zeros,
+)
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
 from roughvisc.views.sweep_figures.maps import draw_maps, positions, set_parameter_axis
 
@@ -84,6 +92,7 @@ def sweep(
         raise InputError(f"a map needs two parameters that vary: found {', '.join(p.key for p in cases.parameters)}")
     frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
     values = np.array([[float(m[quantity][f]) for m, f in zip(cases.members, row, strict=True)] for row in frames])
+    values = without_zeros(quantity, values)
     titles = [_title(cases, row) for row in frames]
     if times is None and len(frames) == 1 and not _all_last(cases, frames[0]):
         titles = [f"{titles[0]}, where the cases differ most"]

@@ -173,6 +173,7 @@ def test_default_client__computes_cases_and_sweeps(study, tmp_path, monkeypatch)
 # workers that are lost
 
 
+@pytest.mark.long
 def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
     cases = study(LONG + LOADS)
     wanted = {}

@@ -45,7 +45,7 @@ def study(tmp_path, scan):
 
 def after_the_first(monkeypatch, change):
     """Changes something when the first case has been computed."""
-    press, pressed = run_module.press, []
+    press, pressed = run_module.carry_out, []
 
     def pressing(*args, **settings):
         ds = press(*args, **settings)
@@ -54,7 +54,7 @@ def after_the_first(monkeypatch, change):
         pressed.append(1)
         return ds
 
-    monkeypatch.setattr(run_module, "press", pressing)
+    monkeypatch.setattr(run_module, "carry_out", pressing)
     return pressed
 
 

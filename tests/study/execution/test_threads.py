@@ -23,7 +23,7 @@ print(len({float(ds.pressure.max()) for ds in found}))
 """
 
 
-@pytest.mark.parametrize("count", [16, pytest.param(400, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [8, pytest.param(400, marks=pytest.mark.long)])
 def test_run__in_four_threads(tmp_path, count):
     loads = ", ".join(f'"{4 + 0.01 * number} mN"' for number in range(count))
     (tmp_path / "balls.toml").write_text(f'{SMALL}[sweep]\n"program.0.load" = [{loads}]\n')

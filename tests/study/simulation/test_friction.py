@@ -5,7 +5,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.materials import frequency
-from roughvisc.variables import SLIDING, STATUS_MEANINGS
+from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.variables.sliding import SLIDING
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)

@@ -9,7 +9,8 @@ import pytest
 import roughvisc as rv
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, stated
 from roughvisc.study.simulation.scene import Ground, prepare
 from roughvisc.study.statement.settings import Settings
@@ -103,6 +104,7 @@ def judged(*, soft=False, fixed=None, since=1.0, step=0.5, entered=False, contro
         remembers=True,
         tolerance=0.1,
         time_step=fixed,
+        motions=(),
         program=SimpleNamespace(duration=7.0),
         is_soft=lambda length: soft and length == 7.0,
     )

@@ -10,7 +10,8 @@ import roughvisc as rv
 from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.statement.identity import identity
-from roughvisc.views.console.tables import plan_tables, result_table
+from roughvisc.views.console.result_tables import result_table
+from roughvisc.views.console.tables import plan_tables
 
 RUBBER = rv.elastic(shear_modulus=1e6)
 STUDY = """

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.contact.neighbours import PERIMETER_CORRECTION
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation.neighbours import PERIMETER_CORRECTION
 from roughvisc.study.simulation.rows import _staircase
 from roughvisc.study.simulation.scene import Ground
 

@@ -333,6 +333,7 @@ def test_kept_rows__hold_nothing_but_what_they_keep(size, monkeypatch):
     assert all(array.base is None for array in kept)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts the page faults of Linux")
 def test_freed_memory__is_used_again(tmp_path):
     """In a process of its own, whose C library is as it comes."""

@@ -433,8 +433,8 @@ generate = "sphere"  =>  generat = "sphere"
     'generate'?
 
 load = "2 N"  =>  laod = "2 N"
-| program.0: found a table with laod, over: expected exactly one of load, approach, pressure, hold, cycle, table; did
-    you mean 'load'?
+| program.0: found a table with laod, over: expected exactly one of load, approach, pressure, hold, slide, cycle, table;
+    did you mean 'load'?
 
 hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
 | program.1.control: found 'force': expected 'load', 'approach' or 'pressure'
@@ -447,7 +447,7 @@ hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
 title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | 2 problems
 | - solve.boundary: found 'periodc': expected 'free' or 'periodic'; did you mean 'periodic'?
-| - x: unknown key: expected one of title, surface, material, program, solve, keep
+| - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit
 
 [surface]  =>  [keep]\nfields = ['presure']\n[surface]
 | keep.fields: found 'presure', which is no field; did you mean 'pressure'?
@@ -542,7 +542,7 @@ def test_read_study__refuses_a_program_of_another_kind(study):
         "program: found a table with load: expected a list of [[program]] tables, at least one"
     )
     assert refusal(study(BALL.split("[[program]]")[0])) == (
-        "program: missing: expected a list of [[program]] tables, at least one"
+        "program: missing: expected a list of [[program]] tables, at least one, or a table [friction]"
     )
     message = refusal(
         study(
@@ -696,7 +696,8 @@ def test_study_schema__names_every_model_and_recipe():
     schema = study_schema()
     text = json.dumps(schema)
     assert all(f'"{name}"' in text for name in (*MODELS, *RECIPES))
-    assert {"surface", "material", "program"} <= set(schema["required"])
+    assert {"surface", "material"} <= set(schema["required"])
+    assert {"program", "friction"} <= set(schema["properties"])
 
 
 def test_recipes__are_those_of_surface_cards():

@@ -42,7 +42,7 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
     signature = inspect.signature(rv.simulate).parameters
     given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
     # of the thickness and what the sheet lies on comes the kernel
-    assert given == USUAL | {"thickness": None, "base": None, "progress": True}
+    assert given == USUAL | {"thickness": None, "base": None, "threads": None, "progress": True}
     solve, keep = SolveSection(), KeepSection()
     assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
     assert (keep.fields, keep.times) == (USUAL["fields"], "all")

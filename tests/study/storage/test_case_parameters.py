@@ -9,8 +9,10 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.statement.schema import Study
+from roughvisc.study.statement.schema.friction import FrictionSection
 from roughvisc.study.storage.parameters import identifier, labels_of_case
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.sliding import SLIDING
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
 SWEEP = """
@@ -103,8 +105,10 @@ def test_open_results__reads_files_without_labels(folder, tmp_path):
 
 
 def test_labels__are_apart_from_all_variables():
-    tables = {f"{name}_" for name in Study.model_fields}
-    assert not [name for name in VARIABLES if any(name.startswith(table) for table in tables)]
+    tables = {f"{name}_" for name in Study.model_fields if name != "friction"}
+    names = {*VARIABLES, *SLIDING}
+    assert not [name for name in names if any(name.startswith(table) for table in tables)]
+    assert not names & {f"friction_{key}" for key in FrictionSection.model_fields}
     assert not {*VARIABLES} & {*Study.model_fields}
 
 

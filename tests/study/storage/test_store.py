@@ -9,6 +9,7 @@ from sample_results import hertz_creep, rough_creep
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.storage import store
+from roughvisc.study.storage.encoding import MAY_BE_MISSING
 from roughvisc.study.storage.store import open_result, whole_file, write_result
 
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
@@ -29,7 +30,7 @@ def test_missing__is_declared_where_it_occurs():
         assert all(ds[name].isnull().all() for name in missing), "throughout"
         found |= missing
     assert found == MISSING | MISSING_AT_STEPS
-    assert found <= store.MAY_BE_MISSING
+    assert found <= MAY_BE_MISSING
 
 
 def test_write_result__gives_the_same_numbers_back(tmp_path):

@@ -89,3 +89,115 @@ def test_friction__refuses_what_is_no_friction_result(other, message):
 def test_friction__refuses_the_theory_where_it_is_not_in_the_result():
     with pytest.raises(rv.InputError, match="'persson_contact_fraction' over the speed"):
         rv.plot.friction(curve().drop_vars("persson_contact_fraction"), persson=True)
+
+
+def test_friction__draws_the_grids_error_and_what_the_last_octave_adds_where_these_are_told():
+    told = {
+        "grid_error_friction": [0.1, 0.5, np.nan],
+        "grid_error_area": [0.1, 0.1, 0.1],
+        "last_octave_friction": [0.25, 0.5, 0.1],
+        "last_octave_area": [-0.01, -0.02, 0.0],
+    }
+    figure = rv.plot.friction(annotate(curve().assign({name: ("speed", one) for name, one in told.items()})))
+    left, right = figure.axes
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "computed",
+        "error of the grid",
+        "without the shortest octave of waves",
+    ]
+    (band,) = left.collections
+    points = np.concatenate([path.vertices for path in band.get_paths()])
+    assert points[:, 1].max() == pytest.approx(0.3 * 1.1)
+    assert (points[:, 1] >= 0).all()
+    (dashed,) = [line for line in left.lines if line.get_linestyle() == "--"]
+    np.testing.assert_allclose(dashed.get_ydata(), [0.005, 0.18, 0.225])
+    assert not [line for line in right.lines if line.get_linestyle() == "--"], "two per cent are not worth a line"
+    boxes = text_boxes(figure)
+    assert not any(box.overlaps(other) for i, (_, box) in enumerate(boxes) for _, other in boxes[i + 1 :])
+
+
+def sliding(direction="x"):
+    """Pressures of three speeds, not in order, on a surface twice as long as wide."""
+    fields = np.zeros((3, 8, 4))
+    for row, cells in enumerate((2, 6, 4)):
+        fields[row, 1 : 1 + cells, 1:3] = 1e5 * (1 + row)
+    axes = {"x": (np.arange(8) + 0.5) * 1e-4, "y": (np.arange(4) + 0.5) * 1e-4}
+    found = curve().assign(friction_coefficient=("speed", [0.1, 0.01, 0.2]))
+    found = found.assign(pressure=(("speed", "x", "y"), fields), height=(("x", "y"), np.zeros((8, 4))))
+    found = annotate(found.assign_coords(axes))
+    return found.assign_attrs(direction=direction)
+
+
+@pytest.mark.parametrize(("direction", "arrow"), [("x", "→"), ("-x", "←"), ("y", "↑"), ("-y", "↓")])
+def test_friction_maps__are_of_low_peak_and_high_speed_with_the_motion(direction, arrow):
+    figure = rv.plot.friction_maps(sliding(direction))
+    panels = [ax for ax in figure.axes if ax.get_title()]
+    assert [ax.get_title() for ax in panels] == [
+        f"{arrow} V = 20 µm/s\nµ = 0.01",
+        f"{arrow} V = 200 µm/s\nµ = 0.2",
+        f"{arrow} V = 2 mm/s\nµ = 0.1",
+    ]
+    drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in panels]
+    assert [int((one > 0).sum()) for one in drawn] == [12, 8, 4], "in the order of the speed"
+    assert panels[0].images[0].get_array().shape == (4, 8), "x to the right"
+
+
+def test_friction_maps__of_speeds_that_are_asked_for():
+    figure = rv.plot.friction_maps(sliding(), [1e-3, 3e-5])
+    assert [ax.get_title().split("\n")[0] for ax in figure.axes if ax.get_title()] == ["→ V = 20 µm/s", "→ V = 2 mm/s"]
+    small = sliding()
+    small["friction_coefficient"][:] = [0.3, 3.2e-5, 0.2]
+    assert r"µ = 3.2$\times 10^{-5}$" in rv.plot.friction_maps(small, 2e-5).axes[0].get_title()
+    for speeds in ([], [-1.0], [1.0] * 13):
+        with pytest.raises(rv.InputError, match="expected 1 to 12 positive numbers"):
+            rv.plot.friction_maps(sliding(), speeds)
+    with pytest.raises(rv.InputError, match="holds no 'pressure'"):
+        rv.plot.friction_maps(sliding().drop_vars("pressure"))
+
+
+def several(shift=(1.0, 100.0)):
+    """Two cases of one curve at two temperatures."""
+    cases = [curve().assign_coords(speed=SPEEDS / factor) for factor in shift]
+    stacked = {name: (("case", "speed"), np.array([one[name].values for one in cases])) for name in cases[0].data_vars}
+    found = xr.Dataset(stacked, coords={"speed": SPEEDS}).assign(
+        reduced_speed=(("case", "speed"), np.outer(shift, SPEEDS)),
+        contact_area=2.0 * xr.DataArray(stacked["contact_fraction"][1], dims=("case", "speed")),
+    )
+    found = annotate(found)
+    kelvin = {"long_name": "material.temperature", "units": "K"}
+    return found.assign_coords(material_temperature=("case", np.array([293.0, 313.0]), kelvin))
+
+
+def test_friction_of_cases__has_a_line_a_case_and_a_legend():
+    figure = rv.plot.friction_of_cases(several())
+    friction, area = figure.axes
+    full = [line for line in friction.lines if line.get_linestyle() == "-"]
+    assert [line.get_ydata().tolist() for line in full] == [[0.01, 0.2, 0.3]] * 2
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["293 K", "313 K", "not converged"]
+    assert (friction.get_xlabel(), friction.get_ylabel()) == ("Speed [µm/s]", "Friction coefficient")
+    assert (friction.get_xscale(), friction.get_ylim()[0], area.get_ylim()[0]) == ("log", 0, 0)
+    boxes = text_boxes(figure)
+    assert not any(box.overlaps(other) for i, (_, box) in enumerate(boxes) for _, other in boxes[i + 1 :])
+
+
+def test_friction_of_cases__against_the_reduced_speed():
+    friction, _ = rv.plot.friction_of_cases(several(), reduced=True).axes
+    at = [line.get_xdata() for line in friction.lines if line.get_linestyle() == "-"]
+    np.testing.assert_allclose(at[1], 100 * at[0])
+    assert "a_T V" in friction.get_xlabel()
+    with pytest.raises(rv.InputError, match="with 'reduced_speed' over the speed in every case"):
+        rv.plot.friction_of_cases(several().drop_vars("reduced_speed"), reduced=True)
+
+
+def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shifted(tmp_path, coarse_pictures):
+    def drawn(results):
+        return [path.name for path in rv.plot.save_sweep_figures(results, tmp_path)]
+
+    assert drawn(several()) == ["sweep-friction.png", "sweep-master.png"]
+    assert drawn(several((1.0, 1.0))) == ["sweep-friction.png"]
+
+
+def test_figures_over_time__refuse_a_curve_in_plain_words():
+    for draw in (rv.plot.history, rv.plot.maps, rv.plot.section):
+        with pytest.raises(rv.InputError, match="lies over the speed of steady sliding: expected a history over time"):
+            draw(sliding())

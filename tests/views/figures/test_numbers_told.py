@@ -61,7 +61,7 @@ FIGURES = {
     ),
     "distributions": (lambda ds: plot.distributions(ds, TIMES), lambda ds: TIMES),
     "clusters": (lambda ds: plot.contact_clusters(ds, TIMES), lambda ds: TIMES),
-    "area_against_load": (plot.area_against_load, lambda ds: [0.09]),
+    "area_against_load": (plot.area_against_load, lambda ds: [0.09, 0.09]),
     "first picture of a film": (first_picture, lambda ds: [0.0, line(ds, int(np.argmax(ds.contact_area.values)))]),
 }
 

@@ -19,7 +19,7 @@ from support import labels, lines, text_boxes
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography.parameters import levelled_parameters
-from roughvisc.views import plot
+from roughvisc.views import observables, plot
 from roughvisc.views.figures import animate as animation
 from roughvisc.views.figures import axes, sections
 
@@ -43,14 +43,29 @@ def first_picture(dataset):
     return animation._moving(dataset, None, 3)[0]
 
 
-FIGURES = {name: entry[0] for name, entry in plot.FIGURES.items()}
+def without_absent(dataset):
+    """A result whose absent cells are closed: what a fluid does there is not known, and leakage is refused."""
+    return dataset.assign(gap=dataset["gap"].fillna(0.0))
+
+
+#: those of a history; of curves of friction: test_friction_figure.py, and of slides: test_friction_distance.py
+APART = {"speed", "sliding_distance"}
+OVER_TIME = [name for name, (_, needed, _) in plot.FIGURES.items() if not APART & {*needed}]
+FIGURES = {name: plot.FIGURES[name][0] for name in OVER_TIME}
+FIGURES["leakage"] = lambda dataset: plot.leakage(without_absent(dataset))
+FIGURES["conductance"] = lambda dataset: plot.conductance(dataset.merge(observables.conductance(dataset, (5.0, 0))))
+FIGURES["film of the flow"] = lambda dataset: animation._moving(without_absent(dataset), "flux", 2)[0]
 FIGURES |= {"area_against_load": plot.area_against_load, "animate": first_picture}
 
 
 #: figures whose layout depends on the proportions of the map
-OF_THE_PLANE = ("maps", "section", "surface", "animate")
+OF_THE_PLANE = ("maps", "section", "surface", "animate", "leakage", "film of the flow")
+#: samples that are told apart by figures that solve for a flow
+FLOWS = {"leakage": ("rough", "one frame", "24 decades", "thin strip", "thin pillar"), "film of the flow": ("rough",)}
+FLOWS["conductance"] = ("rough", "one frame", "24 decades")
 DRAWN = [(name, sample) for name in FIGURES for sample in SAMPLES]
 DRAWN = [(name, sample) for name, sample in DRAWN if name in OF_THE_PLANE or not sample.endswith(("strip", "pillar"))]
+DRAWN = [(name, sample) for name, sample in DRAWN if sample in FLOWS.get(name, SAMPLES)]
 
 
 @pytest.mark.parametrize(("name", "sample"), DRAWN)
@@ -66,6 +81,7 @@ def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
         assert inside, f"{text!r} runs off the figure"
     for label in labels(figure):
         bare = label in ("Rel. error", "Per kept time", "Contact clusters", "Clusters at least as large")
+        bare |= label == "Flux over its largest at that time"
         assert bare or label.endswith("]"), label
 
 
@@ -217,6 +233,24 @@ def test_area_against_load__one_line_a_case_and_the_low_load_line():
     slopes = [(ds["height"].roll({name: -1}) - ds["height"]) / step for name, step in steps.items()]
     slope = float(np.sqrt((slopes[0] ** 2 + slopes[1] ** 2).mean()))
     np.testing.assert_allclose(1e-6 * y, np.sqrt(2 * np.pi) * x / (4e6 * slope))
+
+
+def test_conductance__is_drawn_with_its_error_and_estimates():
+    ds = made.rough_creep()
+    whole = ds.merge(observables.conductance(ds, ("5 K m/W", 0)))
+    (ax,) = plot.conductance(whole).axes
+    drawn = lines(ax)
+    assert set(drawn) == {"computed, with its error", "Holm", "Greenwood"}
+    scale = drawn["Holm"].get_ydata()[-1] / float(whole["thermal_conductance_holm"][-1])
+    np.testing.assert_allclose(
+        drawn["computed, with its error"].get_ydata(), scale * whole["thermal_conductance"], rtol=1e-9
+    )
+    assert len(plot.conductance(whole.merge(observables.conductance(ds, ("1 ohm m", 0)))).axes) == 2
+    full = whole.copy(deep=True)
+    full["thermal_conductance"][-1] = np.inf
+    assert np.isnan(lines(plot.conductance(full).axes[0])["computed, with its error"].get_ydata()[-1])
+    with pytest.raises(InputError, match="holds no conductance"):
+        plot.conductance(ds)
 
 
 def test_area_against_load__cases_in_many_shapes():
@@ -468,7 +502,7 @@ def test_surface__of_points_that_determine_no_plane():
 def test_save_figures__writes_what_the_result_allows(tmp_path):
     ds = made.hertz_creep(shape=(21, 16))
     written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)
-    told = [name for name in plot.FIGURES if name not in ("clusters", "hysteresis")]
+    told = [name for name in OVER_TIME if name not in ("clusters", "hysteresis", "leakage", "conductance")]
     assert [path.name for path in written] == [f"sphere-{name}.png" for name in told], "one spot, and no way back"
     assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == sorted(path.name for path in written)
     for path in written:
@@ -625,3 +659,23 @@ def test_maps_and_section__of_a_mirrored_surface_show_what_was_measured():
     assert plot.maps(ds).axes[0].get_images()[0].get_array().shape == (16, 22)
     profiles = [plot.section(one).axes[1].lines[0].get_xdata() for one in (whole, ds)]
     assert [len(x) for x in profiles] == [11, 22]
+
+
+def test_leakage__lakes_are_white_and_contact_is_grey():
+    gap = np.full((2, 6, 5), 1e-6)
+    gap[:, :, 1] = 0.0
+    gap[:, [0, 5], 0] = 0.0  # a lake is left between them
+    gap[1, 3] = 0.0
+    axes = {"time": [1.0, 2.0], "x": 1e-6 * np.arange(6), "y": 1e-6 * np.arange(5)}
+    figure = plot.leakage(xr.Dataset({"gap": (("time", "x", "y"), gap)}, axes))
+    assert figure.axes[0].get_title(loc="right") == "closes between 1 and 2 s"
+    (image,) = figure.axes[1].images
+    colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
+    assert np.allclose(colours[2, 1], 0.6), "contact"
+    assert np.allclose(colours[2, 0], 1.0), "a lake"
+    assert colours[2, 3].min() < 0.5, "the channel"
+    closed = plot.leakage(xr.Dataset({"gap": (("time", "x", "y"), gap)}, axes), time=-1)
+    (image,) = closed.axes[1].images
+    colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
+    assert np.allclose(colours[gap[1] > 0], 1.0)
+    assert np.allclose(colours[gap[1] == 0], 0.6)

@@ -202,22 +202,32 @@ def test_area_growth__prefers_the_corrected_area():
     np.testing.assert_allclose(observables.area_growth(ds)["area_growth_exponent"], 2.0)
 
 
-def test_stiffness__of_hertz_converges_at_order_two():
+def test_secant_stiffness__of_hertz_converges_at_order_two():
     def error(count):
         approach = np.linspace(0.5, 1.0, count) ** 2
         ds = histories(np.arange(count), force=approach**1.5, approach=approach)
-        found = observables.stiffness(ds)["contact_stiffness"].values
+        found = observables.secant_stiffness(ds)["secant_stiffness"].values
         return np.abs(found / (1.5 * approach**0.5) - 1)[1:-1].max()
 
     assert np.log2(error(21) / error(41)) > 1.9
 
 
-def test_stiffness__turning_and_standing_still():
+def test_secant_stiffness__turning_and_standing_still():
     ds = histories(np.arange(5), force=[0.0, 2.0, 1.0, 1.0, 0.5], approach=[0.0, 1.0, 0.5, 0.5, 0.5])
-    found = observables.stiffness(ds)["contact_stiffness"]
+    found = observables.secant_stiffness(ds)["secant_stiffness"]
     np.testing.assert_allclose(found, [2.0, 2.0, 2.0, np.nan, np.nan])
     assert found.attrs["units"] == "N/m"
-    assert np.isnan(observables.stiffness(ds.isel(time=[0]))["contact_stiffness"]).all()
+    assert np.isnan(observables.secant_stiffness(ds.isel(time=[0]))["secant_stiffness"]).all()
+
+
+def test_stiffness__warns_and_is_what_it_was():
+    ds = histories(np.arange(3), force=[0.0, 1.0, 4.0], approach=[0.0, 1.0, 2.0])
+    with pytest.warns(FutureWarning, match="now secant_stiffness"):
+        older = observables.stiffness(ds)["contact_stiffness"]
+    newer = observables.secant_stiffness(ds)["secant_stiffness"]
+    assert np.array_equal(older, newer)
+    assert older.attrs["long_name"] == "older name of secant_stiffness"
+    assert np.array_equal(observables.observe(ds)["contact_stiffness"], newer)
 
 
 def test_work__of_a_closed_loop_is_the_area_in_it():
@@ -234,7 +244,7 @@ def test_observe__everything_lazily_and_alike_on_dask(make):
     lazy = observables.observe(ds.chunk(time=2, x=20))
     assert all(isinstance(lazy[name].data, dask.array.Array) for name in lazy.data_vars)
     xr.testing.assert_allclose(lazy.compute(scheduler="synchronous"), eager)
-    expected = {"cluster_count", "percolates_x", "gap_median", "contact_stiffness", "trapezoidal_work"}
+    expected = {"cluster_count", "percolates_x", "gap_median", "secant_stiffness", "trapezoidal_work"}
     assert expected <= set(eager.data_vars)
     for name in eager.data_vars:
         assert eager[name].attrs["long_name"]

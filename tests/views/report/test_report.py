@@ -164,7 +164,7 @@ def test_map__has_x_to_the_right_and_y_upwards():
     assert np.argwhere(picture != 1).tolist() == [[20 - 1 - 3, 27]]
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(50, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [pytest.param(10, marks=pytest.mark.long), pytest.param(50, marks=pytest.mark.long)])
 def test_fifty_cases__stay_below_ten_megabytes(tmp_path, monkeypatch, count):
     """Ten of them, with a fifth of what all maps may have, below a fifth of the size."""
     monkeypatch.setattr("roughvisc.views.report.page._MAPS", _MAPS * count // 50)

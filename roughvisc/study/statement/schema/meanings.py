@@ -24,8 +24,13 @@ _TABLES = {
     **{one.__name__: (f"program: {kind}",) for kind, sections in KINDS.items() for one in sections.values()},
     **{f"{control.capitalize()}Wave": ("program.cycle",) for control in RECORDINGS},
     "Crop": ("surface.crop",),
+    "FrictionSection": ("friction",),
     "SolveSection": ("solve",),
     "KeepSection": ("keep",),
+    "ObserveSection": ("observe",),
+    "LeakageTable": ("observe.leakage",),
+    "ConductanceTable": ("observe.conductance",),
+    "AuditSection": ("audit",),
 }
 
 

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, WrapValidator, model_validator
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import INSTEAD, Program
+from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.segment import Control
+from roughvisc.mechanics.stepping.words import INSTEAD
 from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, shown, word_or
@@ -21,6 +22,8 @@ APPROACH = measured("m", instead=INSTEAD["approach"])
 PRESSURE = measured("Pa", least=0, instead=INSTEAD["pressure"])
 DURATION = measured("s", least=0)
 PERIOD = measured("s", above=0)
+DISTANCE = measured("m", above=0)
+SPEED = measured("m/s", above=0)
 INSTANTS = listed(measured("s", least=0), "times [s]")
 
 
@@ -75,6 +78,21 @@ class HoldSegment(SegmentSection):
 
     def extend(self, program: Program) -> Program:
         return program.hold(self.hold, self.control)
+
+
+class SlideSegment(SegmentSection):
+    """Slide the profile along the surface at constant speed; what is controlled keeps the value it has."""
+
+    slide: DISTANCE
+    speed: SPEED | None = None
+    over: PERIOD | None = None
+    direction: choice("x", "-x", "y", "-y") = "x"
+
+    def extend(self, program: Program) -> Program:
+        if (self.speed is None) == (self.over is None):
+            found = "neither" if self.speed is None else "both"
+            raise InputError(f"a slide has a speed, or a time over which it goes: found {found}, expected one of them")
+        return program.slide(self.slide, speed=self.speed, over=self.over, direction=self.direction)
 
 
 class LoadWave(Section):
@@ -277,6 +295,7 @@ KINDS: dict[str, dict[str, type[SegmentSection]]] = {
     "approach": {"load": ApproachSegment},
     "pressure": {"load": PressureSegment},
     "hold": {"load": HoldSegment},
+    "slide": {"load": SlideSegment},
     "cycle": {"load": LoadCycle, "approach": ApproachCycle, "pressure": PressureCycle},
     "table": {"load": LoadTable, "approach": ApproachTable, "pressure": PressureTable},
 }
@@ -291,7 +310,7 @@ def _pick(data: Any, _: Any, info: Any) -> Any:
         raise InputError(f"found {shown(data)}: expected a table")
     kinds = [key for key in KINDS if key in data]
     if len(kinds) != 1:
-        hints = [close(key, KINDS) for key in data if key not in (*KINDS, "over", "control")]
+        hints = [close(key, KINDS) for key in data if key not in (*KINDS, "over", "control", "speed", "direction")]
         hint = "" if kinds else next(filter(None, hints), "")
         raise InputError(f"found {shown(data)}: expected exactly one of {', '.join(KINDS)}{hint}")
     choice = KINDS[kinds[0]]

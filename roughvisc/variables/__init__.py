@@ -1,51 +1,22 @@
 """The vocabulary: every variable that a result Dataset may hold or that is derived from one, declared once.
 
-Dimensions, units and prose of each variable stand here and nowhere else; :mod:`roughvisc.labels` writes them on
-a Dataset.
+Dimensions, units and prose of each variable stand in this folder and nowhere else; :mod:`roughvisc.labels` writes them
+on a Dataset. Here are those of a history over ``time``. Those of programs that slide, of steady sliding, of what flows
+through the gap and of the contact spots have files of their own.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+
+from roughvisc.variables.entry import Variable as Variable
+from roughvisc.variables.slides import SLIDES, STEPPED_IN_SLIDES
+from roughvisc.variables.spots import SPOTS
+from roughvisc.variables.transport import LEAK_MEANINGS, TRANSPORT
 
 #: How an accepted step ended; the values of ``status``, in order.
 STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
-
-
-@dataclass(frozen=True)
-class Variable:
-    """One entry of the vocabulary: what a variable is, how it is written, and which others state its error.
-
-    ``short`` is what it is called where there is no room for ``long_name``. ``axis`` is the axis that a coordinate
-    lies on.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    comment: str = ""
-    dtype: str = "float64"
-    ancillary: tuple[str, ...] = ()
-    short: str = ""
-    axis: str = ""
-
-    @property
-    def label(self) -> str:
-        """Short name as it stands on an axis or in a table, capitalised."""
-        text = self.short or self.long_name
-        return text[:1].upper() + text[1:]
-
-    def attributes(self) -> dict[str, Any]:
-        """CF attributes of this variable."""
-        attrs: dict[str, Any] = {"long_name": self.long_name}
-        if self.units:
-            attrs["units"] = self.units
-        if self.comment:
-            attrs["comment"] = self.comment
-        return attrs
-
 
 _GRID = ("x", "y")
 _FRAME = ("time", "x", "y")
@@ -118,7 +89,8 @@ VARIABLES: dict[str, Variable] = {
         "J",
         "work of the force on the approach since the start",
         "over every accepted step, kept or not, as that of the pressure on the displacement: stored_energy plus "
-        "dissipated_energy; a jump is quasi-static; with periodic boundaries without the uniform displacement",
+        "dissipated_energy, with that of the friction force in a slide; a jump is quasi-static; with periodic "
+        "boundaries without the uniform displacement",
         ancillary=("work_error",),
         short="work",
     ),
@@ -155,6 +127,7 @@ VARIABLES: dict[str, Variable] = {
     "mean_gap": Variable(
         _SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",), short="mean gap"
     ),
+    **SLIDES,
     # accuracy and cost
     "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32"),
     "convolutions": Variable(
@@ -247,12 +220,13 @@ VARIABLES: dict[str, Variable] = {
     "area_growth_exponent": Variable(
         _SERIES, "1", "growth exponent of the contact area", "d ln(area) / d ln(time), local"
     ),
-    "contact_stiffness": Variable(
+    "secant_stiffness": Variable(
         _SERIES,
         "N/m",
         "slope of force over approach along the history",
         "includes the creep between kept times; missing while the approach stands still",
     ),
+    "contact_stiffness": Variable(_SERIES, "N/m", "older name of secant_stiffness"),
     "trapezoidal_work": Variable(
         _SERIES,
         "J",
@@ -277,6 +251,8 @@ VARIABLES: dict[str, Variable] = {
     "percolates_y": Variable(
         _SERIES, "1", "whether the region out of contact connects opposite sides along y", dtype="int8"
     ),
+    **TRANSPORT,
+    **SPOTS,
     # a trade of accuracy against speed: what was set, what it cost, how wrong it was
     "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
     "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
@@ -323,13 +299,14 @@ VARIABLES: dict[str, Variable] = {
     ),
 }
 
-#: Fields that the user may ask for in ``fields``.
-FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME)
+#: Fields that the user may ask for in ``fields``: those that the solver finds.
+FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME and name not in TRANSPORT)
 
 
-_STATE = ("force", "approach", "contact_area", "contact_area_corrected", "contact_fraction", "mean_gap")
+#: What is known of any contact.
+STATE = ("force", "approach", "contact_area", "contact_area_corrected", "contact_fraction", "mean_gap")
 #: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
-STEPPED = (*_STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
+STEPPED = (*STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
 
 
 def of_step(name: str) -> str:
@@ -345,54 +322,6 @@ def _over_steps(name: str) -> Variable:
     )
 
 
-VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
-_OF_SLIDING = {"pressure", "gap", *_STATE, "nominal_pressure", "iterations", "status", "wall_time"}
-
-
-def _over_speed(name: str) -> Variable:
-    """The same variable over the speeds of steady sliding."""
-    one = VARIABLES[name]
-    return replace(one, dims=tuple("speed" if dim == "time" else dim for dim in one.dims), ancillary=())
-
-
-#: The vocabulary of steady sliding: what a Dataset over ``speed`` may hold.
-SLIDING: dict[str, Variable] = {
-    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
-    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
-    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
-    "friction_coefficient": Variable(
-        ("speed",),
-        "1",
-        "friction coefficient of steady sliding",
-        "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
-        ancillary=("friction_residual",),
-        short="friction coefficient",
-    ),
-    "friction_force": Variable(
-        ("speed",),
-        "N",
-        "friction force against the motion",
-        "the power that the material dissipates, over the speed",
-        ancillary=("friction_residual",),
-        short="friction force",
-    ),
-    "slope_friction_force": Variable(
-        ("speed",),
-        "N",
-        "friction force by pressure times slope of the profile",
-        "equal to friction_force but for what the grid leaves open at the edges of contact",
-    ),
-    "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
-    "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
-    "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
-    "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
-    "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
-    "persson_friction_coefficient": Variable(
-        ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
-    ),
-    "persson_contact_fraction": Variable(("speed",), "1", "contact area over nominal area, by Persson's theory"),
-    "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
-    "last_octave_area": Variable(
-        ("speed",), "1", "part of the corrected contact area that the shortest octave of waves adds"
-    ),
-}
+VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED, *STEPPED_IN_SLIDES)}
+#: Variables whose values are words, and these in order.
+FLAGS = {"status": STATUS_MEANINGS, of_step("status"): STATUS_MEANINGS, "leak_status": LEAK_MEANINGS}

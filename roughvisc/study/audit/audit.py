@@ -1,0 +1,190 @@
+"""``audit``: for a result, or a case before it runs, what the model leaves out and whether that matters there."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.notebook import table
+from roughvisc.study.audit import body_verdicts as of_body
+from roughvisc.study.audit import surface_verdicts as of_surface
+from roughvisc.study.audit.evidence import Evidence, of_case, of_result
+from roughvisc.study.audit.finding import Finding
+from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.limits import BROKEN, DOUBTFUL
+from roughvisc.study.statement.case import Case
+
+#: In the order of the table of limits.
+_VERDICTS = (
+    of_surface.adhesion,
+    of_surface.stickiness,
+    of_body.yielding,
+    of_body.thickness,
+    of_surface.slope,
+    of_surface.strain,
+    of_body.inertia,
+    of_body.coupling,
+    of_surface.resolution,
+    of_surface.border,
+)
+#: Of the printed table: what a page of the documentation holds.
+_WIDTH = 98
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What was found, an entry an assumption that the scene makes.
+
+    Printed it is a table, in a notebook too. ``audit["thickness"]`` is the finding of one assumption, with ``number``,
+    ``verdict``, ``sentence`` and ``limit``.
+
+    Attributes
+    ----------
+    title : str
+        Of what was audited.
+    findings : tuple of Finding
+        In the order of the table of limits.
+    """
+
+    title: str
+    findings: tuple[Finding, ...]
+
+    def __iter__(self) -> Iterator[Finding]:
+        return iter(self.findings)
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    def __getitem__(self, name: str) -> Finding:
+        for finding in self.findings:
+            if finding.name == name:
+                return finding
+        raise KeyError(f"{name!r}: expected one of {', '.join(one.name for one in self.findings)}")
+
+    def __repr__(self) -> str:
+        """A table of plain text."""
+        lines = [self.title] if self.title else []
+        for one in self.findings:
+            head = f"{one.name:<11} {one.verdict:<9} {one.shown:>7}  "
+            lines.append(textwrap.fill(one.sentence, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head)))
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return table(self.title or "audit", [(one.name, one.verdict, one.shown, one.sentence) for one in self.findings])
+
+    @property
+    def warning(self) -> str:
+        """The assumptions that are broken or doubtful, with their numbers, in one line; empty if none is."""
+        words = {
+            verdict: [f"{f.name} ({f.shown})" for f in self if f.verdict == verdict] for verdict in (BROKEN, DOUBTFUL)
+        }
+        return "; ".join(f"{verdict}: {', '.join(named)}" for verdict, named in words.items() if named)
+
+    def to_dataset(self) -> xr.Dataset:
+        """The findings over ``assumption``: number, verdict, sentence, and from where on it is doubtful and broken."""
+        columns = {
+            "number": [one.number for one in self],
+            "verdict": [one.verdict for one in self],
+            "sentence": [one.sentence for one in self],
+            "doubtful_from": [one.limit.doubtful for one in self],
+            "broken_from": [one.limit.broken for one in self],
+            "source": [one.limit.source for one in self],
+        }
+        names = np.array([one.name for one in self])
+        dataset = xr.Dataset({name: ("assumption", np.array(values)) for name, values in columns.items()})
+        return dataset.assign_coords(assumption=names).assign_attrs(title=self.title)
+
+
+def audit(
+    result: xr.Dataset | Case,
+    *,
+    work_of_adhesion: float | str | None = None,
+    yield_strength: float | str | None = None,
+    thickness: float | str | None = None,
+    base: Base | None = None,
+    density: float | str | None = None,
+    linear_strain: float | None = None,
+) -> Audit:
+    """What the model leaves out, and whether that matters in a scene.
+
+    Parameters
+    ----------
+    result : xarray.Dataset or Case
+        A result of one case over time; or a case that has not run, of which less is known.
+    work_of_adhesion : float or str, optional
+        Of the two surfaces. [J/m2]
+    yield_strength : float or str, optional
+        In tension, of the body that yields first. [Pa]
+    thickness : float or str, optional
+        True thickness of the body that was taken for a half-space. [m]
+    base : {"bonded", "slipping"}, optional
+        What it lies on; bonded unless given.
+    density : float or str, optional
+        Of the body. [kg/m3]
+    linear_strain : float, optional
+        Strain up to which the material is linear. [-]
+
+    Returns
+    -------
+    Audit
+        For each assumption that the scene makes a number, a verdict and a sentence; what is not given is that of the
+        table ``[audit]`` of its study, if there is one. Without a value a verdict is ``not known``, and the sentence
+        says what to give, and which values would be harmless.
+
+    Raises
+    ------
+    InputError
+        If a value is of another kind or out of range, or the result is none of one case over time.
+
+    Notes
+    -----
+    The limits of the verdicts, and their sources, are :data:`roughvisc.study.audit.limits.LIMITS`. Where a modulus is
+    needed it is that of the end of the program, the softest, which is the least favourable to neglecting adhesion and
+    inertia.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-2, size=1e-3, shape=24)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), rv.Program().load(5e-3, over=1.0), progress=False)
+    >>> found = rv.audit(ds, work_of_adhesion="50 mJ/m^2")
+    >>> found["adhesion"].verdict, found["slope"].verdict, found["yielding"].verdict
+    ('broken', 'holds', 'not known')
+    """
+    given = Given(
+        work_of_adhesion=work_of_adhesion,
+        yield_strength=yield_strength,
+        thickness=thickness,
+        base=base,
+        density=density,
+        linear_strain=linear_strain,
+    )
+    if base is not None and thickness is None:
+        raise InputError(f"base is {base!r} without a thickness: expected both, or neither")
+    if isinstance(result, Case):
+        return judged(of_case(result, result.height()), given, result.title)
+    evidence = of_result(result)
+    return judged(evidence, given, str(result.attrs.get("title", "")))
+
+
+def judged(evidence: Evidence, given: Given, title: str) -> Audit:
+    """The verdicts on what is known of a scene.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        What is known; what its study states for an audit counts where `given` states nothing.
+    given : Given
+        What the user states.
+    title : str
+        Of the scene.
+    """
+    given = given.over(evidence.given)
+    found = (verdict(evidence, given) for verdict in _VERDICTS)
+    return Audit(title, tuple(one for one in found if one is not None))

@@ -1,0 +1,79 @@
+"""What a user states for an audit: quantities that no contact result depends on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, get_args
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.study.statement.case import read_cases
+from roughvisc.study.statement.schema.audit import BOUNDS
+from roughvisc.units import stated_quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """What is stated, None where nothing is; see :func:`roughvisc.audit`. Quantities are numbers in SI, or texts."""
+
+    work_of_adhesion: Any = None
+    yield_strength: Any = None
+    thickness: Any = None
+    base: Any = None
+    density: Any = None
+    linear_strain: Any = None
+
+    def __post_init__(self) -> None:
+        for name, (unit, bounds) in BOUNDS.items():
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, stated_quantity(value, unit, name, **bounds))
+        if self.base not in (None, *get_args(Base)):
+            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
+
+    def over(self, others: Mapping[str, Any]) -> Given:
+        """These, and the others where these state nothing."""
+        return Given(**{**others, **self.stated()})
+
+    def stated(self) -> dict[str, Any]:
+        """What is stated, in SI."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+def from_options(texts: Mapping[str, str | None]) -> Given:
+    """What is stated on a command line, where numbers are texts too; messages name the options.
+
+    Raises
+    ------
+    InputError
+        As :class:`Given` does.
+    """
+    values = {name: _number_or_text(text) for name, text in texts.items()}
+    try:
+        return Given(**values)
+    except InputError as error:
+        name, rest = re.match(r"\w+", str(error))[0], re.sub(r"^\w+", "", str(error))  # type: ignore[index]
+        raise InputError(f"--{name.replace('_', '-')}{rest}") from None
+
+
+def of_study(path: Path) -> dict[str, Any]:
+    """What a study file states for an audit, in SI; of a sweep, what its first case does.
+
+    Raises
+    ------
+    InputError
+        If the study is wrong.
+    """
+    stated = read_cases(path)[0].settings.audit
+    return {} if stated is None else stated.model_dump(exclude_none=True)
+
+
+def _number_or_text(text: str | None) -> Any:
+    try:
+        return text if text is None else float(text)
+    except ValueError:
+        return text

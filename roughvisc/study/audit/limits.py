@@ -1,0 +1,136 @@
+"""The limits of every verdict of an audit, in one table, each with its source."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+#: The verdicts, from the best to the worst; without a number none is given.
+HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN = "holds", "doubtful", "broken", "not known"
+VERDICTS = (HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN)
+#: Distance over which surfaces attract each other: that between atoms (D. Tabor, J. Colloid Interface Sci. 58 (1977)
+#: 2). The Tabor parameter goes with its inverse, the attraction of stiff rough surfaces with that of its cube root. [m]
+ATTRACTION_RANGE = 3e-10
+#: Tabor parameter up to which the attraction leaves the spots' shape alone, as stiff rough surfaces have it.
+STIFF = 1.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What an assumption is judged by.
+
+    Attributes
+    ----------
+    assumption : str
+        What is assumed.
+    number : str
+        What the number is; the larger, the worse.
+    doubtful, broken : float
+        From where on the assumption is doubtful, and broken.
+    meaning : str
+        What these two mean.
+    source : str
+        Whence they are.
+    """
+
+    assumption: str
+    number: str
+    doubtful: float
+    broken: float
+    meaning: str
+    source: str
+
+    def verdict(self, number: float) -> str:
+        """Verdict on a number; NaN is not known."""
+        if math.isnan(number):
+            return NOT_KNOWN
+        return BROKEN if number >= self.broken else DOUBTFUL if number >= self.doubtful else HOLDS
+
+
+#: name -> limits, in the order of an audit. Unless a threshold has a meaning of its own, an effect of some 10 % makes
+#: an assumption doubtful, and one of the size of what is computed breaks it.
+LIMITS: dict[str, Limit] = {
+    "adhesion": Limit(
+        "The spots in contact do not stick.",
+        "pull-off force of the spots over the largest load",
+        0.005,
+        0.3,
+        "contact area 10 % larger; twice as large (JKR)",
+        "K. L. Johnson, K. Kendall, A. D. Roberts, Proc. R. Soc. A 324 (1971) 301",
+    ),
+    "stickiness": Limit(
+        "A rough surface does not stick without a load.",
+        "stiff spots (Tabor parameter up to 1): attraction over repulsion; soft ones: work of adhesion over the "
+        "elastic energy of full contact",
+        0.1,
+        1.0,
+        "contact area 10 % larger; sticks without a load",
+        "L. Pastewka, M. O. Robbins, PNAS 111 (2014) 3298; B. N. J. Persson, E. Tosatti, J. Chem. Phys. 115 (2001) "
+        "5597",
+    ),
+    "yielding": Limit(
+        "Neither body flows.",
+        "largest pressure over the yield strength in tension",
+        1.6,
+        3.0,
+        "first yield under a sphere, at a mean pressure of 1.1 times the strength; full plasticity",
+        "K. L. Johnson, Contact Mechanics, CUP, 1985, sections 6.1 and 6.3",
+    ),
+    "thickness": Limit(
+        "The body is deeper than the contact is wide.",
+        "part by which the approach on a half-space is too large, estimated",
+        0.1,
+        0.5,
+        "10 % too large; twice the true one",
+        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8; closed_forms.half_space_excess",
+    ),
+    "slope": Limit(
+        "Slopes are small.",
+        "rms slope of the loaded surface",
+        0.3,
+        1.0,
+        "true area 4.5 % larger than projected, half of the slope's square; half as large again",
+        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 4.1",
+    ),
+    "strain": Limit(
+        "The material is linear.",
+        "rms slope of the loaded surface, a/R on a sphere, over the strain up to which the material is linear",
+        1.0,
+        5.0,
+        "largest strains, of the order of the slope, leave the range; representative ones do, 0.2 a/R",
+        "D. Tabor, The Hardness of Metals, OUP, 1951; K. L. Johnson, Contact Mechanics, CUP, 1985, section 6.3",
+    ),
+    "inertia": Limit(
+        "The motion is slow.",
+        "lag by radiated waves over the shortest time scale of the program",
+        0.1,
+        1.0,
+        "force 10 % off its quasi-static value; as much as it",
+        "J. Lysmer, F. E. Richart, J. Soil Mech. Found. Div. ASCE 92 (1966) 65",
+    ),
+    "coupling": Limit(
+        "Pressure displaces nothing sideways.",
+        "Dundurs' second constant, (1 - 2 nu)/(2 - 2 nu) of one body",
+        0.5,
+        1.0,
+        "a punch that sticks is 10 % stiffer than one without friction; out of reach",
+        "D. A. Spence, Proc. R. Soc. A 305 (1968) 55",
+    ),
+    "resolution": Limit(
+        "The grid holds all waves that matter.",
+        "part of the rms slope that the last octave of waves adds: under light loads also the part of the contact area "
+        "that it takes away",
+        0.1,
+        0.5,
+        "10 % of the area; half of it, and the next octave as much again",
+        "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840",
+    ),
+    "border": Limit(
+        "The surface repeats without a step.",
+        "difference of opposite borders over that of neighbouring rows",
+        2.0,
+        10.0,
+        "a step is seen; on 100 rows the seam holds as much of the mean square slope as all the rest",
+        "topography.borders; arithmetic: the square of the number over the number of rows",
+    ),
+}

@@ -1,0 +1,122 @@
+"""A surface as it slides: turned into the motion, on one grid, from one speed to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
+from roughvisc.study.simulation.coarser import coarser_shape
+from roughvisc.study.simulation.scene import Ground
+from roughvisc.topography.spectrum import without_last_octave
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How fields turn so that the profile moves along +x, and how they turn back."""
+
+    there: Callable[[Array], Array]
+    back: Callable[[Array], Array]
+    swapped: bool
+
+    @classmethod
+    def of(cls, direction: str) -> Turn:
+        """That of a direction."""
+        flip = slice(None, None, -1 if direction.startswith("-") else 1)
+        if direction.endswith("x"):
+            return cls(lambda field: field[flip], lambda field: field[flip], False)
+        return cls(lambda field: field.T[flip], lambda field: np.ascontiguousarray(field[flip].T), True)
+
+
+@dataclass
+class Face:
+    """One grid of a surface that slides along +x.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (nx, ny)
+        Undeformed, turned into the motion. [m]
+    spacing : tuple of float
+        Cell sides, turned likewise. [m]
+    kernel : Kernel
+        Of the body.
+    pressure : ndarray or None
+        That of the last speed, with which the next one begins. [Pa]
+    """
+
+    gap: Array
+    spacing: tuple[float, float]
+    kernel: Kernel
+    pressure: Array | None = None
+
+    @classmethod
+    def of(cls, ground: Ground, turn: Turn) -> Face:
+        """That of a surface."""
+        sides = ground.spacing[::-1] if turn.swapped else ground.spacing
+        return cls(np.ascontiguousarray(turn.there(ground.gap)), (sides[0], sides[1]), ground.kernel)
+
+    def smooth(self) -> tuple[Face, float]:
+        """The same without its shortest octave of waves, and the length below which these are. [m]
+
+        Raises
+        ------
+        InputError
+            If there are no others.
+        """
+        gap, shortest = without_last_octave(self.gap, self.spacing)
+        if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
+            raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
+        return Face(gap, self.spacing, self.kernel), shortest
+
+    def coarser(self, factor: float) -> Face | None:
+        """The same waves on cells about so many times longer, as far as these can hold them; None if there is none."""
+        shape = coarser_shape((self.gap.shape[0], self.gap.shape[1]), factor, False)
+        if shape == self.gap.shape:
+            return None
+        sides = [side * many / few for side, many, few in zip(self.spacing, self.gap.shape, shape, strict=True)]
+        gap = _sampled(_sampled(self.gap, shape[0], 0), shape[1], 1)
+        return Face(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
+
+    @property
+    def waves(self) -> Array:
+        """Wave numbers along the motion. [1/m]"""
+        return np.asarray(2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]))
+
+    def sliding(self, speed: float, material: Material) -> Sliding:
+        """The operator at a speed [m/s]; of the material a complex compliance in closed form is asked."""
+        shape = (self.gap.shape[0], self.gap.shape[1])
+        return Sliding(self.kernel, partial(complex_compliance, material), shape, self.spacing, speed)
+
+    def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
+        """Steady state under a force [N], begun with that of the last speed, which it takes the place of."""
+        found = steady_state(sliding, self.gap, force, tolerance=tolerance, start=self.pressure)
+        self.pressure = found.pressure
+        return found
+
+
+def _sampled(field: Array, count: int, axis: int) -> Array:
+    """The waves of a field along an axis on fewer cells, those that are too short for these left out."""
+    before = field.shape[axis]
+    spectrum = np.moveaxis(fft.rfft(field, axis=axis), axis, 0)[: count // 2 + 1].copy()
+    if count % 2 == 0 and count < before:
+        spectrum[-1] *= 2  # of both signs, which such cells do not tell apart
+    return np.asarray(fft.irfft(np.moveaxis(spectrum, 0, axis), n=count, axis=axis) * (count / before))
+
+
+def areas(contact: NDArray[np.bool_], spacing: tuple[float, float]) -> tuple[float, float]:
+    """Contact area, counted and corrected for the grid. [m2]"""
+    cell = spacing[0] * spacing[1]
+    counted = np.count_nonzero(contact) * cell
+    return counted, max(counted - staircase(contact, ~contact, cell, True), 0.0)

@@ -1,0 +1,96 @@
+"""Memory of a march, counted in fields of its grid (8 bytes a cell) before there is any."""
+
+from __future__ import annotations
+
+from roughvisc.mechanics.hereditary.direct import History, history_bytes
+from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
+from roughvisc.study.statement.settings import Settings
+
+#: What the interpreter and the libraries take, measured. [byte]
+PROCESS = 200e6
+#: Fields of the surface: heights and gaps, and the marks of present cells.
+_SURFACE = 2.1
+#: Fields of a march without a past, and what a contact on all cells adds to them.
+_ELASTIC, _IN_CONTACT = 8.1, 4.3
+#: Spectrum, symbols and what a transform gives.
+_TRANSFORMS = {"periodic": 2.0, "free": 5.4}
+#: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
+#: and after a step.
+_COMPANION, _EXPONENTIAL = 5.25, 5.0
+#: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
+_SHOWN = 7.0
+#: Fields of the state while the file is written, and frames that are in memory then.
+_STATE, _FRAMES_TOGETHER = 6.0, 8
+#: Rows wait for the disk until they take more. [byte]
+_WAITING = 8e6
+#: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
+_CURVE = 27.0
+#: Contact fraction below which a contact is sparse.
+SPARSE = 0.05
+
+
+def march_bytes(
+    settings: Settings,
+    cells: float,
+    memory: Memory,
+    *,
+    contact: float = SPARSE,
+    steps: float = 0.0,
+    rows: float = 1.0,
+    part: float = 1.0,
+    in_memory: bool = False,
+) -> float:
+    """Memory of a march at its peak, without what the process takes in any case.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of the solve.
+    cells : float
+        Of the surface.
+    memory : Memory
+        Of the material's past.
+    contact : float
+        Largest contact fraction.
+    steps, rows : float
+        Accepted steps, and kept ones.
+    part : float
+        Part of the cells that is solved on.
+    in_memory : bool
+        Whether the kept fields stay in memory, as those of :func:`roughvisc.simulate` do; else they go to a file.
+
+    Returns
+    -------
+    float
+        [byte]
+
+    Notes
+    -----
+    The larger one of the peaks while the contact is solved and while the file is written. Measured by
+    ``workflows/benchmarks/memory.py``.
+    """
+    field = 8.0 * cells
+    state, past = _STATE, 0.0
+    solved = _ELASTIC + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
+    if isinstance(memory, Modes):
+        modes = len(memory.material.times) + bool(memory.material.fluidity)
+        if modes:
+            solved += _COMPANION + _EXPONENTIAL * modes
+            state += 3 * modes
+            if "bdf2" in memory.rules:
+                solved += _SHOWN + _EXPONENTIAL * modes
+    elif isinstance(memory, History):
+        past = 1.5 * history_bytes(contact * cells, steps)
+        solved += _COMPANION
+    frames = rows * len(settings.fields) * field
+    surface = _SURFACE * field + past
+    if in_memory:
+        return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
+    written = min(rows, _FRAMES_TOGETHER) * field
+    waiting = min(max(rows - 1, 0) * len(settings.fields) * field, _WAITING)
+    return surface + max(part * solved * field + waiting, part * state * field + written)
+
+
+def curve_bytes(settings: Settings, cells: float) -> float:
+    """Memory of a curve of friction at its peak, without what the process takes in any case. [byte]"""
+    return (_CURVE + len(settings.fields)) * 8.0 * cells

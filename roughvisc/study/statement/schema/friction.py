@@ -1,0 +1,108 @@
+"""``[friction]``: a curve of steady sliding, in place of the segments of a program."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.stepping.program import INSTEAD
+from roughvisc.study.statement.curve import DIRECTIONS, Curve
+from roughvisc.study.statement.schema.entries import (
+    Flag,
+    Unit,
+    checked,
+    choice,
+    measured,
+    optional,
+    shown,
+    whole,
+)
+from roughvisc.study.statement.schema.section import Section, refuse
+from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
+
+_SPEED = measured("m/s", above=0)
+_WANTED = "a speed in m/s, a list of them, or a table with from, to and count"
+#: More speeds than a curve has decades for are taken for a slip.
+_MOST_SPEEDS = 1000
+
+
+class Decades(Section):
+    """Speeds between two ends, evenly on a logarithmic axis."""
+
+    from_: Annotated[_SPEED, Field(alias="from")]
+    to: _SPEED
+    count: whole(2, _MOST_SPEEDS)
+
+
+def _speeds(value: Any, info: ValidationInfo) -> tuple[float, ...]:
+    """Speeds in order, each once."""
+    if isinstance(value, dict):
+        ends = Decades.model_validate(value, context=info.context)
+        if not ends.from_ < ends.to:
+            raise InputError(f"found from {ends.from_:g} to {ends.to:g} m/s: expected the lower end first")
+        found = np.geomspace(ends.from_, ends.to, ends.count).tolist()
+    elif isinstance(value, list | tuple):
+        found = [checked(_SPEED, one) for one in value]
+        if not 0 < len(found) <= _MOST_SPEEDS:
+            raise InputError(f"found {len(found)} speeds: expected 1 to {_MOST_SPEEDS}")
+    elif isinstance(value, str | int | float) and not isinstance(value, bool):
+        found = [checked(_SPEED, value)]
+    else:
+        raise InputError(f"found {shown(value)}: expected {_WANTED}")
+    return tuple(sorted({float(f"{speed:.12g}") for speed in found}))
+
+
+class FrictionSection(Section):
+    """Steady sliding at given speeds."""
+
+    speeds: Annotated[
+        tuple[float, ...],
+        BeforeValidator(_speeds),
+        WithJsonSchema(
+            {"type": ["number", "string", "array", "object"], "items": {"type": ["number", "string"]}},
+        ),
+        Field(description=_WANTED),
+        Unit("m/s"),
+    ]
+    load: optional(measured("N", above=0, instead=INSTEAD["load"])) = None
+    pressure: optional(measured("Pa", above=0, instead=INSTEAD["pressure"])) = None
+    direction: choice(*DIRECTIONS) = Curve.direction
+    last_octave: Flag = Curve.last_octave
+
+    @model_validator(mode="after")
+    def _has_one_load(self) -> FrictionSection:
+        if self.load is None and self.pressure is None:
+            raise refuse("load", "missing: expected a load in N, or a nominal pressure in Pa as pressure")
+        if self.load is not None and self.pressure is not None:
+            raise refuse("pressure", "found beside load: expected one of them")
+        return self
+
+    def curve(self) -> Curve:
+        """What is asked, as the solver takes it."""
+        return Curve(**dict(self))
+
+
+def refuse_beside_friction(solve: SolveSection, keep: KeepSection, missing: str) -> None:
+    """Refuse what has no meaning in steady sliding.
+
+    Raises
+    ------
+    ValidationError
+        Naming the key.
+    """
+    if solve.boundary != "periodic":
+        raise refuse("solve.boundary", f"found {solve.boundary!r}: steady sliding repeats: expected 'periodic'")
+    for key in ("time_step", "method", "edge", "memory"):
+        if getattr(solve, key) != SolveSection.model_fields[key].default:
+            raise refuse(
+                f"solve.{key}", f"found {getattr(solve, key)!r}: steady sliding has none: expected no such key"
+            )
+    if keep.times != "all":
+        raise refuse("keep.times", f"found {shown(keep.times)}: steady sliding has no times: expected no such key")
+    if "displacement" in keep.fields:
+        raise refuse("keep.fields", "found 'displacement': of steady sliding expected some of pressure, gap")
+    if missing != "refuse":
+        raise refuse("surface.missing", f"found {missing!r}: a surface that slides has no holes: expected fill = true")

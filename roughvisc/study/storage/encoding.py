@@ -1,0 +1,104 @@
+"""How variables are laid out in a result's file: chunks, filters, rounding, fill values."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from roughvisc.variables import of_step
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area", "grid_error_friction"}) | {
+    "last_octave_friction",
+    "last_octave_area",
+    "stated_error",
+    "time_error",
+    "residual",
+    "residual_bound",
+    "pressure_error",
+    "approach_error",
+    "stored_energy",
+    "dissipated_energy",
+    "work_error",
+    "dissipated_energy_error",
+    "contact_area_lower",
+    "contact_area_upper",
+    "friction_coefficient",
+    "friction_force_error",
+    "slope_friction_force",
+}
+#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
+#: algorithm states no accuracy, the direct history no energies; of steps between kept times the mean gap is not known
+#: over a grid that has grown since.
+MAY_BE_MISSING = _MAY_BE_MISSING | {of_step(name) for name in (*_MAY_BE_MISSING, "mean_gap")}
+#: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
+#: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
+#: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.
+_CHUNK = (8, 64, 64)
+#: The same of a grid of more cells than this: a frame is read without its neighbours in time, which no memory has room
+#: for. At 4096 x 4096 x 20, in ms, compressed: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51; (1, 256, 256) 331
+#: and 41; (1, 1024, 1024) 309 and 302. ``workflows/benchmarks/big_results.py`` measures it.
+_MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
+#: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
+_LONGEST_CHUNK = 1024
+#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
+#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
+#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
+#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms.
+_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.04, 0.5
+_SMALL = 1 << 16  # compressed in any case [bytes]
+_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
+
+
+def is_field(variable: xr.Variable) -> bool:
+    """Whether a variable is one of fields over the rows of a result."""
+    return variable.dims[-2:] == ("x", "y") and variable.dims[:-2] in (("time",), ("speed",))
+
+
+def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
+    """Bits of a double's fraction to keep of a field, so that rounding changes it by less than that part; None: all."""
+    if precision is None or not is_field(variable):
+        return None
+    return min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
+
+
+def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
+    """What netCDF4 is told of a variable."""
+    encoding: dict[str, Any] = {"fill_value": False}
+    if variable.dtype.kind == "f" and name in MAY_BE_MISSING:
+        encoding["fill_value"] = variable.dtype.type(np.nan)
+    bits = bits_kept(variable, precision)
+    if bits is not None:
+        encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
+    if variable.nbytes > _TINY:
+        encoding["chunksizes"] = chunks(variable.shape)
+        encoding |= _filters(variable, bits)
+    return encoding
+
+
+def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
+    """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
+    middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
+    sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
+    if bits is not None:
+        sample = (sample.view(np.int64) & -(1 << (52 - bits))).view(float)  # cut off compresses as rounded
+    shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
+    size, shuffle = min(
+        (len(zlib.compress(text.tobytes(), 1)), shuffle) for shuffle, text in enumerate((sample, shuffled))
+    )
+    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
+        return {}
+    return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
+
+
+def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Sides of the chunks: as equal as they can be, since a chunk that sticks out takes its whole space."""
+    many = len(shape) > 1 and shape[-2] * shape[-1] > _MANY_CELLS
+    fields = _CHUNK_OF_MANY if many else _CHUNK
+    longest = fields[-len(shape) :] if len(shape) == 3 or many else (_LONGEST_CHUNK,) * len(shape)
+    return tuple(math.ceil(n / math.ceil(n / most)) for n, most in zip(shape, longest, strict=True))

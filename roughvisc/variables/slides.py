@@ -1,0 +1,55 @@
+"""The vocabulary of programs in which the profile slides: what a history over ``time`` holds then."""
+
+from __future__ import annotations
+
+from roughvisc.variables.entry import Variable
+
+_SERIES = ("time",)
+
+SLIDES: dict[str, Variable] = {
+    "sliding_distance": Variable(
+        _SERIES,
+        "m",
+        "distance slid since the start",
+        "along the path, whatever its direction; in whole cells of the grid",
+        short="sliding distance",
+    ),
+    "friction_force": Variable(
+        _SERIES,
+        "N",
+        "friction force against the motion",
+        "of pressure on inclined faces alone, by the slope of the body's surface; in a hold against the last slide, "
+        "before the first one against that",
+        ancillary=("friction_force_error",),
+        short="friction force",
+    ),
+    "slope_friction_force": Variable(
+        _SERIES,
+        "N",
+        "friction force by pressure times slope of the profile",
+        "equal to friction_force but for what the grid leaves open at the edges of contact",
+    ),
+    "friction_coefficient": Variable(
+        _SERIES,
+        "1",
+        "friction coefficient",
+        "friction_force over force: without shear at the interface; missing while the surfaces are apart",
+        short="friction coefficient",
+    ),
+    "friction_force_error": Variable(
+        _SERIES,
+        "N",
+        "stated error of the friction force",
+        "of steps of one cell, by a companion march in steps of two; the rest of the grid's error comes on top",
+    ),
+    "friction_work": Variable(
+        _SERIES,
+        "J",
+        "work of the friction force since the start",
+        "by the balance of energy: what the body has stored and dissipated in slides, less the work of the normal "
+        "force; the integral of friction_force over sliding_distance checks it",
+    ),
+}
+
+#: What of them is known of every accepted step.
+STEPPED_IN_SLIDES = ("sliding_distance", "friction_force", "friction_coefficient", "friction_work")

@@ -1,0 +1,77 @@
+"""The vocabulary of steady sliding: what a Dataset over ``speed`` may hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from roughvisc.variables import STATE, VARIABLES, Variable
+
+_OF_SLIDING = {"pressure", "gap", *STATE, "nominal_pressure", "iterations", "status", "wall_time"}
+
+
+def _over_speed(name: str) -> Variable:
+    """The same variable over the speeds of steady sliding."""
+    one = VARIABLES[name]
+    return replace(one, dims=tuple("speed" if dim == "time" else dim for dim in one.dims), ancillary=())
+
+
+SLIDING: dict[str, Variable] = {
+    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
+    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
+    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
+    "reduced_speed": Variable(
+        ("speed",),
+        "m/s",
+        "speed times the shift factor of the material",
+        "curves of several temperatures fall on one over it",
+        short="reduced speed a_T V",
+    ),
+    "friction_coefficient": Variable(
+        ("speed",),
+        "1",
+        "friction coefficient of steady sliding",
+        "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
+        ancillary=("friction_residual", "grid_error_friction"),
+        short="friction coefficient",
+    ),
+    "friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force against the motion",
+        "the power that the material dissipates, over the speed",
+        ancillary=("friction_residual", "grid_error_friction"),
+        short="friction force",
+    ),
+    "slope_friction_force": Variable(
+        ("speed",),
+        "N",
+        "friction force by pressure times slope of the profile",
+        "equal to friction_force but for what the grid leaves open at the edges of contact",
+    ),
+    "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
+    "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
+    "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
+    "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
+    "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
+    "persson_friction_coefficient": Variable(
+        ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
+    ),
+    "persson_contact_fraction": Variable(("speed",), "1", "contact area over nominal area, by Persson's theory"),
+    "grid_error_friction": Variable(
+        ("speed",),
+        "1",
+        "bound in practice on the relative error of friction due to the grid",
+        "from the same speed on cells twice and four times as long (grid convergence index); of a scan it holds what "
+        "roughness its coarser copies have lost",
+    ),
+    "grid_error_area": Variable(
+        ("speed",),
+        "1",
+        "bound in practice on the relative error of the corrected contact area due to the grid",
+        "as grid_error_friction, and from the number of faces at the contact's edge",
+    ),
+    "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
+    "last_octave_area": Variable(
+        ("speed",), "1", "part of the corrected contact area that the shortest octave of waves adds"
+    ),
+}

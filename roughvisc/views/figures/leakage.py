@@ -1,0 +1,171 @@
+"""Figure of leakage: the leak rate over time, and where the fluid flows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+
+from roughvisc.units import unit_for
+from roughvisc.variables import VARIABLES
+from roughvisc.variables.transport import LEAK_MEANINGS
+from roughvisc.views.figures.axes import (
+    BLUE,
+    VERMILION,
+    TimeAxis,
+    Unit,
+    frame_at,
+    letter_panels,
+    new_figure,
+    require,
+    spread_axis,
+    styled,
+    time_text,
+)
+from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.histories import leave_room, marker_of
+from roughvisc.views.observables import asked
+from roughvisc.views.observables import leakage as derived
+
+#: Cells in contact on a map of the flow; fluid that stands still is white.
+_TOUCHING = "0.6"
+#: Decades of the flux below its largest that a map shows.
+_DECADES = 3
+#: Largest over smallest leak rate from which its axis is logarithmic.
+_SPANS = 30.0
+
+
+@styled
+def leakage(dataset: xr.Dataset, time: float | None = None) -> Figure:
+    """Leak rate over time, with the time at which the contact closes, and a map of the flow at one time.
+
+    The flux is drawn on a logarithmic scale of three decades: cells in contact grey, fluid that stands still white.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``gap``. What of the leakage it does not hold is derived here, as the study's
+        ``[observe]`` asks for it, or with the defaults of :func:`roughvisc.observables.leakage`.
+    time : float, optional
+        The nearest kept time is mapped; a negative whole number counts frames from the end. Default: the last at
+        which the fluid flows. [s]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or holds no gap.
+    """
+    require(dataset, "time", "x", "y", "gap")
+    dataset = with_leak_rate(dataset)
+    flowing = np.flatnonzero(dataset["leak_rate"].values > 0)
+    frame = frame_at(dataset["time"], time) if time is not None else int(flowing[-1]) if flowing.size else -1
+    frame %= dataset.sizes["time"]
+    ratio = float(np.clip(plane_ratio(dataset), 0.4, 1.4))
+    figure = new_figure(7.4, 0.9 + 2.4 * max(ratio, 0.8))
+    on_time, on_map = figure.subplots(1, 2, width_ratios=[1.25, 1])
+    _draw_rate(on_time, dataset, frame)
+    _draw_flow(figure, on_map, dataset, frame)
+    letter_panels((on_time,))
+    return figure
+
+
+def with_leak_rate(dataset: xr.Dataset) -> xr.Dataset:
+    """A result that holds its leak rate."""
+    if "leak_rate" in dataset:
+        return dataset
+    found = asked(dataset)
+    found = found if "leak_rate" in found else derived(dataset)
+    return dataset.merge(found.compute(), compat="equals", join="exact")
+
+
+def rate_unit(history: xr.DataArray) -> tuple[Unit, bool]:
+    """Unit of a history, and whether it is a leak rate that spans so much that its axis is logarithmic."""
+    si, positive = VARIABLES[str(history.name)].units, history.values[history.values > 0]
+    if history.name != "leak_rate" or not positive.size or positive.max() <= _SPANS * positive.min():
+        return unit_for(history.values, si), False
+    return unit_for(np.sqrt([positive.min()]) * np.sqrt(positive.max()), si), True
+
+
+def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
+    """The last kept time at which fluid flows, and the first after it, from which on the contact is closed. [s]"""
+    closed = dataset["leak_status"].values == LEAK_MEANINGS.index("closed")
+    if not closed[-1] or closed.all():
+        return None
+    last = int(np.flatnonzero(~closed)[-1])
+    times = dataset["time"].values
+    return float(times[last]), float(times[last + 1])
+
+
+def flux_of(dataset: xr.Dataset) -> xr.DataArray:
+    """Size of the flux over (time, x, y), missing in contact, lazily; asked as the leak rate in the result was."""
+    asked_with: dict[str, Any] = {
+        name: dataset["leak_rate"].attrs[name] for name in ("along", "sides", "viscosity", "pressure_drop")
+    }
+    lazily = dataset[["gap"]].chunk({"time": 1, "x": -1, "y": -1})
+    lazily.attrs = dataset.attrs
+    found = derived(lazily, flow=True, **asked_with)
+    size = np.hypot(found["flux_x"], found["flux_y"]).where(lazily["gap"] > 0)
+    return size.rename("flux").assign_attrs(VARIABLES["flux"].attributes())
+
+
+def draw_flux(ax: Axes, flux: xr.DataArray, unit: Unit, plane: Unit, highest: float) -> AxesImage:
+    """Map of the flux of one frame, up to the highest [m2/s] of all that are drawn."""
+    lowest = highest * 10.0**-_DECADES
+    image = draw_map(ax, visible(flux, highest * unit.factor), unit, plane, norm=LogNorm(lowest, highest))
+    image.set_cmap(image.get_cmap().with_extremes(bad=_TOUCHING, under="w"))
+    return image
+
+
+def visible(flux: xr.DataArray, highest: float) -> xr.DataArray:
+    """Flux whose zeros a logarithmic scale takes for too low, and not for missing."""
+    return flux.clip(min=0.1 * highest * 10.0**-_DECADES)
+
+
+def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
+    """Leak rate over time, the frame that is mapped, and when the contact closes."""
+    axis, rate = TimeAxis.of(dataset["time"]), dataset["leak_rate"].values
+    unit, spans = rate_unit(dataset["leak_rate"])
+    times = axis.unit(dataset["time"])
+    shown = np.where(rate > 0, unit(rate), np.nan) if spans else unit(rate)
+    ax.plot(times, shown, color=BLUE, marker=marker_of(len(times)))
+    ax.plot(times[[frame]], shown[[frame]], "o", color=VERMILION, ms=6, mfc="none", mew=1.2)
+    if spans:
+        spread_axis(ax.yaxis, shown)
+    else:
+        leave_room(ax, shown)
+    if closes := closing_times(dataset):
+        before, after = axis.unit(closes)
+        ax.axvspan(before, after, color="0.9", lw=0)
+        whole = unit_for(closes, "s")
+        ax.set_title(f"closes between {whole(closes[0]):.3g} and {whole.text(closes[1])}", loc="right")
+    elif not rate.any():
+        ax.set_title("closed at every kept time", loc="right")
+    axis.apply(ax, dataset["time"], most=5)
+    ax.set_ylabel(unit.label(VARIABLES["leak_rate"].label))
+    ax.grid(color="0.9", lw=0.5)
+
+
+def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> None:
+    """Map of the flux at one time."""
+    flux = flux_of(dataset.isel(time=[frame])).isel(time=0).load()
+    highest = float(np.nan_to_num(flux.values).max())
+    unit, plane = unit_for([highest], VARIABLES["flux"].units), plane_unit(dataset)
+    if highest > 0:
+        image = draw_flux(ax, flux, unit, plane, float(unit(highest)))
+        bar = figure.colorbar(image, ax=ax, pad=0.02, aspect=18, extend="min")
+        bar.set_label("contact grey\n" + unit.label(VARIABLES["flux"].label))
+    else:
+        draw_flux(ax, flux, unit, plane, 1.0)
+    label_plane(ax, dataset, plane)
+    note = "" if highest > 0 else ", closed: contact grey"
+    # in one text with its letter, which a narrow map has no room for beside it
+    ax.set_title(rf"$\mathbf{{(b)}}$  {time_text(float(dataset['time'][frame]))}{note}", loc="left")

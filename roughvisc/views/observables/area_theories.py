@@ -1,0 +1,100 @@
+"""Contact area of a rough surface by theory: Persson's, and that of asperities at low loads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from roughvisc.errors import InputError
+from roughvisc.labels import describe
+from roughvisc.topography.grid import nominal_area
+from roughvisc.topography.parameters import rms_slope
+from roughvisc.views.observables.derived import material_of, need
+from roughvisc.views.observables.response import history
+
+
+def persson_fraction(strain: ArrayLike) -> Any:
+    r"""Contact area over nominal area by Persson's theory, :math:`\mathrm{erf}(\sqrt2 \, p / (E^* h'))`.
+
+    Parameters
+    ----------
+    strain : array_like
+        Nominal pressure over contact modulus and rms slope.
+    """
+    from scipy.special import erf  # slow to import
+
+    return erf(math.sqrt(2) * np.asarray(strain, dtype=float))
+
+
+def asperity_fraction(strain: ArrayLike) -> Any:
+    r"""The same by the theory of asperities at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`: 1.57 times Persson's."""
+    return math.sqrt(2 * math.pi) * np.asarray(strain, dtype=float)
+
+
+def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
+    r"""Contact area of a rough surface by Persson's theory and by that of asperities, while the load does not fall.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``force`` and ``height``, of a half-space and periodic boundaries.
+    material : Material, optional
+        Default: that of the case in the attributes.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing from where the load falls on. [m2]
+
+    Raises
+    ------
+    InputError
+        If the boundaries are not periodic, the body is no half-space, or no material is known.
+
+    Notes
+    -----
+    On an elastic half-space Persson's theory [1]_ has :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
+    the nominal pressure :math:`p`, and asperities at low loads [2]_ :math:`A = A_0 \sqrt{2\pi} \, p / (E^* h')`; both
+    of a Gaussian surface, by its root-mean-square slope :math:`h'` on the grid. While the contact grows, a
+    viscoelastic one is an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`: under a constant
+    pressure by :math:`C(t) \, p`. The load counts as linear between accepted steps, so that a jump other than at
+    the start counts as a ramp over the step before it.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
+    .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
+    """
+    need(dataset, "force", "height")
+    if dataset["force"].dims != ("time",):
+        raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
+    if dataset.attrs.get("boundary") != "periodic":
+        raise InputError("the theories are of surfaces without borders: expected a result with periodic boundaries")
+    for body in ("thickness", "kernel"):
+        if body in dataset.attrs:
+            raise InputError(f"the theories are of a half-space: found a result with the {body} {dataset.attrs[body]}")
+    steps, kept = history(dataset), dataset["time"].values
+    area = nominal_area(dataset)
+    known = material_of(dataset) if material is None else material
+    strain = _effective(known, steps["time"].values, steps["force"].values / area, kept)
+    falling = np.diff(steps["force"].values) < -1e-9 * float(steps["force"].max())
+    last = steps["time"].values[int(np.argmax(falling))] if falling.any() else math.inf
+    strain = np.where(kept <= last, strain / rms_slope(dataset["height"], periodic=True), np.nan)
+    found = {
+        "persson_contact_area": ("time", area * persson_fraction(strain)),
+        "asperity_contact_area": ("time", area * asperity_fraction(strain)),
+    }
+    return describe(xr.Dataset(found, coords={"time": dataset["time"]}))
+
+
+def _effective(material: Any, times: np.ndarray, pressure: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """``int C(t - s) dp(s)`` at some times, of a pressure that is linear between those where it is known."""
+    since = np.maximum(at[:, None] - times[None], 0.0)
+    integral = np.asarray(material.contact_integral(since), dtype=float)
+    rate = np.diff(pressure) / np.diff(times)
+    at_start = np.asarray(material.contact_compliance(since[:, 0]), dtype=float) * pressure[0]
+    return at_start + (integral[:, :-1] - integral[:, 1:]) @ rate

@@ -1,0 +1,95 @@
+"""Thermal and electrical conductance of the contact spots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.labels import describe
+from roughvisc.study.statement.resistivity import Kind, resistivities
+from roughvisc.views.observables.connectivity import label_clusters
+from roughvisc.views.observables.frozen import over_frames
+
+
+def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Kind | None = None) -> xr.Dataset:
+    r"""Conductance of the contact spots at every kept time: one solution each.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``.
+    resistivity : pair of float or str
+        Resistivities of the two bodies; zero for a perfect conductor. Strings state the unit, which says whether they
+        are thermal, as ``"0.2 K m/W"``, or electrical, as ``"1.7e-8 ohm m"``. [K m/W] or [ohm m]
+    kind : {"thermal", "electrical"}, optional
+        What flows, where the resistivities are numbers. Default: heat.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], its error, and beside it
+        the estimates that end in ``_holm`` and ``_greenwood``. Zero without contact; infinite where periodic
+        boundaries are in full contact. Attribute ``resistivity``: those of the two bodies.
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or the resistivities are not two of one kind, not
+        negative, and not both zero.
+
+    Notes
+    -----
+    All spots are at one potential, and far away each body is at another: :math:`G = 2k / (\rho_1 + \rho_2)` with the
+    stiffness :math:`k` of a flat punch of the same spots over the contact modulus [1]_; a single disc has
+    :math:`4a / (\rho_1 + \rho_2)`. Each body conducts as a half-space, also where a sheet was pressed. With periodic
+    boundaries the conductance is that of the constriction alone, of one period: what the bulk adds to
+    the resistance is counted apart. Nothing flows through the gap, and films on the spots have no resistance.
+
+    Of resistance over half the sum of the resistivities, with the spots' radii :math:`a_i` from their areas and
+    distances :math:`s_{ij}`, Greenwood [2]_ has
+    :math:`1/(2 \sum a_i) + \sum_{i \ne j} a_i a_j / s_{ij} / \pi (\sum a_i)^2`, and Holm
+    :math:`1/(2 \sum a_i) + 1/(2 \alpha)` with the radius :math:`\alpha` of the disc that the spots lie in.
+
+    References
+    ----------
+    .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
+    .. [2] J. A. Greenwood, *Br. J. Appl. Phys.* 17 (1966) 1621-1632.
+    """
+    try:
+        flows, both = resistivities(resistivity, kind)
+    except InputError as error:
+        raise InputError(f"resistivity: {error}") from None
+    stiffness, error, holm, greenwood = over_frames(dataset, _punch_and_estimates, outputs=4)
+    name, factor = f"{flows}_conductance", 2 / sum(both)
+    found = {
+        name: factor * stiffness,
+        f"{name}_error": factor * error,
+        f"{name}_holm": factor * holm,
+        f"{name}_greenwood": factor * greenwood,
+    }
+    described = describe(xr.Dataset(found))
+    for variable in described.data_vars.values():
+        variable.attrs["resistivity"] = list(both)
+    return described
+
+
+def _punch_and_estimates(
+    touching: np.ndarray, present: np.ndarray, *, spacing: tuple[float, float], boundary: Any
+) -> tuple[float, float, float, float]:
+    """Stiffness of the spots over the contact modulus, its error, and Holm's and Greenwood's estimates of it. [m]"""
+    from roughvisc.mechanics.transport import spot_estimates, spots  # slow to import
+
+    found = spots.frozen_contact(touching, spacing, boundary, present=present)
+    if math.isinf(found.stiffness):
+        return found.stiffness, found.error, math.inf, math.inf
+    periodic = boundary == "periodic"
+    labels, _ = label_clusters(touching, periodic)
+    radii, places = spot_estimates.round_spots(labels, present & ~touching, spacing, periodic)
+    period = (spacing[0] * touching.shape[0], spacing[1] * touching.shape[1]) if periodic else None
+    estimates = (one(radii, places, period) for one in (spot_estimates.holm, spot_estimates.greenwood))
+    return found.stiffness, found.error, *estimates  # type: ignore[return-value]

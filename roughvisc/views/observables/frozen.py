@@ -1,0 +1,106 @@
+"""The contact at a kept time with its area frozen: its stiffness against a fast increment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.labels import describe
+from roughvisc.topography.grid import spacing
+from roughvisc.units import quantity
+from roughvisc.views.observables.derived import frame_by_frame, material_of
+from roughvisc.views.observables.spots import contact
+
+
+def incremental_stiffness(
+    dataset: xr.Dataset, *, contact_modulus: float | str | None = None, kernel: Any = None
+) -> xr.Dataset:
+    r"""Stiffness of the contact against a fast increment of load, its area frozen: one solution a kept time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``.
+    contact_modulus : float or str, optional
+        Contact modulus of the increment, :math:`E^* = 2G/(1-\nu)`: the magnitude of the complex one for a small
+        oscillation, the relaxed one for a slow increment that leaves the area alone. Default: that at once,
+        :math:`1/C(0)`, of the material in the case of the result. [Pa]
+    kernel : Kernel, optional
+        Of the body; default: that of the result, a half-space or a sheet.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``incremental_stiffness`` [N/m] and ``frozen_stiffness`` [m], which is it over the contact modulus, each with
+        its error, over time. Without contact they are zero. Where the material has no compliance at once the former
+        is missing: a jump of approach would take an infinite force, and ``frozen_stiffness`` is what is left to know.
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or states no material or body and none is given.
+
+    Notes
+    -----
+    An increment of load raises the pressure as a flat punch of the contact's shape would, since at the edge, where the
+    contact grows, pressure is zero. The approach is that of results: with periodic boundaries on a half-space
+    to its mean plane. :mod:`roughvisc.mechanics.transport.spots` has what the grid leaves.
+    """
+    stiffness, error = over_frames(dataset, partial(_stiffness, kernel=_kernel_of(dataset, kernel)), outputs=2)
+    modulus = (
+        _modulus_at_once(dataset) if contact_modulus is None else quantity(contact_modulus, "Pa", "contact_modulus")
+    )
+    if not (modulus > 0 or np.isnan(modulus)):
+        raise InputError(f"contact_modulus is {contact_modulus!r}: expected a positive number [Pa]")
+    found = {
+        "incremental_stiffness": stiffness * modulus,
+        "incremental_stiffness_error": error * modulus,
+        "frozen_stiffness": stiffness,
+        "frozen_stiffness_error": error,
+    }
+    return describe(xr.Dataset(found))
+
+
+def over_frames(dataset: xr.Dataset, measure: Callable[..., tuple[float, ...]], outputs: int) -> Any:
+    """What a function of contact, present cells, spacing and boundary gives of every frame; lazily on Dask."""
+    touching = contact(dataset)
+    present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
+    boundary = "periodic" if dataset.attrs.get("boundary") == "periodic" else "free"
+    of_frame = partial(measure, spacing=spacing(dataset, "spots"), boundary=boundary)
+    return frame_by_frame(of_frame, touching, present, outputs=outputs)
+
+
+def _stiffness(
+    touching: np.ndarray, present: np.ndarray, *, spacing: tuple[float, float], boundary: Any, kernel: Any
+) -> tuple[float, float]:
+    from roughvisc.mechanics.transport.spots import frozen_contact  # slow to import
+
+    options = {} if kernel is None else {"kernel": kernel}
+    found = frozen_contact(touching, spacing, boundary, present=present, **options)
+    return found.stiffness, found.error
+
+
+def _kernel_of(dataset: xr.Dataset, kernel: Any) -> Any:
+    """Kernel of the body of a result; None: a half-space."""
+    if kernel is not None:
+        return kernel
+    if "kernel" in dataset.attrs:
+        raise InputError(f"the result is of the kernel {dataset.attrs['kernel']}: give kernel=")
+    if "thickness" not in dataset.attrs:
+        return None
+    from roughvisc.study.statement.body import body
+
+    material = material_of(dataset, "the result is of a sheet and does not record its material: give kernel=")
+    return body(material, float(dataset.attrs["thickness"]), dataset.attrs["base"])
+
+
+def _modulus_at_once(dataset: xr.Dataset) -> float:
+    """Contact modulus at once, of the material in the attributes; NaN where that gives way at once by nothing. [Pa]"""
+    missing = "the result does not record its material: give contact_modulus= [Pa]"
+    compliance = float(material_of(dataset, missing).contact_compliance(0.0))
+    return 1 / compliance if compliance > 0 else np.nan

@@ -1,0 +1,101 @@
+"""What a study asks to be observed: derived from its finished results, and added to their files."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.storage.index import index_of, save_index
+from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.store import open_result, result_path, write_result
+from roughvisc.study.storage.table import write_table
+from roughvisc.views.observables.tables import asked
+
+log = logging.getLogger("roughvisc")
+
+#: Attribute of a result that says with what its observables were asked, as JSON.
+OBSERVED = "observed"
+
+
+def observe(
+    cases: Sequence[Case] | str | Path,
+    out: str | Path | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Derive what a study asks for in ``[observe]`` from its finished results, and add it to their files.
+
+    ``roughvisc run`` ends with it; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the same
+    arguments. What a file holds already, asked with the same values, is not derived again. Frames are tasks of Dask: on
+    the default client if there is one, else in threads.
+
+    Parameters
+    ----------
+    cases : sequence of Case, or path
+        Cases, or the study file that states them. Those that are not finished are left out.
+    out : path, optional
+        Folder of the results. Default: ``results/`` and the study's name, beside the study.
+    progress : callable, optional
+        Called with the number of cases that are done and that of all.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files that were added to.
+
+    Raises
+    ------
+    InputError
+        If a result does not allow what is asked for; its file stays as it was.
+    """
+    cases = read_cases(cases) if isinstance(cases, str | Path) else cases
+    distinct = {case.key: case for case in cases if case.settings.observe is not None}
+    folder = result_folder(cases[0], out).absolute()
+    added = []
+    for number, case in enumerate(distinct.values()):
+        if progress is not None:
+            progress(number, len(distinct))
+        path = result_path(folder, case.key)
+        if path.exists() and _add(case, path):
+            added.append(path)
+    if added and len(cases) > 1:
+        index = index_of(folder)
+        save_index(folder, index)
+        write_table(folder, index, {case.key: json.loads(case.to_json()) for case in cases})
+    return added
+
+
+def _add(case: Case, path: Path) -> bool:
+    """Add to one file what it lacks; whether it lacked anything."""
+    wanted: Mapping[str, Any] = case.settings.observe.stated()
+    with open_result(path) as result:
+        before = json.loads(result.attrs.get(OBSERVED, "{}"))
+        lacking = {name: values for name, values in wanted.items() if before.get(name) != values}
+        if not lacking:
+            return False
+        try:
+            found = asked(_frame_by_frame(result), lacking).compute()
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        told = {"case": case.to_json(), OBSERVED: json.dumps(before | wanted)}
+        whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
+            found, compat="equals", join="exact"
+        )
+        whole.attrs = result.attrs | told
+        with held(path.with_name(f".{case.key}.lock")):
+            write_result(whole, path, precision=case.settings.keep.precision)
+    log.info("%s: added %s", path, ", ".join(lacking))
+    return True
+
+
+def _frame_by_frame(result: xr.Dataset) -> xr.Dataset:
+    """A result whose fields are on Dask, a frame a block."""
+    return result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})

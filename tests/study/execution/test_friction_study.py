@@ -1,0 +1,218 @@
+"""Studies of friction: a table ``[friction]`` from the file to results, sweeps, figures and tables."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL, assert_same, numbers
+
+import roughvisc as rv
+from roughvisc.study.execution.cluster import connect
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.execution.watch import Silence
+from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.study.storage.results import open_results
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*Sending large graph.*:UserWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+
+FRICTION = """
+title = "Sliding"
+[surface]
+generate = "self_affine"
+size = ["1 mm", "0.8 mm"]
+shape = [26, 21]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.5 mm"
+shortcut = "0.16 mm"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.3 MPa"
+kelvin_viscosity = "0.3 kPa s"
+[friction]
+pressure = "20 kPa"
+speeds = { from = "2 mm/s", to = "2 m/s", count = 4 }
+[solve]
+boundary = "periodic"
+"""
+BESIDE = 'last_octave = true\n[solve]\ngrid_error = true\nboundary = "periodic"\n'
+PRESSURES = '[sweep]\n"friction.pressure" = ["20 kPa", "40 kPa"]\n'
+TEMPERATURES = FRICTION.replace(
+    "[friction]",
+    'temperature = "20 degC"\nreference_temperature = "20 degC"\nactivation_energy = "80 kJ/mol"\n[friction]',
+)
+
+
+@pytest.fixture
+def case(tmp_path):
+    """Writes a study of friction and reads its only case."""
+
+    def read(text=FRICTION):
+        path = tmp_path / "slide.toml"
+        path.write_text(text)
+        return read_study(path)
+
+    return read
+
+
+def with_beside(text=FRICTION):
+    return text.replace('[solve]\nboundary = "periodic"\n', BESIDE)
+
+
+def test_run__gives_what_the_function_gives(case, tmp_path):
+    one = case(with_beside())
+    ds = rv.run(one, tmp_path / "out", progress=False)
+    surface = rv.self_affine((1e-3, 0.8e-3), (26, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, shortcut=1.6e-4, seed=1)
+    asked = {"pressure": 2e4, "speeds": [2e-3, 2e-2, 0.2, 2.0], "last_octave": True, "grid_error": True}
+    fields = {"fields": ("pressure", "gap"), "progress": False}
+    same = rv.friction(surface, rv.zener(1e6, 0.3e6, 0.3e3), **asked, **fields)
+    assert set(same.data_vars) | {"reduced_speed"} == set(ds.data_vars)
+    xr.testing.assert_equal(
+        ds.drop_vars(["wall_time", "case_key", "reduced_speed"]).load(), same.drop_vars("wall_time")
+    )
+    assert ds.attrs["case_key"] == one.key
+    assert json.loads(ds.attrs["case"])["friction"]["speeds"] == [2e-3, 2e-2, 0.2, 2.0]
+    assert ds.attrs["title"] == "Sliding"
+    assert "without shear or adhesion" in ds.attrs["comment"]
+    assert ds.attrs["last_octave"] == same.attrs["last_octave"]
+    stamp = (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns
+    rv.run(one, tmp_path / "out", progress=False)
+    assert (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns == stamp, "finished, and not computed again"
+
+
+def test_run__interrupted_goes_on_with_the_same_bits(case, tmp_path, caplog):
+    one = case(with_beside())
+    run_case(one, tmp_path / "whole")
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return len(asked) == 2
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(one, tmp_path / "out", stop=stop)
+    assert not list((tmp_path / "out").glob("*.nc"))
+    told = []
+    with caplog.at_level(logging.INFO, "roughvisc"):
+        run_case(one, tmp_path / "out", progress=lambda now, end: told.append((now, end)))
+    assert "goes on from speed 3" in caplog.text
+    assert told == [(3.0, 4.0), (4.0, 4.0)], "two speeds are not computed again"
+    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "whole"))
+    assert [p.name for p in (tmp_path / "out").iterdir()] == [f"{one.key}.nc"], "nothing else is left"
+
+
+def test_sweep__opens_as_one_and_as_a_table(tmp_path):
+    (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES)
+    ds = rv.sweep(tmp_path / "slide.toml", tmp_path / "out", workers=0, progress=False)
+    assert ds.friction_coefficient.dims == ("case", "speed")
+    assert ds.pressure.dims == ("case", "speed", "x", "y")
+    assert ds["friction.pressure"].values.tolist() == [2e4, 4e4]
+    np.testing.assert_allclose(ds.pressure.mean(("x", "y")), ds.nominal_pressure)
+    one = rv.open_result(tmp_path / "out" / f"{ds.case_key.values[1]}.nc")
+    xr.testing.assert_equal(ds.gap.isel(case=1, drop=True).variable.load(), one.gap.variable.load())
+    table = rv.to_table(tmp_path / "out")
+    peak = ds.friction_coefficient.argmax("speed")
+    np.testing.assert_allclose(table["friction_coefficient"], ds.friction_coefficient.max("speed"))
+    np.testing.assert_allclose(table["speed [m/s]"], ds.speed[peak])
+    np.testing.assert_allclose(table["contact_area_corrected [m^2]"], ds.contact_area_corrected.isel(speed=peak))
+    assert table["friction.pressure [kPa]"].tolist() == [20, 40]
+    assert table["status"].tolist() == ["converged", "converged"]
+    assert "time [s]" not in table
+    assert (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig").count("converged") == 2
+    rv.to_csv(one, tmp_path / "one.csv")
+    assert (tmp_path / "one.csv").read_text().startswith("speed [m/s],")
+
+
+def test_sweep__on_a_cluster_ends_with_the_same_bits(tmp_path, by_hand):
+    (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES + '"friction.direction" = ["x", "-y"]\n')
+    cases = read_cases(tmp_path / "slide.toml")
+    with connect(file=by_hand) as client:
+        outcomes = run_cases(cases, tmp_path / "there", watch=Silence(), client=client)
+    assert [one.kind for one in outcomes.values()] == ["done"] * 4
+    run_cases(cases, tmp_path / "here", watch=Silence(), workers=0)
+    assert_same(numbers(tmp_path / "there"), numbers(tmp_path / "here"))
+
+
+def test_results__over_time_and_over_speed_are_not_put_into_one(case, tmp_path):
+    (tmp_path / "ball.toml").write_text(BALL)
+    cases = [case(), read_study(tmp_path / "ball.toml")]
+    for one in cases:
+        run_case(one, tmp_path / "out")
+    with pytest.raises(rv.InputError, match=r"lies over speed, .* over time: open them with ragged=True"):
+        open_results(tmp_path / "out", cases=cases)
+    tree = open_results(tmp_path / "out", cases=cases, ragged=True)
+    assert [set(tree[one.key].dims) for one in cases] == [{"speed", "x", "y"}, {"time", "step", "x", "y"}]
+    table = rv.to_table(tmp_path / "out")
+    assert table["friction_coefficient"].notna().sum() == table["time [s]"].notna().sum() == 1
+    curve = rv.open_result(tmp_path / "out" / f"{cases[0].key}.nc")
+    for derive in (rv.observables.history, rv.observables.clusters, rv.deformed):
+        with pytest.raises(rv.InputError, match="lies over the speed of steady sliding: expected a history over time"):
+            derive(curve)
+
+
+def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
+    """At 40 degrees the curve of 20 degrees lies at a speed that is larger by the shift factor."""
+    reference = rv.run(case(TEMPERATURES), tmp_path, progress=False)
+    np.testing.assert_allclose(reference.reduced_speed, reference.speed)
+    factor = rv.arrhenius_shift(313.15, 293.15, 80e3)
+    faster = [speed / factor for speed in reference.speed.values.tolist()]
+    warm = vary(case(TEMPERATURES), {"material.temperature": "40 degC", "friction.speeds": faster})
+    shifted = rv.run(warm, tmp_path, progress=False)
+    np.testing.assert_allclose(shifted.reduced_speed, reference.speed, rtol=1e-9)
+    np.testing.assert_allclose(shifted.friction_coefficient, reference.friction_coefficient, rtol=1e-6)
+    plain = rv.run(case(), tmp_path, progress=False)
+    assert plain.attrs["case_key"] == reference.attrs["case_key"], "at the reference temperature nothing is shifted"
+
+
+def test_unconverged_speed__is_told_by_its_speed(case, tmp_path, stubborn):
+    with pytest.raises(rv.ConvergenceError, match=r"1 of 4 speeds did not converge, first at 0\.02 m/s"):
+        rv.run(case(), tmp_path, progress=False)
+
+
+def test_plan__counts_speeds_and_says_what_it_refuses(case):
+    costs = rv.plan([case(), vary(case(), {"friction.speeds": ["1 mm/s", "1 m/s"]})])
+    assert costs.speeds.values.tolist() == [4, 2]
+    assert np.isnan(costs.steps).all()
+    assert (costs.convolutions > 50).all()
+    assert (costs.wall_time > 0).all()
+    assert costs.attrs["refusal"] == ""
+    fluid = vary(case(), {"material": {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}})
+    assert "creeps without end" in rv.plan([fluid]).attrs["refusal"]
+
+
+def test_plan__expects_about_the_work_that_is_done(case, tmp_path):
+    ds = rv.run(case(), tmp_path, progress=False)
+    done = float((2 * ds.iterations + 5 * ds.outer_iterations).sum())
+    assert 0.5 * done < float(rv.plan([case()]).convolutions[0]) < 2 * done
+
+
+def test_trade__refuses_friction(case):
+    with pytest.raises(rv.InputError, match="friction: found steady sliding, which has no program"):
+        rv.trade(case(), progress=False)
+
+
+def test_command__runs_plots_and_reports(invoke, tmp_path, coarse_pictures):
+    (tmp_path / "slide.toml").write_text(with_beside())
+    status, out, err = invoke("run", "slide.toml")
+    assert (status, err) == (0, "")
+    for words in ("4, from 2 mm/s to 2 m/s, along x", "the largest", "grid error of friction", "contact problems"):
+        assert words in " ".join(out.split())
+    drawn = {p.stem.rpartition("-")[2] for p in (tmp_path / "results" / "slide").glob("*.png")}
+    assert drawn == {"friction", "pressure_maps", "surface"}
+    status, out, _ = invoke("plan", "slide.toml")
+    assert (status, "Speeds a case" in out, "Steps a case" in out) == (0, True, False)
+    status, _, _ = invoke("report", "results/slide")
+    page = (tmp_path / "results" / "slide" / "report.html").read_text()
+    assert status == 0
+    for words in ("Largest<br>friction", "4 speeds, 2 mm/s to 2 m/s, pressure 20 kPa, along x", "Pressure maps"):
+        assert words in page
+    assert invoke("verify", "results/slide")[0] == 0
+    status, _, err = invoke("trade", "slide.toml")
+    assert (status, "friction: found steady sliding" in err) == (2, True)

@@ -1,0 +1,79 @@
+"""The memory that a march is said to take, against what it takes."""
+
+import gc
+import tracemalloc
+
+import pytest
+
+from roughvisc.mechanics.hereditary.choice import choose_memory
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.simulation import simulate as simulate_module
+from roughvisc.study.simulation.footprint import march_bytes
+from roughvisc.study.simulation.scene import memory_wanted
+from roughvisc.study.statement.case import read_study, vary
+from roughvisc.study.storage.store import open_result
+
+ROUGH = """
+title = "Rough"
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [160, 144]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.25 mm"
+shortcut = "50 um"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+pressure = "6 kPa"
+over = "10 ms"
+[[program]]
+hold = "0.5 s"
+[solve]
+boundary = "periodic"
+tolerance = 1e-2
+[keep]
+fields = ["pressure"]
+times = 2
+"""
+ELASTIC = {"material": {"model": "elastic", "shear_modulus": 3e6}, "surface.shape": [400, 360]}
+THREE = {"model": "prony", "glassy": 3e-7, "compliances": [1e-7, 2e-7, 1e-7], "times": [0.01, 0.05, 0.3]}
+FREE = {"solve.boundary": "free", "solve.edge": "accept"}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The case, and a folder in which it was computed once, so that what is imported late is there."""
+    folder = tmp_path_factory.mktemp("footprint")
+    (folder / "rough.toml").write_text(ROUGH)
+    case = read_study(folder / "rough.toml")
+    run_case(vary(case, {"surface.shape": [48, 45]}), folder)
+    return case, folder
+
+
+@pytest.mark.parametrize(
+    "changes", [ELASTIC, {}, *(pytest.param(one, marks=pytest.mark.long) for one in (FREE, {"material": THREE}))]
+)
+def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
+    monkeypatch.setattr(simulate_module, "expect_arrays", lambda size: None)  # is never touched
+    case, folder = vary(study[0], changes), study[1]
+    gc.collect()
+    tracemalloc.start()
+    try:
+        path = run_case(case, folder)
+        taken = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    with open_result(path) as ds:
+        contact, rows, cells = float(ds.contact_fraction.max()), ds.sizes["time"], ds.sizes["x"] * ds.sizes["y"]
+    settings = case.solving()
+    memory = choose_memory(case.material(), **memory_wanted(case.program().on_area(1e-6), settings)).memory
+    stated = march_bytes(settings, cells, memory, contact=contact, rows=rows)
+    assert stated == pytest.approx(taken, rel=0.1), (
+        f"{taken / 8 / cells:.1f} fields taken, {stated / 8 / cells:.1f} stated"
+    )

@@ -1,0 +1,191 @@
+"""Maps of more cells than are drawn: extremes stay, little is read at a time, small maps are as they were."""
+
+import base64
+import io
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+
+import roughvisc as rv
+from roughvisc.study.storage import encoding, reading, store
+from roughvisc.topography import blocks
+from roughvisc.topography.grid import cell_edges
+from roughvisc.views.figures import animate, coarsened, fields, sections
+from roughvisc.views.report import frames
+
+SHAPE, CELL = (50, 37), (2e-6, 3e-6)
+
+
+def result(displacement=False):
+    """Two frames: nothing but one cell in contact; and a patch, with the highest pressure in one cell of it."""
+    x, y = ((np.arange(n) + 0.5) * d for n, d in zip(SHAPE, CELL, strict=True))
+    random = np.random.default_rng(0)
+    height = 1e-6 * random.standard_normal(SHAPE)
+    pressure = np.zeros((2, *SHAPE))
+    pressure[0, 17, 23] = 2e6
+    pressure[1, 10:30, 5:20] = 1e6
+    pressure[1, 21, 13] = 9e6
+    gap = np.where(pressure > 0, 0.0, 1e-7 + 1e-6 * random.random(pressure.shape))
+    kept = {"pressure": (("time", "x", "y"), pressure), "gap": (("time", "x", "y"), gap)}
+    if displacement:
+        kept["displacement"] = (("time", "x", "y"), height + gap - 3e-6)
+    histories = {name: ("time", [1.0, 2.0]) for name in ("force", "approach", "contact_area")}
+    return xr.Dataset(
+        {"height": (("x", "y"), height), **kept, **histories},
+        coords={"time": [0.1, 0.2], "x": x, "y": y},
+        attrs={"boundary": "periodic", "tolerance": 1e-3, "title": "made up"},
+    )
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Maps of at most 16 cells a side, read a few rows at a time: a cell drawn for 4 x 4."""
+    monkeypatch.setattr(coarsened, "MOST_DRAWN", 16)
+    monkeypatch.setattr(blocks, "BLOCK", 8 * 37 * 4)
+
+
+@pytest.fixture
+def stored(tmp_path, monkeypatch):
+    """The result in a file of small chunks, and the shapes that are read of it."""
+    monkeypatch.setattr(encoding, "_MANY_CELLS", 100)
+    monkeypatch.setattr(encoding, "_CHUNK_OF_MANY", (1, 8, 8))
+    path, shapes = store.write_result(result(displacement=True), tmp_path / "result.nc"), []
+    read = reading._Field._read
+
+    def told(self, key):
+        found = read(self, key)
+        shapes.append(found.shape)
+        return found
+
+    monkeypatch.setattr(reading._Field, "_read", told)
+    with store.open_result(path) as dataset:
+        yield dataset, shapes
+
+
+def test_present__of_a_small_map_is_the_map():
+    ds = result()
+    ds["height"][3, 4] = np.nan
+    xr.testing.assert_identical(
+        coarsened.present(ds, "pressure", 1), ds["pressure"].isel(time=1).where(ds["height"].notnull())
+    )
+    assert coarsened.note(ds, "pressure") == ""
+
+
+def test_present__keeps_the_extremes_of_every_block(coarse):
+    ds = result(displacement=True)
+    ds["height"][:4, :4] = ds["height"][6, 7] = np.nan
+    drawn = {name: coarsened.present(ds, name, 1) for name in ("pressure", "gap", "displacement")}
+    touching = coarsened.touching(ds, 1)
+    assert touching.shape == (13, 10)
+    assert np.isnan(drawn["pressure"].values[0, 0])
+    assert np.isfinite(drawn["pressure"].values[1, 1])
+    for i, j in np.ndindex(touching.shape):
+        block = ds.isel(time=1, x=slice(4 * i, 4 * i + 4), y=slice(4 * j, 4 * j + 4))
+        assert bool(touching[i, j]) == bool((block["pressure"] > 0).any())
+        block = block.where(block["height"].notnull())
+        for name, kept in (("pressure", block["pressure"].max()), ("gap", block["gap"].min())):
+            np.testing.assert_array_equal(drawn[name][i, j], kept)
+        np.testing.assert_allclose(drawn["displacement"][i, j], block["displacement"].mean(), rtol=1e-12)
+
+
+def test_present__lies_where_the_cells_lie(coarse):
+    drawn, ds = coarsened.present(result(), "gap", 0), result()
+    for axis, count in zip(("x", "y"), SHAPE, strict=True):
+        np.testing.assert_allclose(cell_edges(drawn[axis])[: count // 4 + 1], cell_edges(ds[axis])[: count + 1 : 4])
+
+
+def test_maps__show_a_lone_spot_and_say_so(coarse):
+    figure = rv.plot.maps(result(), times=[0.1, 0.2])
+    images = [image for ax in figure.axes for image in ax.images if image.get_gid() == "pressure"]
+    assert [float(image.get_array().max()) for image in images] == pytest.approx([2.0, 9.0])
+    assert (images[0].get_array() > 0).sum() == 1
+    assert "4 × 4" in figure.get_suptitle()
+    assert "largest pressure" in figure.get_suptitle()
+    assert "smallest gap" in figure.get_suptitle()
+
+
+def test_maps__tell_the_largest_pressure_where_it_is_beyond_the_scale(coarse, monkeypatch):
+    monkeypatch.setattr(fields, "_MANY", 10)
+    figure = rv.plot.maps(result(), times=0.2)
+    labels = [ax.get_ylabel() for ax in figure.axes]
+    assert any(label.startswith("at most 9 MPa\n") for label in labels), labels
+
+
+def test_report__shows_a_lone_spot(coarse, monkeypatch):
+    monkeypatch.setattr(frames, "_LADDER", ((2, 5),))
+    found = frames.frames_of(result(), 10**6)
+    assert found["block"] == 12
+    assert found["extremes"]
+    png = base64.b64decode(found["frames"][0]["maps"][0].partition(",")[2])
+    with Image.open(io.BytesIO(png)) as picture:
+        pixels = np.array(picture)
+    assert (pixels != frames._MARKED).sum() == 1, "white but for one cell"
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(stored, boundary):
+    opened, shapes = stored
+    opened.attrs["boundary"] = boundary
+    loaded = opened.copy(deep=True).load()
+    shapes.clear()
+    for name in ("clusters", "percolation", "gap_statistics", "pressure_distribution", "gap_distribution"):
+        observe = getattr(rv.observables, name)
+        xr.testing.assert_allclose(observe(opened).compute(), observe(loaded), rtol=1e-13)
+        xr.testing.assert_allclose(observe(loaded.chunk(time=1)).compute(), observe(loaded), rtol=1e-13)
+    areas = rv.observables.cluster_areas(opened)
+    xr.testing.assert_identical(areas, rv.observables.cluster_areas(loaded))
+    contact = rv.observables.contact(opened)
+    assert contact.chunks
+    assert max(int(np.prod(shape)) for shape in shapes) == SHAPE[0] * SHAPE[1], "a frame"
+    xr.testing.assert_equal(contact.compute(), rv.observables.contact(loaded))
+
+
+def test_figures__of_a_big_file_read_some_rows_at_a_time(stored, coarse):
+    opened, shapes = stored
+    shapes.clear()
+    rv.plot.maps(opened)
+    rv.plot.section(opened)
+    _, move, chosen = animate._moving(opened, None, 2)
+    move(chosen[-1])
+    frames.frames_of(opened, 10**6)
+    assert max(int(np.prod(shape)) for shape in shapes) <= 8 * SHAPE[1], "rows of one chunk"
+    assert not any(opened[name].variable._in_memory for name in ("height", "pressure", "gap", "displacement"))
+
+
+def test_deformed_line__is_that_of_the_whole_surface(coarse):
+    ds = result(displacement=True)
+    for one in (ds, ds.drop_vars("gap"), ds.drop_vars("displacement")):
+        whole = sections.deformed_surface(one, 1)
+        np.testing.assert_allclose(sections.deformed_line(one, 1, "y", 13), whole.isel(y=13), rtol=1e-12)
+    np.testing.assert_allclose(sections.deformed_surface(ds, 1), ds["height"] + ds["gap"].isel(time=1), atol=1e-15)
+
+
+def test_section__is_cut_where_most_is_carried(coarse):
+    ds = result()
+    for axis, along in (("x", "y"), ("y", "x")):
+        carried = ds["pressure"].isel(time=1).sum(along)
+        assert sections.cut_position(ds, 1, axis) == carried.values.argmax()
+        peaks = ds["height"].max(along)
+        assert sections.cut_position(ds.drop_vars("pressure"), 1, axis) == peaks.values.argmax()
+
+
+def test_surface__of_many_points_tells_its_extremes(coarse):
+    height = result()["height"]
+    height.attrs["units"] = "m"
+    before = height.copy(deep=True)
+    height[3, 4] = np.nan
+    figure = rv.plot.surface(height)
+    assert figure.axes[0].images[0].get_array().shape == (10, 13)
+    told = figure.get_suptitle()
+    assert "4 × 4" in told
+    for end in (before.min(), before.max()):
+        assert f"{float(end) * 1e6:.3g} µm" in told
+    assert int(height.isnull().sum()) == 1, "the heights given stay as they are"
+
+
+def test_file__of_a_big_grid_is_chunked_by_frame_and_place(stored):
+    opened, _ = stored
+    assert opened["pressure"].encoding["chunksizes"] == (1, 8, 8)
+    assert opened["height"].encoding["chunksizes"] == (8, 8)

@@ -1,0 +1,97 @@
+"""Contact area by theory: elastic limits, creep, ramps, and where the theories do not hold."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import erf
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.views import plot
+from roughvisc.views.observables import area_by_theory
+
+SIDE = 1e-3
+SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE / 3, seed=3)
+SLOPE = float(rv.parameters(SURFACE, periodic=True)["rms_slope"])
+RUBBER = rv.zener(3e6, 1e6, 1e5)
+
+
+def loaded(times, pressures, **attrs):
+    """A result with a history of the nominal pressure, piecewise linear, and a jump at its start."""
+    return xr.Dataset(
+        {"force": ("time", SIDE**2 * np.asarray(pressures, dtype=float)), "height": SURFACE},
+        {"time": np.asarray(times, dtype=float)},
+        attrs={"boundary": "periodic", **attrs},
+    )
+
+
+def test_elastic__both_limits_by_hand():
+    pressures = np.array([0.0, 1e2, 1e4, 1e6])
+    found = area_by_theory(loaded(np.arange(4), pressures), material=rv.elastic(1e6, 0.3))
+    strain = pressures / (2e6 / 0.7) / SLOPE
+    np.testing.assert_allclose(found["persson_contact_area"], SIDE**2 * erf(math.sqrt(2) * strain), rtol=1e-9)
+    np.testing.assert_allclose(found["asperity_contact_area"], SIDE**2 * math.sqrt(2 * math.pi) * strain, rtol=1e-9)
+    ratio = float(found["persson_contact_area"][1] / found["asperity_contact_area"][1])
+    assert ratio == pytest.approx(2 / math.pi, rel=1e-3), "sqrt(8/pi) over sqrt(2 pi)"
+
+
+def test_creep__replaces_the_compliance():
+    times = np.array([0.0, 0.01, 0.1, 1.0])
+    found = area_by_theory(loaded(times, np.full(4, 2e4)), material=RUBBER)["persson_contact_area"]
+    exact = erf(math.sqrt(2) * 2e4 * RUBBER.contact_compliance(times) / SLOPE)
+    np.testing.assert_allclose(found, SIDE**2 * exact, rtol=1e-12)
+
+
+def test_ramp__is_the_integral_of_the_compliance():
+    times = np.array([0.0, 0.03, 0.1])
+    found = area_by_theory(loaded(times, 3e5 * times), material=RUBBER)["asperity_contact_area"]
+    exact = math.sqrt(2 * math.pi) * 3e5 * RUBBER.contact_integral(times) / SLOPE
+    np.testing.assert_allclose(found, SIDE**2 * exact, rtol=1e-12)
+
+
+def test_falling_load__is_left_out():
+    ds = loaded(np.arange(5), [0.0, 1e4, 1e4, 9e3, 2e4])
+    assert area_by_theory(ds, material=RUBBER)["persson_contact_area"].isnull().values.tolist() == [0, 0, 0, 1, 1]
+
+
+def test_solution__lies_near_the_theories():
+    """512^2 runs of others have 2.1 to 2.6 times ``p / (E* h')`` at low loads; the small grid adds to it."""
+    program = rv.Program().pressure(3e4, over=0.05).hold(1.0)
+    ds = rv.simulate(SURFACE, RUBBER, program, boundary="periodic", tolerance=1e-2, times=4, progress=False, fields=())
+    theory = area_by_theory(ds, material=RUBBER)
+    part = (ds["contact_area_corrected"] / theory["persson_contact_area"])[1:]
+    assert ((part > 0.9) & (part < 2.0)).all()
+    figure = plot.history(ds.assign_attrs(case=CASE), persson=True)
+    (line,) = (line for ax in figure.axes for line in ax.lines if line.get_label() == "Persson")
+    np.testing.assert_allclose(line.get_ydata()[-1], 1e6 * theory["persson_contact_area"][-1], rtol=1e-6)
+
+
+CASE = """{"surface": {"generate": "wavy", "amplitude": 1e-6, "wavelength": 1e-3, "size": 1e-3, "shape": 16},
+ "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
+ "program": [{"load": 1e-3, "over": 0.1}]}"""
+
+
+@pytest.mark.parametrize(
+    ("attrs", "message"),
+    [
+        ({"boundary": "free"}, "surfaces without borders"),
+        ({"thickness": 1e-3, "base": "bonded"}, "of a half-space: found a result with the thickness 0.001"),
+        ({}, "does not record its material: give material="),
+    ],
+)
+def test_where_theories_do_not_hold__says_so(attrs, message):
+    with pytest.raises(InputError, match=message):
+        area_by_theory(loaded([0.0, 1.0], [0.0, 1e4], **attrs))
+
+
+def test_figure__draws_both_theories_up_to_the_nominal_area():
+    ds = loaded([0.0, 1.0], [0.0, 3e5]).assign(contact_area_corrected=("time", [0.0, 0.5 * SIDE**2]))
+    (ax,) = plot.area_against_load(ds, contact_modulus=4e6).axes
+    drawn = {line.get_label(): line for line in ax.lines}
+    x, y = drawn["Persson"].get_data()
+    strain = x * 1e-3 / SIDE**2 / 4e6 / SLOPE
+    np.testing.assert_allclose(y * 1e-6, SIDE**2 * erf(math.sqrt(2) * strain), rtol=1e-9)
+    assert drawn["low loads"].get_ydata().max() <= 1e6 * SIDE**2
+    assert drawn["low loads"].get_xdata().max() < x.max()

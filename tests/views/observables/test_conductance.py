@@ -1,0 +1,179 @@
+"""Conductance and stiffness of the spots of whole results, against Hertz and against the run's own increments."""
+
+import json
+import math
+
+import dask.array
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.sheet import Sheet
+from roughvisc.mechanics.transport.spots import frozen_contact
+from roughvisc.variables import VARIABLES
+from roughvisc.views.observables import conductance, incremental_stiffness, secant_stiffness
+
+RADIUS = 1e-2
+RUBBER = rv.zener(3e6, 1e6, 1e5)
+
+
+def pressed(material=RUBBER, load=0.02, cells=63, **settings):
+    height = rv.sphere(RADIUS, 1.2e-3, (cells, cells - 1))
+    return rv.simulate(
+        height,
+        material,
+        rv.Program().load(load, over=0).hold(1.0),
+        times=[0.0, 0.1, 1.0],
+        fields=("pressure",),
+        progress=False,
+        **settings,
+    )
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return pressed()
+
+
+def test_ball__conducts_as_a_disc_of_its_radius(ball):
+    """``4 a / (rho_1 + rho_2)`` with the exact radius of the growing contact."""
+    radius = rv.closed_forms.lee_radok_step(RADIUS, RUBBER, 0.02).radius(ball["time"].values)
+    found = conductance(ball, (5.0, 0.02))
+    off = found["thermal_conductance"] / (4 * radius / 5.02) - 1
+    assert np.abs(off).max() < 1.5e-2
+    assert (np.abs(off) < found["thermal_conductance_error"] / found["thermal_conductance"]).all()
+    for estimate in ("holm", "greenwood"):  # one spot: nothing interacts
+        np.testing.assert_allclose(found[f"thermal_conductance_{estimate}"] / (4 * radius / 5.02), 1, atol=1.5e-2)
+    assert found["thermal_conductance"].attrs["units"] == "W/K"
+    assert conductance(ball, ("2 ohm m", 0))["electrical_conductance"].attrs["units"] == "S"
+
+
+def test_resistivities__say_what_flows(ball):
+    heat = conductance(ball, ("0.2 K m/W", 0))["thermal_conductance"]
+    xr.testing.assert_allclose(conductance(ball, [0.1, 0.1])["thermal_conductance"], heat)
+    charge = conductance(ball, (0.2, 0.0), kind="electrical")["electrical_conductance"]
+    np.testing.assert_allclose(charge, heat)
+    assert not set(conductance(ball, (1, 1), kind="electrical")) & set(conductance(ball, (1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("resistivity", "kind", "message"),
+    [
+        (1.0, None, "resistivity: found 1.0: expected a list of two"),
+        ("1 ohm m", None, "expected a list of two"),
+        ((1.0,), None, "expected a list of two"),
+        ((0.0, 0), None, "not both zero"),
+        ((1.0, -1), None, "none below zero"),
+        (("1 ohm m", "1 K m/W"), None, "resistivity: found '1 K m/W', which is in"),
+        (("1 ohm m", 0), "thermal", "which is in"),
+        ((1, 1), "sound", "found the kind 'sound': expected 'thermal' or 'electrical'"),
+        ((np.nan, 1), None, "finite"),
+    ],
+)
+def test_wrong_resistivities__are_refused(ball, resistivity, kind, message):
+    with pytest.raises(InputError) as caught:
+        conductance(ball, resistivity, kind=kind)
+    assert message in str(caught.value)
+
+
+def test_results__on_dask_are_alike_and_lazy(ball):
+    lazy = conductance(ball.chunk(time=1), (1, 1))
+    assert isinstance(lazy["thermal_conductance"].data, dask.array.Array)
+    xr.testing.assert_allclose(lazy.compute(scheduler="synchronous"), conductance(ball, (1, 1)))
+
+
+def test_stiffness__is_what_a_small_increment_of_load_meets():
+    """Of an elastic ball: ``dF/d(approach)`` between two loads, from two runs; the secant of creep is another one."""
+    ball = rv.elastic(3e6)
+    loads = 0.02 * np.array([0.999, 1.001])
+    below, above = (pressed(ball, load, tolerance=1e-6, cells=31).isel(time=0) for load in loads)
+    slope = np.diff(loads)[0] / float(above["approach"] - below["approach"])
+    middle = pressed(ball, 0.02, tolerance=1e-6, cells=31).assign_attrs(case=_case("elastic", shear_modulus=3e6))
+    assert int(((above["pressure"] > 0) != (below["pressure"] > 0)).sum()) == 0, "choose another load"
+    found = incremental_stiffness(middle)
+    assert float(found["incremental_stiffness"][0]) == pytest.approx(slope, rel=1e-3)
+    modulus = rv.closed_forms.hertz(RADIUS, 12e6, 0.02)
+    assert float(found["incremental_stiffness"][0]) == pytest.approx(2 * 12e6 * modulus.radius, rel=2e-2)
+
+
+def _case(model, **values):
+    study = {
+        "surface": {"generate": "sphere", "radius": RADIUS, "size": 1.2e-3, "shape": 16},
+        "material": {"model": model, **values},
+        "program": [{"load": 0.02, "over": 0.0}],
+    }
+    return json.dumps(study)
+
+
+def test_stiffness__of_a_rubber_is_that_at_once(ball):
+    with pytest.raises(InputError, match="does not record its material: give contact_modulus="):
+        incremental_stiffness(ball)
+    known = ball.assign_attrs(case=_case("zener", shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5))
+    found = incremental_stiffness(known)
+    np.testing.assert_allclose(found["incremental_stiffness"], 12e6 * found["frozen_stiffness"])
+    np.testing.assert_allclose(found["incremental_stiffness_error"], 12e6 * found["frozen_stiffness_error"])
+    slow = incremental_stiffness(ball, contact_modulus="3 MPa")["incremental_stiffness"]
+    np.testing.assert_allclose(slow, found["incremental_stiffness"] / 4)
+    assert not np.allclose(secant_stiffness(ball)["secant_stiffness"], found["incremental_stiffness"], rtol=0.5)
+    with pytest.raises(InputError, match="expected a positive number"):
+        incremental_stiffness(ball, contact_modulus=0)
+
+
+def test_stiffness__of_what_gives_way_at_once_by_nothing(ball):
+    known = ball.assign_attrs(case=_case("kelvin_voigt", shear_modulus=1e6, viscosity=1e5))
+    found = incremental_stiffness(known)
+    assert found["incremental_stiffness"].isnull().all()
+    assert (found["frozen_stiffness"] > 0).all()
+
+
+def test_sheet__is_pressed_as_one_and_conducts_as_a_half_space():
+    ds = pressed(rv.elastic(1e6, 0.3), 0.002, cells=31, thickness=2e-4, base="slipping")
+    contact = ds["pressure"].values[0] > 0
+    cells = tuple(float(ds[axis][1] - ds[axis][0]) for axis in "xy")
+    with pytest.raises(InputError, match="of a sheet and does not record its material: give kernel="):
+        incremental_stiffness(ds, contact_modulus=1e6)
+    for known, options in (
+        (ds.assign_attrs(case=_case("elastic", shear_modulus=1e6, poisson=0.3)), {}),
+        (ds, {"kernel": Sheet(2e-4, 0.3, "slipping")}),
+    ):
+        stiffness = incremental_stiffness(known, contact_modulus=1e6, **options)["frozen_stiffness"][0]
+        exact = frozen_contact(contact, cells, kernel=Sheet(2e-4, 0.3, "slipping")).stiffness
+        assert float(stiffness) == pytest.approx(exact)
+    flows = float(conductance(ds, (1, 1))["thermal_conductance"][0])
+    assert flows == pytest.approx(frozen_contact(contact, cells).stiffness)
+    assert exact > 1.1 * flows
+    with pytest.raises(InputError, match="the result is of the kernel Mine"):
+        incremental_stiffness(ds.assign_attrs(kernel="Mine()"), contact_modulus=1e6)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_no_contact_and_full_contact(boundary):
+    cells = (np.arange(8) + 0.5) * 1e-6
+    pressure = np.stack([np.zeros((8, 8)), np.ones((8, 8))])
+    ds = xr.Dataset(
+        {"pressure": (("time", "x", "y"), pressure)},
+        {"time": [0.0, 1.0], "x": cells, "y": cells},
+        attrs={"boundary": boundary},
+    )
+    found = conductance(ds, (1.0, 1.0))
+    assert (found.isel(time=0).to_array() == 0).all()
+    square = math.pi * 0.36678742 * 8e-6 if boundary == "free" else math.inf
+    assert float(found["thermal_conductance"][1]) == pytest.approx(square, rel=2e-3)
+    assert np.isinf(found["thermal_conductance_greenwood"][1]) == (boundary == "periodic")
+
+
+def test_punch__is_corrected_and_no_worse_for_its_staircase():
+    height = rv.flat_punch(5e-4, 1.2e-3, (48, 47))
+    contact = height.notnull().astype(float).drop_attrs()
+    ds = xr.Dataset({"pressure": contact.expand_dims(time=[0.0]), "height": height}, attrs={"boundary": "free"})
+    found = float(conductance(ds, (1, 1))["thermal_conductance"][0])
+    area = float(contact.sum()) * (1.2e-3 / 48) * (1.2e-3 / 47)
+    assert found == pytest.approx(2 * math.sqrt(area / math.pi), rel=1e-3)
+
+
+def test_variables__state_their_errors():
+    for name in ("thermal_conductance", "electrical_conductance", "incremental_stiffness", "frozen_stiffness"):
+        assert VARIABLES[name].ancillary == (f"{name}_error",)
+        assert VARIABLES[f"{name}_error"].units == VARIABLES[name].units

@@ -1,0 +1,176 @@
+"""``[observe]`` after a run: what a study asks for stands in the files of its results."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import read_cases
+
+STUDY = """
+title = "A seal"
+[surface]
+generate = "wavy"
+amplitude = "1 um"
+wavelength = "0.5 mm"
+size = "1 mm"
+shape = 16
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+pressure = "1 kPa"
+over = 0
+[[program]]
+pressure = "200 kPa"
+over = "1 s"
+[solve]
+boundary = "periodic"
+tolerance = 1e-2
+[keep]
+times = [0, 1]
+"""
+LEAKAGE = '[observe.leakage]\nviscosity = "1 mPa s"\npressure_drop = "1 bar"\n'
+LOADS = '[sweep]\n"program.0.pressure" = ["1 kPa", "2 kPa"]\n'
+
+
+@pytest.fixture
+def study(tmp_path):
+    def written(text):
+        path = tmp_path / "seal.toml"
+        path.write_text(STUDY + text)
+        return path
+
+    return written
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Names of the observables that were derived."""
+    from roughvisc.views.observables import tables
+
+    derived = []
+    plain = tables.OBSERVABLES["leakage"]
+
+    def noted(*dataset, **settings):
+        derived.append(settings)
+        return plain(*dataset, **settings)
+
+    monkeypatch.setitem(tables.OBSERVABLES, "leakage", noted)
+    return derived
+
+
+def test_run__ends_with_what_is_observed(invoke, study, tmp_path, counted, coarse_pictures, monkeypatch):
+    monkeypatch.setattr(rv.plot, "FIGURES", {"leakage": rv.plot.FIGURES["leakage"]})
+    status, told, _ = invoke("run", study(LEAKAGE), "--out", "out")
+    assert status == 0
+    assert "Leak rate at the end" in told
+    assert "closed between t = 0 s and 1 s" in told
+    (path,) = (tmp_path / "out").glob("*.nc")
+    assert (tmp_path / "out" / f"{path.stem}-leakage.png").exists()
+    with rv.open_result(path) as ds:
+        assert ds.leak_rate[0] > 0
+        assert ds.leak_status.values.tolist() == [0, 1]
+        assert ds.leak_rate.attrs["viscosity"] == 1e-3
+        assert json.loads(ds.attrs["observed"]) == {"leakage": {"viscosity": 1e-3, "pressure_drop": 1e5, "along": "x"}}
+        xr.testing.assert_allclose(ds.leak_rate, rv.observables.leakage(ds).leak_rate, rtol=1e-12, atol=0)
+    table = rv.to_csv(ds, tmp_path / "history.csv").read_text()
+    assert ",closed" in table
+    written = path.stat().st_mtime_ns
+    assert invoke("run", study(LEAKAGE), "--out", "out", "--no-plots")[0] == 0
+    assert path.stat().st_mtime_ns == written, "nothing was asked anew"
+    assert len(counted) == 1
+
+
+def test_another_viscosity__keeps_the_run(invoke, study, tmp_path, counted, solved_on):
+    assert invoke("run", study(LEAKAGE), "--out", "out", "--no-plots")[0] == 0
+    (path,) = (tmp_path / "out").glob("*.nc")
+    with rv.open_result(path) as ds:
+        before = ds.load()
+    solved_on.clear()
+    thick = LEAKAGE.replace("1 mPa s", "4 mPa s")
+    status, told, _ = invoke("run", study(thick), "--out", "out", "--no-plots")
+    assert (status, solved_on) == (0, [])
+    assert "Finished before" in told
+    with rv.open_result(path) as ds:
+        np.testing.assert_allclose(4 * ds.leak_rate, before.leak_rate, rtol=1e-12, atol=0)
+        assert json.loads(ds.attrs["case"])["observe"]["leakage"]["viscosity"] == 4e-3
+        names = [name for name in before.variables if not name.startswith("leak_rate")]
+        xr.testing.assert_identical(before[names].drop_attrs(), ds[names].load().drop_attrs())
+    assert len(counted) == 2
+
+
+def test_run__without_observe_loads_none_of_it(invoke, study, counted):
+    assert invoke("run", study(""), "--out", "out", "--no-plots")[0] == 0
+    assert counted == []
+
+
+def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coarse_pictures):
+    assert invoke("run", study(LEAKAGE + LOADS), "--out", "out", "--workers", 0)[0] == 0
+    results = rv.open_results(tmp_path / "out")
+    assert results.leak_rate.dims == ("case", "time")
+    assert (results.leak_rate[:, 0] > 0).all()
+    heading, *rows = (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig").splitlines()
+    assert "leak_rate [m^3/s]" in heading
+    assert len(rows) == 2
+    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)]
+    assert {"sweep-leak_rate.png", "sweep-leak_rate-histories.png"} <= set(written)
+
+
+def test_observe__from_python_after_a_sweep(study, tmp_path):
+    path = study(LEAKAGE + LOADS)
+    rv.sweep(path, tmp_path / "out", workers=0, progress=False)
+    told = []
+    added = rv.observe(path, tmp_path / "out", progress=lambda done, of: told.append((done, of)))
+    assert sorted(one.stem for one in added) == sorted(case.key for case in read_cases(path))
+    assert told == [(0, 2), (1, 2)]
+    assert rv.observe(path, tmp_path / "out") == []
+    assert "leak_rate" in rv.open_results(tmp_path / "out")
+
+
+def test_observe__of_what_is_not_finished_adds_nothing(study, tmp_path):
+    assert rv.observe(study(LEAKAGE), tmp_path / "out") == []
+
+
+def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_path):
+    punch = STUDY.replace('"wavy"\namplitude = "1 um"\nwavelength = "0.5 mm"', '"flat_punch"\nradius = "0.3 mm"')
+    path = study("")
+    path.write_text(punch + LEAKAGE)
+    status, _, complaint = invoke("run", path, "--out", "out", "--no-plots")
+    assert status == 1
+    assert "where the surface is absent" in complaint
+    (file,) = (tmp_path / "out").glob("*.nc")
+    with rv.open_result(file) as ds:
+        assert "leak_rate" not in ds
+    with pytest.raises(InputError, match="where the surface is absent"):
+        rv.observe(path, tmp_path / "out")
+
+
+CONDUCTANCE = '[observe.conductance]\nresistivity = ["5 K m/W", 0]\n'
+
+
+def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pictures, monkeypatch):
+    monkeypatch.setattr(rv.plot, "FIGURES", {"conductance": rv.plot.FIGURES["conductance"]})
+    status, told, _ = invoke("run", study(CONDUCTANCE), "--out", "out")
+    assert status == 0
+    assert "Thermal conductance at the end" in told
+    assert "infinite: full contact" in told
+    (path,) = (tmp_path / "out").glob("*.nc")
+    assert (tmp_path / "out" / f"{path.stem}-conductance.png").exists()
+    with rv.open_result(path) as ds:
+        again = rv.observables.conductance(ds, (5.0, 0.0))
+        xr.testing.assert_allclose(ds.thermal_conductance, again.thermal_conductance)
+        assert list(ds.thermal_conductance.attrs["resistivity"]) == [5.0, 0.0]
+        asked = {"conductance": {"resistivity": [5.0, 0.0], "kind": "thermal"}}
+        assert json.loads(ds.attrs["observed"]) == asked
+
+
+def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
+    assert invoke("run", study(CONDUCTANCE + LOADS), "--out", "out", "--workers", 0)[0] == 0
+    assert "thermal_conductance [W/K]" in (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig")
+    results = rv.open_results(tmp_path / "out")
+    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)]
+    assert "sweep-thermal_conductance-histories.png" in written
