@@ -1,10 +1,14 @@
 """Damaged studies, tables and scans: refused in one sentence, or read; nothing else, and in time."""
 
 import contextlib
+import subprocess
+import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from damage import attempt, damaged_bytes, damaged_study
 from scan_files import write_sdf, write_x3p
 from support import BALL, ROUGH
@@ -100,6 +104,23 @@ def test_scans(scans, count):
             assert np.isfinite(read.values).any()
         found.append(read)
     assert_some_of_each(found, 0.05)
+
+
+@pytest.mark.parametrize("count", amounts(SCANS))
+def test_scans__of_classic_netcdf(tmp_path, count):
+    """In a process of their own: netCDF's library does not survive every one of them."""
+    script, seed = Path(__file__).with_name("opening.py"), "21"
+    heights = rv.from_array(np.add.outer(1e-6 * np.arange(12.0), 1e-7 * np.arange(9.0) ** 2), 1e-6)
+    paths = [tmp_path / f"{version}.nc" for version in ("NETCDF3_CLASSIC", "NETCDF3_64BIT")]
+    for path in paths:
+        heights.to_netcdf(path, engine="netcdf4", format=path.stem)
+        xr.testing.assert_allclose(rv.open_scan(path), heights)
+    done = subprocess.run([sys.executable, script, str(count), seed, *paths], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for line in done.stdout.splitlines():
+        read, refused, grown = map(int, line.split())
+        assert (read + refused, read > 0, refused > 0) == (count, True, True)
+        assert grown < 1 << 26
 
 
 @pytest.mark.parametrize("count", amounts(TABLES))

@@ -253,4 +253,5 @@ def test_run__an_interrupt_while_processes_start_is_quiet(tmp_path, after):
     time.sleep(after)
     os.killpg(process.pid, signal.SIGINT)
     assert process.communicate(timeout=60) == ("", "roughvisc: interrupted; what was finished is kept\n")
-    assert process.returncode == 130
+    # Python ends by the signal itself where that struck within exec, as modules that make code do; 130 for a shell too
+    assert process.returncode in (130, -signal.SIGINT)

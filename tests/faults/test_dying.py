@@ -1,6 +1,7 @@
-"""A run that dies, or is refused something, at any of its file operations: the next one ends with the same bits."""
+"""A run that dies, is refused something, or finds its files damaged: the next one ends with the same bits."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -61,6 +62,48 @@ def test_at_a_file_operation(case, wanted, tmp_path, most):
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
         tidy(folder)
         assert [path.name for path in folder.iterdir()] == [f"{case.key}.nc"], (way, at, end)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the addresses of a process")
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("count", [2, pytest.param(200, marks=pytest.mark.long)])
+def test_at_an_allocation(tmp_path, count):
+    """Libraries of C die of it here and there; no run is the worse for it."""
+    path = tmp_path / "ball.toml"
+    path.write_text(BALL.replace("[24, 21]", "[128, 112]"))
+    script = Path(__file__).with_name("starving.py")
+    command = [sys.executable, script, path, tmp_path, str(count), "23"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=True)
+    ends = [line.split(" ", 1)[1] for line in done.stdout.splitlines()]
+    assert len(ends) == count
+    assert not [end for end in ends if "TRACEBACK" in end]
+    assert any(end != "finished" for end in ends)
+    case = read_study(path)
+    with open_result(run_case(case, tmp_path / "wanted")) as ds:
+        wanted = ds.drop_vars("wall_time").load()
+    for number in range(count):
+        with open_result(run_case(case, tmp_path / str(number))) as found:
+            xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.long)])
+def test_damaged_checkpoints(case, wanted, tmp_path, count):
+    """One of the two, both, or the rows: each run ends with the same bits, from the other one or from the start."""
+    rng, steps = np.random.default_rng(24), iter(range(1000))
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path / "stopped", checkpoint_steps=2, stop=lambda: next(steps) >= 6)
+    (unfinished,) = (tmp_path / "stopped").glob(".*.unfinished")
+    names = sorted(path.name for path in unfinished.iterdir())
+    assert names == ["checkpoint.0", "checkpoint.1", "rows"]
+    for number in range(count):
+        there = tmp_path / str(number) / unfinished.name
+        shutil.copytree(unfinished, there)
+        for name in rng.choice(names, size=rng.integers(1, 3), replace=False):
+            (there / name).write_bytes(damaged_bytes(rng, (unfinished / name).read_bytes()))
+        with within(20), open_result(run_case(case, there.parent)) as found:
+            xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
+        assert [path.name for path in there.parent.iterdir()] == [f"{case.key}.nc"]
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(300, marks=pytest.mark.long)])

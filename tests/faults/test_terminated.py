@@ -1,0 +1,70 @@
+"""SIGTERM, as a batch system sends it before it kills: a checkpoint is written, and the same command goes on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import xarray as xr
+from support import BALL
+
+from roughvisc.cli import group
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.statement.case import read_cases
+from roughvisc.study.storage.store import open_result
+
+MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", '[solve]\ntime_step = "160 us"\n[keep]')
+TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
+
+
+def terminated(folder, *options, whole_group, after):
+    """Run a study, send SIGTERM some seconds after its cases have begun to march; how it ended."""
+    command = [sys.executable, "-m", "roughvisc", "run", "s.toml", "-q", "--no-plots", "--out", "out", *options]
+    process = subprocess.Popen(command, cwd=folder, stdout=-1, stderr=-1, text=True, start_new_session=True)
+    cases = len(read_cases(folder / "s.toml"))
+    while len(list(folder.glob("out/.*.unfinished/rows"))) < cases:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+    time.sleep(after)
+    (os.killpg if whole_group else os.kill)(process.pid, signal.SIGTERM)
+    return (*process.communicate(timeout=100), process.returncode)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(
+    ("text", "options", "whole_group"),
+    [
+        (MANY_STEPS, [], False),
+        pytest.param(TWO, ["--workers", "2"], False, marks=pytest.mark.long),
+        pytest.param(TWO, ["--workers", "2"], True, marks=pytest.mark.long),
+    ],
+)
+def test_run__writes_its_checkpoint_and_ends_quietly(tmp_path, text, options, whole_group):
+    (tmp_path / "s.toml").write_text(text)
+    cases = read_cases(tmp_path / "s.toml")
+    for after in (0.2, 0.4, 0.6, 0.8):  # on a busy machine there is no step to keep so early
+        ended = terminated(tmp_path, *options, whole_group=whole_group, after=after)
+        assert ended == ("", "roughvisc: interrupted; what was finished is kept\n", 143)
+        if all([*tmp_path.glob(f"out/.{case.key}.unfinished/checkpoint.*")] for case in cases):
+            break
+    for case in read_cases(tmp_path / "s.toml"):
+        unfinished = tmp_path / "out" / f".{case.key}.unfinished"
+        assert list(unfinished.glob("checkpoint.*")), "long before one is due"
+        reached = []
+        path = run_case(case, tmp_path / "out", progress=lambda now, end, all=reached: all.append(now))
+        assert min(reached) > 0, "it goes on"
+        with open_result(path) as found, open_result(run_case(case, tmp_path / "calm")) as wanted:
+            xr.testing.assert_equal(found.drop_vars("wall_time"), wanted.drop_vars("wall_time"))
+        assert [one.name for one in unfinished.parent.glob(f"*{case.key}*")] == [path.name]
+
+
+def test_terminable__leaves_a_handler_of_others_alone():
+    before = signal.getsignal(signal.SIGTERM)
+    with group.terminable():
+        assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
+        with group.terminable():
+            mine = signal.getsignal(signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is mine
+    assert signal.getsignal(signal.SIGTERM) == before
