@@ -1,6 +1,6 @@
 """All benchmarks: prints the tables and writes them as NetCDF.
 
-    python workflows/benchmarks/run.py [--small] [--only seed,tamaas,scaling,sweep] [--out benchmarks.nc]
+    python workflows/benchmarks/run.py [--small] [--only seed,tamaas,scaling,spots,sweep] [--out benchmarks.nc]
 
 Every figure is a ratio or a count measured in one run, at equal or smaller measured error. Times are processor times,
 of one thread. Tamaas and ContactMechanics are compared with where they are installed.
@@ -17,6 +17,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import against_contact_mechanics
 import against_seed
 import against_tamaas
+import conducting_spots
 import scaling
 import sweep_overhead
 
@@ -25,6 +26,7 @@ SMALL = {
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
     "contact_mechanics": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
     "scaling": {"sizes": (32, 48), "steps": (10,), "exponentials": (2,), "window": 96, "sparse": 40},
+    "spots": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
     "sweep": {"count": 3, "workers": 1, "cells": 32, "swept": ("periodic",)},
 }
 PARTS = {
@@ -32,6 +34,7 @@ PARTS = {
     "tamaas": against_tamaas.measure,
     "contact_mechanics": against_contact_mechanics.measure,
     "scaling": scaling.measure,
+    "spots": conducting_spots.measure,
     "sweep": sweep_overhead.measure,
 }
 

@@ -51,7 +51,10 @@ def main(arguments: list[str] | None = None) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # dask-jobqueue has Ctrl-C end with status 0
     with cluster(given.queue, given.walltime) as jobs, Client(jobs) as client:
         jobs.adapt(minimum=1, maximum=given.jobs)  # a job that left is replaced as long as cases wait
-        results = rv.sweep(given.study, out=given.out, client=client)
+        try:
+            results = rv.sweep(given.study, out=given.out, client=client)
+        except KeyboardInterrupt:
+            sys.exit("interrupted: what was computed is kept, and the same command goes on")
     print(f"{results.sizes['case']} cases in {given.out}")
 
 

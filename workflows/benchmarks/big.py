@@ -1,0 +1,175 @@
+"""Large grids: elastic rough contact at 1024 to 8192 squared, by this package, Tamaas and ASPHER; creep at 4096.
+
+    python workflows/benchmarks/big.py [elastic|creep|threads] [CELLS ...]
+
+Every solution runs in a process of its own, which tells its time, wall and processor, and its largest memory.
+The error is the L1 difference of the pressure to a solution to a duality gap of 1e-12, over the load. Tamaas and ASPHER
+are left out where they are not installed.
+"""
+
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+from scenes import load_for_area, rough_gap, sphere_gap
+from scipy import fft
+
+import roughvisc as rv
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+AREAS = (0.05, 0.3, 0.95)
+
+
+def scene(cells, area):
+    """Gap and mean pressure over the contact modulus; the load for an area is that of a quarter of the width."""
+    if area == "sphere":
+        return (*sphere_gap(cells), "free")
+    few = min(cells, 512)
+    gap, halfspace = rough_gap(few), HalfSpace((few, few), (1.0, 1.0), "periodic")
+    return rough_gap(cells), load_for_area(halfspace, gap, area), "periodic"
+
+
+def ours(gap, mean, boundary, tolerance, threads):
+    halfspace = HalfSpace(gap.shape, (1.0, 1.0), boundary)
+    with fft.set_workers(threads):
+        state = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=tolerance)
+    return state.pressure, state.iterations
+
+
+def by_tamaas(gap, mean, boundary, tolerance, threads):
+    import tamaas
+
+    tamaas.set_log_level(tamaas.LogLevel.error)
+    tamaas.initialize(threads)
+    model = tamaas.Model(tamaas.model_type.basic_2d, [float(n) for n in gap.shape], list(gap.shape))
+    model.E, model.nu = 1.0, 0.0
+    if boundary == "free":
+        tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
+    solver = tamaas.PolonskyKeerRey(model, gap.max() - gap, tolerance)
+    if boundary == "free":
+        solver.setIntegralOperator("dcfft")
+    solver.max_iter = 20_000
+    solver.solve(mean)
+    return np.array(model.traction), None
+
+
+def by_aspher(gap, mean, boundary, tolerance, threads):
+    import aspher
+
+    cells = gap.shape[0]
+    backend = "periodic" if boundary == "periodic" else "fft"
+    found = aspher.solve_nested(
+        cells, gap.ravel(), mean, domain_size=float(cells), tol=tolerance, backend=backend, light_result=True
+    )
+    return np.asarray(found.pressure).reshape(gap.shape), int(found.iterations)
+
+
+SOLVERS = {"roughvisc": ours, "Tamaas": by_tamaas, "ASPHER": by_aspher}
+
+
+def one(solver, cells, area, tolerance, threads, folder):
+    """In a process of its own: solve, tell, and keep the pressure."""
+    gap, mean, boundary = scene(cells, area)
+    held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    wall, spent = time.perf_counter(), time.process_time()
+    pressure, iterations = SOLVERS[solver](gap, mean, boundary, tolerance, threads)
+    told = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - spent, "iterations": iterations}
+    told["area"] = float(np.mean(pressure > 0))
+    told["fields"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * 1024 / (8 * gap.size)
+    told["fields_before"] = held * 1024 / (8 * gap.size)
+    np.save(pathlib.Path(folder) / f"{solver}-{tolerance:g}.npy", pressure)
+    print(json.dumps(told))
+
+
+def apart(solver, cells, area, tolerance, threads, folder):
+    """What a process of its own tells; None where the solver is not there."""
+    environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
+    command = [sys.executable, __file__, "one", solver, str(cells), str(area), str(tolerance), str(threads), folder]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if "No module named" in done.stderr:
+        return None
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def elastic(sizes, tolerance=1e-6, reference=1e-12, largest_peer=4096):
+    for cells in sizes:
+        for area in (*AREAS, "sphere"):
+            if area == "sphere" and cells > 4096:
+                continue
+            with tempfile.TemporaryDirectory() as folder:
+                apart("roughvisc", cells, area, reference, 2, folder)
+                exact = np.load(pathlib.Path(folder) / f"roughvisc-{reference:g}.npy")
+                for solver in SOLVERS:
+                    if solver != "roughvisc" and cells > largest_peer:
+                        continue
+                    told = apart(solver, cells, area, tolerance, 1, folder)
+                    if told is None:
+                        continue
+                    pressure = np.load(pathlib.Path(folder) / f"{solver}-{tolerance:g}.npy")
+                    error = float(np.abs(pressure / pressure.sum() * exact.sum() - exact).sum() / exact.sum())
+                    tell(cells, area, solver, told, error)
+
+
+def tell(cells, area, solver, told, error):
+    each = told["cpu"] / cells**2 / told["iterations"] * 1e9 if told["iterations"] else float("nan")
+    print(
+        f"{cells:5d} {area!s:>7} {solver:10s} area {told['area']:.3f}  error {error:.1e}  wall {told['wall']:8.2f} s  "
+        f"cpu {told['cpu']:8.2f} s  iterations {told['iterations']}  {each:5.1f} ns a cell and iteration  "
+        f"{told['fields']:.1f} fields (before {told['fields_before']:.1f})",
+        flush=True,
+    )
+
+
+def threads(sizes, area=0.05, tolerance=1e-6, repeats=3):
+    """Wall time of one solve by one thread and by two, in turn."""
+    for cells in sizes:
+        walls = {1: [], 2: []}
+        with tempfile.TemporaryDirectory() as folder:
+            for _ in range(repeats):
+                for count, found in walls.items():
+                    found.append(apart("roughvisc", cells, area, tolerance, count, folder)["wall"])
+        one_thread, two = (float(np.median(found)) for found in walls.values())
+        print(
+            f"{cells:5d} wall by one thread {one_thread:.2f} s, by two {two:.2f} s: {one_thread / two:.2f}", flush=True
+        )
+
+
+def creep(sizes, fraction=0.08, tolerance=1e-3):
+    """Zener, step and hold: total time, steps, memory by two threads."""
+    for cells in sizes:
+        surface = rv.self_affine(
+            1.0, (cells, cells), hurst=0.8, rms_slope=0.1, rolloff=0.25, shortcut=8 / cells, seed=0
+        )
+        material = rv.zener(shear_modulus=3e6, kelvin_modulus=3e6, kelvin_viscosity=3e6)
+        softest = float(material.contact_compliance(1e9))
+        program = rv.Program().pressure(fraction * 0.1 / softest / 1.9, over=0).hold(5.0)
+        settings = {"boundary": "periodic", "tolerance": tolerance, "times": [5.0], "fields": (), "progress": False}
+        wall, spent = time.perf_counter(), time.process_time()
+        with fft.set_workers(2):
+            ds = rv.simulate(surface, material, program, **settings)
+        fields = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / (8 * cells**2)
+        print(
+            f"{cells:5d} creep: contact {float(ds.contact_fraction[-1]):.3f}, wall {time.perf_counter() - wall:.1f} s, "
+            f"cpu {time.process_time() - spent:.1f} s, {ds.sizes['step']} steps, "
+            f"{int(ds.iterations.sum())} iterations, time error {float(ds.time_error.max()):.1e}, {fields:.1f} fields",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    what, *given = sys.argv[1:] or ["elastic"]
+    if what == "one":
+        solver, cells, area, tolerance, count, folder = given
+        one(solver, int(cells), area if area == "sphere" else float(area), float(tolerance), int(count), folder)
+    else:
+        sizes = [int(n) for n in given] or [1024, 2048, 4096, 8192]
+        {"elastic": elastic, "creep": creep, "threads": threads}[what](sizes)

@@ -1,0 +1,69 @@
+"""Peak memory of a process that computes a case, against what is stated of it: python memory.py 512 1024 2048.
+
+Each case runs in a process of its own, since the system tells only the highest that a process has come to.
+"""
+
+import json
+import multiprocessing
+import resource
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+
+from roughvisc.mechanics.hereditary.choice import choose_memory
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.simulation.footprint import PROCESS, march_bytes
+from roughvisc.study.simulation.scene import memory_wanted
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.storage.store import open_result
+from roughvisc.topography.grid import nominal_area
+
+CASE = {
+    "title": "memory",
+    "surface": {"generate": "self_affine", "size": [1e-3, 1e-3], "hurst": 0.8, "rms_slope": 0.1, "rolloff": 2.5e-4},
+    "program": [{"pressure": 7e3, "over": 0.01}, {"hold": 0.5}],
+    "solve": {"tolerance": 1e-2, "boundary": "periodic"},
+    "keep": {"fields": ["pressure", "gap"], "times": 5},
+}
+MATERIALS = {
+    "elastic": {"model": "elastic", "shear_modulus": 3e6},
+    "zener": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
+    "three": {"model": "prony", "glassy": 3e-7, "compliances": [1e-7, 2e-7, 1e-7], "times": [0.01, 0.05, 0.3]},
+    "kelvin_voigt": {"model": "kelvin_voigt", "shear_modulus": 1e6, "viscosity": 1e5},
+}
+BOUNDARIES = {"periodic": {}, "free": {"solve.boundary": "free", "solve.edge": "accept"}}
+
+
+def measure(sides, materials=tuple(MATERIALS), boundaries=tuple(BOUNDARIES)):
+    context = multiprocessing.get_context("spawn")
+    for side in sides:
+        for boundary in boundaries:
+            for material in materials:
+                with ProcessPoolExecutor(1, context) as pool:
+                    yield pool.submit(one, side, material, boundary).result()
+
+
+def one(side, material, boundary):
+    """Bytes of this process at its peak, and those that are stated of the case once its contact is known."""
+    surface = CASE["surface"] | {"shape": [side, side], "shortcut": max(1.6e-5, 4e-3 / side), "seed": 1}
+    case = vary(Case.from_json(json.dumps(CASE | {"surface": surface, "material": MATERIALS[material]})), {})
+    case = vary(case, BOUNDARIES[boundary])
+    with tempfile.TemporaryDirectory() as folder:
+        with open_result(run_case(case, folder)) as ds:
+            contact, rows = float(ds.contact_fraction.max()), ds.sizes["time"]
+        taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    settings, program = case.solving(), case.program().on_area(nominal_area(case.height()))
+    memory = choose_memory(case.material(), **memory_wanted(program, settings)).memory
+    stated = PROCESS + march_bytes(settings, side**2, memory, contact=contact, rows=rows)
+    return {
+        "case": f"{side} x {side}, {boundary}, {material}",
+        "contact": contact,
+        "bytes": taken,
+        "stated_over_taken": stated / taken,
+        "fields": (taken - PROCESS) / (8 * side**2),
+    }
+
+
+if __name__ == "__main__":
+    for row in measure(map(int, sys.argv[1].split(",")), *(text.split(",") for text in sys.argv[2:])):
+        print(" ".join(f"{name}={value}" for name, value in row.items()), flush=True)
