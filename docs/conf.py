@@ -55,7 +55,8 @@ copyright = author
 
 def _with_tables(app, docname, source):
     """Put the table of the vocabulary, and those of the keys of study files, where the pages ask for them."""
-    from roughvisc.variables import SLIDING, STATUS_MEANINGS, VARIABLES
+    from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+    from roughvisc.variables.sliding import SLIDING
 
     def table(variables):
         rows = ["| variable | dimensions | unit | meaning |", "|---|---|---|---|"]

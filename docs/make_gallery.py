@@ -40,10 +40,16 @@ FIGURES = {
         "approach": lambda results: rv.plot.sweep(results, "approach"),
         "area": rv.plot.sweep,
     },
+    "stop_and_go": {"friction": rv.plot.friction_against_distance},
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}
         ),
+    },
+    "creeping_seal": {"leakage": rv.plot.leakage},
+    "friction": {
+        "curve": lambda ds: rv.plot.friction(ds, persson=True),
+        "maps": rv.plot.friction_maps,
     },
     "stability_map": {},  # drawn by its script
 }

@@ -7,8 +7,11 @@ import re
 
 from roughvisc.study.statement.schema import (
     StudyFile,
+    audit,
     conditioning,
+    friction,
     material,
+    observe,
     program,
     settings,
     surface,
@@ -69,19 +72,32 @@ TABLES = {
     },
     "program.cycle": ("program.0.cycle", program.LoadWave.model_fields),
     "program.table": ("program.0.table", program.LoadRows.model_fields),
+    "friction": ("friction", friction.FrictionSection.model_fields),
+    "friction.speeds": (
+        "friction.speeds",
+        {field.alias or name: field for name, field in friction.Decades.model_fields.items()},
+    ),
     "solve": ("solve", settings.SolveSection.model_fields),
     "keep": ("keep", settings.KeepSection.model_fields),
+    "observe": ("observe", observe.ObserveSection.model_fields),
+    "observe.leakage": ("observe.leakage", observe.LeakageTable.model_fields),
+    "observe.conductance": ("observe.conductance", observe.ConductanceTable.model_fields),
+    "audit": ("audit", audit.AuditSection.model_fields),
 }
 #: first word of a table's name -> the table whose meanings hold where it has none of its own
 _SHARED = {"generate": "generate: any", "material": "material: any"}
 _WORDS = {
     "control": "'load' or 'approach'",
     "cycle": "a table",
+    "friction": "a table",
     "note": "a text",
     "table": "a table, or the path of a CSV file",
     "crop": "a table of x and y limits",
+    "speed": "a quantity above 0",
+    "over": "a quantity above 0",
     "solve": "a table",
     "keep": "a table",
+    "audit": "a table",
     "sweep": "a table of lists, or several",
     "precision": "a number above 0 and below 1",
     "generate": "one of " + ", ".join(surface.GENERATED),
@@ -90,6 +106,7 @@ _WORDS = {
 _UNITS = {
     **dict.fromkeys(("mean", "amplitude", "values"), "N, m or Pa"),
     "frequencies": "Hz or rad/s",
+    **dict.fromkeys(("from", "to"), "m/s"),
 }
 
 
@@ -105,9 +122,8 @@ def rows(name):
     for key, field in fields.items():
         words = field.description or _WORDS[key]
         unit = unit_of(f"{above}.{key}" if above else key, _CASES.get(name))
-        unit = (
-            _UNITS.get(key, unit) if name.startswith(("program.", "material: dynamic")) else unit
-        )
+        told = ("program.", "material: dynamic", "friction.speeds")
+        unit = _UNITS.get(key, unit) if name.startswith(told) else unit
         about, example = meaning(name, key)
         found.append((key, _short(words), unit, _default(field), about, example))
     return found

@@ -1,9 +1,10 @@
-"""What a notebook shows of materials, programs and cases."""
+"""What a notebook shows of materials, programs, cases and plans."""
 
 import re
 from html import unescape
 
 import pytest
+import xarray as xr
 from support import BALL, case_of
 
 import roughvisc as rv
@@ -86,3 +87,18 @@ def test_case__of_a_scan_that_is_gone_says_so(tmp_path):
     said = {row[0]: row[1] for row in shown(case)[1]}
     assert said["surface"] == "a<b>c.x3p"
     assert "a<b>c.x3p" in said["key"], "why there is none"
+
+
+def test_plan__shows_what_each_case_will_take(tmp_path):
+    (tmp_path / "s.toml").write_text(
+        BALL + f'[sweep]\n"program.0.load" = {[round(1e-3 * n, 3) for n in range(1, 11)]}\n'
+    )
+    costs = rv.plan(tmp_path / "s.toml", workers=3)
+    title, rows = shown(costs)
+    assert re.fullmatch(r"A ball: 10 cases, 3 side by side, wall time .*s, memory .* MB, disk .* [kM]B", title)
+    assert rows[0] == ["", "program.0.load", "cells", "steps", "convolutions", "wall time", "memory", "disk", ""]
+    assert [row[0] for row in rows[1:]] == [*"12345678", "..."]
+    assert (rows[2][1:4], rows[-1]) == (["2 mN", "24 x 21", str(int(costs.steps[1]))], ["...", "2 more"])
+    assert isinstance(costs, xr.Dataset)
+    for part in (costs.isel(case=0), costs[["steps"]]):
+        assert "xr-wrap" in part._repr_html_(), "as xarray shows it"

@@ -141,7 +141,8 @@ def programs(study_keys, name, key, example):
         return [{kind: {**value(study_keys.meaning(f"program: {kind}", kind)[1]), key: example}}]
     kind = name.removeprefix("program: ")
     needed = {k: value(e) for k, _, _, default, _, e in study_keys.rows(name) if default == "required"}
-    before = [{"load": 1, "over": 0}] if kind == "hold" else []
+    before = [{"load": 1, "over": 0}] if kind in ("hold", "slide") else []
+    needed |= {"over": 1} if kind == "slide" and key not in ("speed", "over") else {}
     return [*before, {**needed, key: example}]
 
 
@@ -175,10 +176,19 @@ def example_in(study_keys, data, name, key, one, folder):
         data["material"] = materials(study_keys, name, key, one, folder)
     elif head == "program":
         data["program"] = programs(study_keys, name, key, one)
+    elif head == "friction":
+        del data["program"], data["keep"]
+        asked = {"speeds": "1 mm/s", **({} if key == "load" else {"pressure": "0.2 MPa"})}
+        data["friction"] = asked | (
+            {"speeds": value(study_keys.meaning("friction", "speeds")[1]) | {key: one}} if "." in name else {key: one}
+        )
     elif head == "study":
         data[key] = one
+    elif name.startswith("observe."):
+        needed = {"resistivity": [1, 0]} if name == "observe.conductance" else {}
+        data["observe"] = {name.partition(".")[2]: {**needed, key: one}}
     else:
-        data[head] = {**BASE.get(head, {}), key: one}
+        data[head] = {**BASE.get(head, {}), **(BESIDE.get(key, {}) if head == "audit" else {}), key: one}
         data["program"] = [{"load": 1e-4, "over": 0.1}]
 
 
