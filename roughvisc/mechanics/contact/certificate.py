@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.full_contact import ROUNDED, load_certainty
 from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
@@ -61,29 +62,38 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     -------
     Certificate
     """
-    at = problem.influence.at
-    carried, own, here = at(pressure, contact), at(displacement, contact), at(separation, contact)
-    energy, load = float((carried * own).sum()), float(carried.sum())
+    fields = [field.reshape(-1) for field in (pressure, displacement, separation)]
     lowest = problem.lowest_of(separation)
+
+    def judged(part: slice) -> tuple[float, ...]:
+        carried, own, here = (field.take(contact[part]) for field in fields)
+        excess = 0.0 if problem.load is not None else (carried * (here - problem.target)).sum()
+        sums = (carried * own).sum(), carried.sum(), here.sum(), (carried * (here - lowest)).sum(), excess
+        return *sums, here.max(initial=1.0), here.min(initial=-1.0), own.max(initial=0.0)
+
+    of_parts = np.array(passes.of_parts(judged, contact.size, problem.influence.threads))
+    energy, load, height, own_duality_gap, excess = map(float, of_parts[:, :5].sum(axis=0))
     if problem.load is not None:
-        level = float(np.mean(here))
-        duality_gap = float((carried * (here - lowest)).sum())
+        level = height / contact.size
+        duality_gap = own_duality_gap
     else:
         level = problem.target
-        duality_gap = _under_approach(problem, carried, displacement, here, lowest)
+        duality_gap = _under_approach(problem, displacement, load, excess, own_duality_gap, lowest)
     # with rounding of the sums above; a pressure of nothing has no error to speak of
-    largest = max(float(here.max(initial=1.0)), -float(here.min(initial=-1.0)))
+    largest = max(float(of_parts[:, 5].max()), -float(of_parts[:, 6].min()))
     converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0
     hopeless = contact.size == separation.size and problem.remaining < -ROUNDED  # no load is enough
     if converged and not problem.sees_load:
-        rounding = _ROUNDING * max(largest, float(own.max()))
+        rounding = _ROUNDING * max(largest, float(of_parts[:, 7].max()))
+        here = problem.influence.at(separation, contact)
         converged, hopeless = load_certainty(problem, contact, separation, here, load, rounding)
     return Certificate(duality_gap, energy, level, converged, hopeless)
 
 
-def _under_approach(problem: Problem, pressure: Array, displacement: Array, here: Array, lowest: float) -> float:
-    """The duality gap where the approach is given; pressure and separation are those of the contact's cells."""
-    excess = float((pressure * (here - problem.target)).sum())
+def _under_approach(
+    problem: Problem, displacement: Array, load: float, excess: float, own_duality_gap: float, lowest: float
+) -> float:
+    """The duality gap where the approach is given; its own is that of the pressure under its own load."""
     missing = max(0.0, problem.target - lowest)
     if problem.definite and problem.uniform[0] > 0:
         # a dual feasible point from q >= 0 with Kq >= 1: here q is uniform over the cells that are there
@@ -93,6 +103,4 @@ def _under_approach(problem: Problem, pressure: Array, displacement: Array, here
         return duality_gap + 0.5 * missing**2 * uniform**2 * response
     # No such q exists, as a half-space's periodic kernel is singular. The pressure is certified under its own load, and
     # its own approach must be the one asked for.
-    load = float(pressure.sum())
-    own_duality_gap = float((pressure * (here - lowest)).sum())
     return max(own_duality_gap, abs(excess) + load * missing) if load > 0 else math.inf

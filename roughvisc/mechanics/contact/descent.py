@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
 
@@ -102,42 +103,58 @@ def conjugate_gradient(
     measured : bool
         Whether to measure the change that the preconditioner asks for.
     """
-    free_set = problem.free_set(pressure, separation, level)
-    at = problem.influence.at
-    residual = at(separation, free_set)
-    residual -= level if problem.load is None else float(np.mean(residual))
-    held = at(pressure, free_set)
+    free_set, threads = problem.free_set(pressure, separation, level), problem.influence.threads
+    residual, held = problem.influence.at(separation, free_set), problem.influence.at(pressure, free_set)
+    residual -= level if problem.load is None else passes.total(residual, threads) / residual.size
     search, caution = problem.answered(residual, free_set, held, energy)
-    asked = caution * float(np.abs(search).sum()) if measured else math.nan
+    asked = caution * passes.magnitude(search, threads) if measured else math.nan
     if previous is not None:
         search = _conjugate(problem, search, residual, free_set, previous)
-    search *= -step_length
-    search += held
-    trial = _cut(search, problem.load)
-    change = trial - held
-    return Trial(free_set, held, trial, change, float((change * residual).sum()), asked)
+
+    def moved(part: slice) -> float:
+        here = search[part]
+        here *= -step_length
+        here += held[part]
+        np.maximum(here, 0, out=here)  # in the manner of Polonsky and Keer: cut at zero, then scaled to the load
+        return float(here.sum())
+
+    carried = sum(passes.of_parts(moved, search.size, threads))
+    scale = 1.0 if problem.load is None else problem.load / carried
+    change = np.empty_like(search)
+
+    def scaled(part: slice) -> float:
+        search[part] *= scale
+        np.subtract(search[part], held[part], out=change[part])
+        return float((change[part] * residual[part]).sum())
+
+    slope = sum(passes.of_parts(scaled, search.size, threads))
+    return Trial(free_set, held, search, change, slope, asked)
 
 
 def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells, previous: Step) -> Array:
     """Search direction conjugate to the previous step, if it descends still."""
-    work = problem.influence.work
-    work.fill(0)
-    work.reshape(-1)[previous.free_set] = previous.change
-    at = problem.influence.at
-    beta = float((search * (at(previous.displacement, free_set) * (previous.unit / previous.curvature))).sum())
+    influence, threads = problem.influence, problem.influence.threads
+    passes.spread(influence.work, previous.free_set, previous.change, threads)
+    response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
+
+    def along(part: slice) -> float:
+        return float((search[part] * (response.take(free_set[part]) * unit)).sum())
+
+    beta = sum(passes.of_parts(along, search.size, threads))
     if beta > 0:
-        conjugate = search - beta * problem.tangent(at(work, free_set))
-        if float((residual * conjugate).sum()) > 0:
-            return conjugate
+        former = influence.at(influence.work, free_set)
+        mean = 0.0 if problem.load is None else passes.total(former, threads) / former.size
+
+        def conjugated(part: slice) -> float:
+            here = former[part]
+            here -= mean
+            here *= beta
+            np.subtract(search[part], here, out=here)
+            return float((residual[part] * here).sum())
+
+        if sum(passes.of_parts(conjugated, search.size, threads)) > 0:
+            return former
     return search
-
-
-def _cut(pressure: Array, load: float | None) -> Array:
-    """The pressure made admissible in the manner of Polonsky and Keer: cut at zero, then scaled to the load."""
-    np.maximum(pressure, 0, out=pressure)
-    if load is not None:
-        pressure *= load / float(pressure.sum())
-    return pressure
 
 
 def projected_gradient(problem: Problem, pressure: Array, separation: Array, level: float) -> Trial:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact.passes import taken
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Influence:
 
     def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
         """Values of a field at some cells, as flat indices."""
-        return taken(field, cells, self.threads)
+        return passes.taken(field, cells, self.threads)
 
     @property
     def largest(self) -> float:
@@ -57,7 +57,12 @@ class Influence:
         """Displacement by a pressure, in double precision."""
         self.convolutions += 1
         displacement = self.halfspace.displacement(pressure)
-        displacement *= self.scale
+        flat = displacement.reshape(-1)
+
+        def scaled(part: slice) -> None:
+            flat[part] *= self.scale
+
+        passes.of_parts(scaled, flat.size, self.threads)
         return displacement
 
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:
@@ -71,9 +76,8 @@ class Influence:
         """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
         self.convolutions += 1
         field, size = self._spread(displacement, cells)
-        pressure = self.at(self.halfspace.approximate_inverse(field), cells).astype(float)
-        pressure *= size
-        return pressure
+        found = self.halfspace.approximate_inverse(field, out=self._single(1))
+        return passes.taken(found, cells, self.threads, size)
 
     def approximate_pressure_field(self, displacement: Single) -> Array:
         """The same for a displacement everywhere, of ordinary size."""
@@ -96,8 +100,11 @@ class Influence:
 
     def _spread(self, values: Array, cells: Cells) -> tuple[Single, float]:
         """Values of some cells over the whole grid, zero elsewhere, over the largest; and that: single underflows."""
-        size = float(np.abs(values).max(initial=0.0)) or 1.0
-        field = self.work.reshape(-1).view(np.float32)[: self.work.size]
-        field.fill(0)
-        field[cells] = (values / size).astype(np.float32)
-        return field.reshape(self.work.shape), size
+        size = passes.largest(values, self.threads) or 1.0
+        field = self._single(0)
+        passes.spread(field, cells, values, self.threads, size)
+        return field, size
+
+    def _single(self, half: int) -> Single:
+        """One half of the work array, as a field of single precision."""
+        return self.work.reshape(-1).view(np.float32).reshape(2, *self.work.shape)[half]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.certificate import Certificate, certify
 from roughvisc.mechanics.contact.descent import (
     Step,
@@ -26,7 +27,6 @@ from roughvisc.mechanics.contact.descent import (
 from roughvisc.mechanics.contact.error_estimate import estimated_error
 from roughvisc.mechanics.contact.full_contact import approach_under_load, carries_excess
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
-from roughvisc.mechanics.contact.passes import add_scaled
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.contact.state import ContactState
 
@@ -193,20 +193,31 @@ def _forgetting(problem: Problem, iterate: Iterate, search: Search, previous: St
 
 def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -> tuple[Iterate, Search, Step | None]:
     """The iterate after a trial, as far along it as ``f`` falls and the pressure is admissible: one convolution."""
-    influence, free_set = problem.influence, trial.free_set
+    influence, free_set, threads = problem.influence, trial.free_set, problem.influence.threads
     pressure, displacement = iterate.pressure.reshape(-1), iterate.displacement
-    pressure[free_set] = taken = trial.pressure
+    passes.put(pressure, free_set, trial.pressure, threads)
     response, unit = _response(influence, iterate, trial, search.single)
-    curvature = unit * float((trial.change * influence.at(response, free_set)).sum())
+    answer = response.reshape(-1)
+
+    def curved(part: slice) -> float:
+        return float((trial.change[part] * answer.take(free_set[part])).sum())
+
+    curvature = unit * sum(passes.of_parts(curved, free_set.size, threads))
     minimum = minimum_along(trial, curvature)
     fraction, cut = admissible_fraction(trial, minimum)
-    if fraction != 1:
-        taken = fraction * trial.change
-        taken += trial.held
-        np.maximum(taken, 0, out=taken)
-        pressure[free_set] = taken
-    add_scaled(displacement, response, fraction * unit, influence.threads)
-    stepped = Iterate(iterate.pressure, displacement, free_set[taken > 0], approximate=search.single)
+
+    def taken(part: slice) -> Cells:
+        here = trial.pressure[part]
+        if fraction != 1:
+            here = fraction * trial.change[part]
+            here += trial.held[part]
+            np.maximum(here, 0, out=here)
+            pressure[free_set[part]] = here
+        return free_set[part][here > 0]
+
+    contact = np.concatenate(passes.of_parts(taken, free_set.size, threads))
+    passes.add_scaled(displacement, response, fraction * unit, threads)
+    stepped = Iterate(iterate.pressure, displacement, contact, approximate=search.single)
     if search.spacer:
         return stepped, replace(search, spacer=False), None
     factor = min(max(minimum, _SHRINKAGE), _GROWTH_IF_CUT if cut else _GROWTH)
@@ -219,7 +230,7 @@ def _response(influence: Influence, iterate: Iterate, trial: Trial, single: bool
     if single:
         return influence.displacement_single(trial.change, trial.free_set)
     response = influence.displacement(iterate.pressure)
-    response -= iterate.displacement
+    passes.subtract(response, iterate.displacement, influence.threads)
     return response, 1.0
 
 

@@ -22,10 +22,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 
 # Cells a side from which blocks pay, and the part of the grid that is free up to which they do: at 256 they save
@@ -68,11 +70,8 @@ class LongWaves:
         """The blocks of a free set, by a pressure on it and ``p.Kp``; None where they do not pay."""
         if min(influence.halfspace.shape) < _FROM or free_set.size > _SPARSE * influence.work.size:
             return None
-        coarse = influence.halfspace.coarse
-        blocks = _blocks(influence.halfspace.shape, coarse.shape, free_set)
-        count = coarse.shape[0] * coarse.shape[1]
-        cells = np.bincount(blocks, minlength=count).astype(float)
-        loads = np.bincount(blocks, pressure, count).astype(float)  # also of no cells at all
+        blocks = _blocks(influence.halfspace.shape, influence.halfspace.coarse.shape, free_set, influence.threads)
+        cells, loads = (_sums(influence, blocks, values) for values in (None, pressure))
         spread = float((loads * loads / np.maximum(cells, 1)).sum())
         smooth = float((loads * influence.of_blocks(loads)).sum())
         if not energy > smooth:  # a kernel that bulges
@@ -89,14 +88,25 @@ class LongWaves:
         fine : callable
             The preconditioner of the cells.
         """
-        means = self._means(residual)
-        found = fine(residual - means.take(self.blocks))
-        found += (self._answered(self.cells * means) - self._means(found)).take(self.blocks)
+        means, threads = self._means(residual), self.influence.threads
+        rest = np.empty_like(residual)
+
+        def without_means(part: slice) -> None:
+            np.subtract(residual[part], means.take(self.blocks[part]), out=rest[part])
+
+        passes.of_parts(without_means, residual.size, threads)
+        found = fine(rest)
+        answer = self._answered(self.cells * means) - self._means(found)
+
+        def with_answer(part: slice) -> None:
+            found[part] += answer.take(self.blocks[part])
+
+        passes.of_parts(with_answer, residual.size, threads)
         return found
 
     def _means(self, values: Array) -> Array:
         """Mean over the free cells of each block; zero where there are none."""
-        return np.bincount(self.blocks, values, self.cells.size) / np.maximum(self.cells, 1)
+        return _sums(self.influence, self.blocks, values) / np.maximum(self.cells, 1)
 
     def _answered(self, sums: Array) -> Array:
         """Pressure, but for the scale, that displaces blocks by the residual of these sums: conjugate gradients."""
@@ -120,11 +130,35 @@ class LongWaves:
         return answer
 
 
-def _blocks(shape: tuple[int, int], coarse: tuple[int, int], cells: Cells) -> NDArray[np.intp]:
+def _blocks(shape: tuple[int, int], coarse: tuple[int, int], cells: Cells, threads: int) -> NDArray[np.intp]:
     """Block of each cell, as flat indices."""
-    rows = cells // shape[1]
-    columns = cells - rows * shape[1]
-    along = [np.arange(n) * m // n for n, m in zip(shape, coarse, strict=True)]
-    found = (along[0] * coarse[1]).take(rows)
-    found += along[1].take(columns)
+    rows, columns = (np.arange(n) * m // n for n, m in zip(shape, coarse, strict=True))
+    begins, found = np.arange(shape[0] + 1) * shape[1], np.empty_like(cells)
+
+    def work(part: slice) -> None:
+        here = cells[part]
+        first, last = here[0] // shape[1], here[-1] // shape[1] + 1
+        counts = np.diff(np.searchsorted(here, begins[first : last + 1]))  # of each row's cells
+        found[part] = columns.take(here - begins[first:last].repeat(counts))
+        found[part] += (rows[first:last] * coarse[1]).repeat(counts)
+
+    if cells.size:
+        passes.of_parts(work, cells.size, threads)
     return found
+
+
+def _sums(influence: Influence, blocks: NDArray[np.intp], values: Array | None) -> Array:
+    """Sums of the values of the cells in each block, or their number."""
+    shape = influence.halfspace.coarse.shape
+    sums = np.zeros(shape)
+
+    def work(part: slice) -> tuple[slice, NDArray[Any]]:
+        here = blocks[part]
+        rows = slice(here[0] // shape[1], here[-1] // shape[1] + 1)  # of blocks: cells ascend
+        few = here - rows.start * shape[1]
+        weights = None if values is None else values[part]
+        return rows, np.bincount(few, weights, (rows.stop - rows.start) * shape[1])
+
+    for rows, found in passes.of_parts(work, blocks.size, influence.threads) if blocks.size else ():
+        sums[rows] += found.reshape(-1, shape[1])
+    return sums.reshape(-1)

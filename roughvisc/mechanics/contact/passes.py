@@ -1,12 +1,14 @@
 """Passes over the cells of a grid or of a contact, by parts that stay in the cache, side by side on some threads.
 
-Nothing here sums: what is found is the same to the last bit, whatever the parts and the number of threads.
+Sums are those of the parts, added up in their order: what is found is the same to the last bit, whatever the number of
+threads. A gather from a wide grid waits for the memory, more than all that is computed of it; so what is gathered is
+used while it is in the cache. Cells are flat indices, ascending.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +18,21 @@ from roughvisc.mechanics.halfspace.threads import blocks, side_by_side
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Cells = NDArray[np.intp]
+Found = TypeVar("Found")
 
 # Cells of a part.
 _PART = 1 << 17
 
 
+def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Found]:
+    """What some work gives of each part of a vector of some size, in their order."""
+    return side_by_side(work, list(blocks(size, _PART)) or [slice(0, 0)], threads)
+
+
 def add(a: Array, b: Array, out: Array, threads: int) -> Array:
     """``out = a + b``."""
     first, second, found = a.reshape(-1), b.reshape(-1), out.reshape(-1)
-    _through(out.size, lambda part: np.add(first[part], second[part], out=found[part]), threads)
+    of_parts(lambda part: np.add(first[part], second[part], out=found[part]), out.size, threads)
     return out
 
 
@@ -35,7 +43,13 @@ def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> 
     def work(part: slice) -> None:
         found[part] += np.multiply(added[part], factor, dtype=np.float64)
 
-    _through(out.size, work, threads)
+    of_parts(work, out.size, threads)
+
+
+def subtract(out: Array, field: Array, threads: int) -> None:
+    """``out -= field``."""
+    found, taken_off = out.reshape(-1), field.reshape(-1)
+    of_parts(lambda part: np.subtract(found[part], taken_off[part], out=found[part]), out.size, threads)
 
 
 def lowest(field: Array, present: Mask | None, threads: int) -> float:
@@ -47,7 +61,7 @@ def lowest(field: Array, present: Mask | None, threads: int) -> float:
             return float(values[part].min())
         return float(values[part].min(where=there[part], initial=np.inf))
 
-    return min(_through(field.size, work, threads))
+    return min(of_parts(work, field.size, threads))
 
 
 def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells:
@@ -58,22 +72,65 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
         found += part.start
         return found
 
-    found = _through(size, work, threads)
-    return found[0] if len(found) == 1 else np.concatenate(found)
+    return np.concatenate(of_parts(work, size, threads))
 
 
-def taken(field: NDArray[Any], cells: Cells, threads: int) -> NDArray[Any]:
-    """Values of a field at some cells."""
-    if threads == 1:
+def taken(field: NDArray[Any], cells: Cells, threads: int, factor: float | None = None) -> NDArray[Any]:
+    """Values of a field at some cells; where there is a factor, times that in double precision."""
+    if factor is None and (threads == 1 or cells.size <= _PART):
         return field.take(cells)
-    found, values = np.empty(cells.size, field.dtype), field.reshape(-1)
+    found, values = np.empty(cells.size, field.dtype if factor is None else np.float64), field.reshape(-1)
 
     def work(part: slice) -> None:
-        found[part] = values.take(cells[part])
+        here = values.take(cells[part])
+        if factor is None:
+            found[part] = here
+        else:
+            np.multiply(here, factor, out=found[part], dtype=np.float64)
 
-    _through(cells.size, work, threads)
+    of_parts(work, cells.size, threads)
     return found
 
 
-def _through(size: int, work: Callable[[slice], Any], threads: int) -> list[Any]:
-    return side_by_side(work, list(blocks(size, _PART)), threads)
+def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
+    """Set a field at some cells."""
+    field = out.reshape(-1)
+
+    def work(part: slice) -> None:
+        field[cells[part]] = values[part]
+
+    of_parts(work, cells.size, threads)
+
+
+def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: float = 1.0) -> None:
+    """Set a field to values over their size at some cells, and to zero elsewhere."""
+    field = out.reshape(-1)
+    edges = [*range(0, field.size, _PART), field.size]
+    ends = np.searchsorted(cells, edges)
+
+    def work(number: int) -> None:
+        field[edges[number] : edges[number + 1]] = 0
+        part = slice(ends[number], ends[number + 1])
+        field[cells[part]] = values[part] if size == 1 else values[part] / size
+
+    side_by_side(work, range(len(edges) - 1), threads)
+
+
+def total(vector: Array, threads: int) -> float:
+    """Sum of a vector."""
+    return sum(of_parts(lambda part: float(vector[part].sum()), vector.size, threads))
+
+
+def magnitude(vector: Array, threads: int) -> float:
+    """Sum of its magnitudes."""
+    return sum(of_parts(lambda part: float(np.abs(vector[part]).sum()), vector.size, threads))
+
+
+def largest(vector: Array, threads: int) -> float:
+    """Largest magnitude in a vector; zero of none."""
+
+    def work(part: slice) -> float:
+        here = vector[part]
+        return max(float(here.max(initial=0.0)), -float(here.min(initial=0.0)))
+
+    return max(of_parts(work, vector.size, threads))

@@ -19,12 +19,14 @@ except ImportError:
 Field = NDArray[Any]
 
 
-def rfft(x: Field, n: int, axis: int, workers: int | None = None) -> Field:
-    return ducc0.fft.r2c(_lengthened(x, n, axis), axes=(axis,), nthreads=_threads(workers))
+def rfft(x: Field, n: int, axis: int, workers: int | None = None, out: Field | None = None) -> Field:
+    return ducc0.fft.r2c(_lengthened(x, n, axis), axes=(axis,), out=out, nthreads=_threads(workers))
 
 
-def irfft(x: Field, n: int, axis: int, overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _real(x, (axis,), n, overwrite_x, workers)
+def irfft(
+    x: Field, n: int, axis: int, overwrite_x: bool = False, workers: int | None = None, out: Field | None = None
+) -> Field:
+    return _real(x, (axis,), n, overwrite_x, workers, out)
 
 
 def cfft(x: Field, axis: int, n: int | None = None, overwrite_x: bool = False, workers: int | None = None) -> Field:
@@ -66,9 +68,11 @@ def _complex(x: Field, axis: int, forward: bool, overwrite: bool, workers: int |
     return ducc0.fft.c2c(x, axes=(axis,), forward=forward, inorm=norm, out=out, nthreads=_threads(workers))
 
 
-def _real(x: Field, axes: tuple[int, ...], n: int, overwrite: bool, workers: int | None) -> Field:
+def _real(
+    x: Field, axes: tuple[int, ...], n: int, overwrite: bool, workers: int | None, out: Field | None = None
+) -> Field:
     given = {"forward": False, "inorm": 2, "allow_overwriting_input": overwrite, "nthreads": _threads(workers)}
-    return ducc0.fft.c2r(x, axes=axes, lastsize=n, **given)
+    return ducc0.fft.c2r(x, axes=axes, lastsize=n, out=out, **given)
 
 
 def _cosine(x: Field, axes: tuple[int, ...], kind: int, overwrite: bool, workers: int | None) -> Field:

@@ -165,19 +165,21 @@ class HalfSpace:
             return self._filtered(pressure, symbol)
         return self._by_blocks(pressure, symbol, self._points)
 
-    def _by_blocks(self, field: NDArray[Any], symbol: NDArray[Any], points: tuple[int, int]) -> NDArray[Any]:
+    def _by_blocks(
+        self, field: NDArray[Any], symbol: NDArray[Any], points: tuple[int, int], out: NDArray[Any] | None = None
+    ) -> NDArray[Any]:
         """Convolution on so many points, in the precision of field and symbol.
 
         Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of columns
         go forward, are multiplied and come back while they stay in the cache.
         """
-        along, (nx, ny), (mx, my) = self._transforms, self.shape, points
+        along, nx, (mx, my) = self._transforms, self.shape[0], points
         spectrum, rooms = self._working_memory(points, field.dtype)
-        found = np.empty(self.shape, field.dtype)
+        found = np.empty(self.shape, field.dtype) if out is None else out
         rows = list(blocks(nx, min(_ROWS, max(_ROW_POINTS // my, 1))))
 
         def forward(rows: slice) -> None:
-            spectrum[rows] = along.of_rows(field[rows], n=my, axis=1, workers=1)
+            along.rows_into(spectrum[rows], field[rows], my)
 
         def across(block: slice) -> None:
             room = rooms.get()
@@ -191,7 +193,7 @@ class HalfSpace:
             rooms.put(room)
 
         def back(rows: slice) -> None:
-            found[rows] = along.rows_back(spectrum[rows], n=my, axis=1, workers=1)[:, :ny]
+            along.rows_back_into(found[rows], spectrum[rows], my)
 
         side_by_side(forward, rows, self.threads)
         side_by_side(across, list(blocks(spectrum.shape[1], _together(mx, spectrum.shape[1]))), self.threads)
@@ -217,13 +219,17 @@ class HalfSpace:
         rooms = [np.empty(size * mx * _together(mx, count), np.uint8) for _ in range(self.threads)]
         return np.empty(size * self.shape[0] * count, np.uint8), rooms
 
-    def approximate_inverse(self, displacement: NDArray[np.float32]) -> NDArray[np.float32]:
+    def approximate_inverse(
+        self, displacement: NDArray[np.float32], out: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
 
         Parameters
         ----------
         displacement : ndarray of float32, shape (nx, ny)
             Of ordinary size: single precision underflows. [m]
+        out : ndarray of float32, shape (nx, ny), optional
+            Memory for what is returned, which large grids use: other memory has to be had first.
 
         Returns
         -------
@@ -235,7 +241,7 @@ class HalfSpace:
         The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
         positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
         """
-        return self._filtered(displacement, self._inverse_symbol)
+        return self._filtered(displacement, self._inverse_symbol, out)
 
     @cached_property
     def _inverse_symbol(self) -> NDArray[np.float32]:
@@ -243,10 +249,10 @@ class HalfSpace:
         symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
         return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
 
-    def _filtered(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+    def _filtered(self, field: NDArray[Any], symbol: NDArray[Any], out: NDArray[Any] | None = None) -> NDArray[Any]:
         """Convolution on the cells themselves."""
         if field.size >= _BLOCKED:
-            return self._by_blocks(field, symbol, self.shape)
+            return self._by_blocks(field, symbol, self.shape, out)
         field_q = self._transforms.of_field(field, workers=1)
         self._transforms.multiply(field_q, symbol)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)

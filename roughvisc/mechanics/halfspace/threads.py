@@ -6,10 +6,11 @@ What the parts are does not depend on how many threads there are, so that result
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 Found = TypeVar("Found")
@@ -24,11 +25,28 @@ def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
         It holds the interpreter's lock for short times only.
     parts : sequence
     threads : int
-        One works in the caller's thread.
+        The caller's is one of them.
     """
     if threads == 1 or len(parts) == 1:
         return [work(part) for part in parts]
-    return list(_pool(threads, os.getpid()).map(work, parts))
+    found: list[Any] = [None] * len(parts)
+    todo = deque(range(len(parts)))  # each thread takes the next: a task for each part costs as much as a short part
+
+    def take_on() -> None:
+        try:
+            while (number := _next(todo)) is not None:
+                found[number] = work(parts[number])
+        finally:
+            todo.clear()  # where the work failed, for the others too
+
+    helpers = [_pool(threads, os.getpid()).submit(take_on) for _ in range(min(threads, len(parts)) - 1)]
+    try:
+        take_on()
+    finally:
+        begun = [helper for helper in helpers if not helper.cancel()]  # what has not begun is not needed any more
+        for helper in begun:
+            helper.result()
+    return found
 
 
 def blocks(length: int, size: int) -> Iterator[slice]:
@@ -36,7 +54,15 @@ def blocks(length: int, size: int) -> Iterator[slice]:
     return (slice(first, min(first + size, length)) for first in range(0, length, size))
 
 
+def _next(todo: deque[int]) -> int | None:
+    """The first that is left, taken away; None where there is none."""
+    try:
+        return todo.popleft()
+    except IndexError:
+        return None
+
+
 @lru_cache(maxsize=4)
 def _pool(threads: int, _process: int) -> ThreadPoolExecutor:
-    """Threads of this process: a forked one has none of its parent's."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="roughvisc")
+    """The others of so many threads of this process: a forked one has none of its parent's."""
+    return ThreadPoolExecutor(threads - 1, thread_name_prefix="roughvisc")

@@ -35,6 +35,8 @@ class Transforms:
         Along both.
     is_complex : bool
         Whether what they give is.
+    fills : bool
+        Whether those of rows take an array, as ``out``, to write what they give into.
     """
 
     images: int
@@ -45,6 +47,21 @@ class Transforms:
     of_field: Callable[..., NDArray[Any]]
     field_back: Callable[..., NDArray[Any]]
     is_complex: bool
+    fills: bool = False
+
+    def rows_into(self, out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
+        """Transform rows of so many points, zeros behind them, into an array."""
+        self._into(self.of_rows, out, rows, points)
+
+    def rows_back_into(self, out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
+        """Transform them back into an array, as many points of them as it takes."""
+        self._into(self.rows_back, out, rows, points)
+
+    def _into(self, transform: Callable[..., NDArray[Any]], out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
+        if self.fills and (transform is self.of_rows or out.shape[1] == points):
+            transform(rows, n=points, axis=1, workers=1, out=out)
+        else:
+            out[...] = transform(rows, n=points, axis=1, workers=1)[:, : out.shape[1]]
 
     def width(self, points: int) -> int:
         """Numbers that so many points of a row have as their transform."""
@@ -85,6 +102,6 @@ _SCIPY = (
     Transforms(2, fft.dct, fft.dct, fft.idct, fft.idct, fft.dctn, fft.idctn, False),
 )
 _DUCC0 = (
-    Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True),
+    Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True, fills=True),
     Transforms(2, ducc.dct, ducc.dct, ducc.idct, ducc.idct, ducc.dctn, ducc.idctn, False),
 )
