@@ -27,12 +27,14 @@ ALLOWED = {
     "units": {"errors"},
     "notebook": set(),
     "mechanics.materials": {"errors", "notebook", "units"},
-    "mechanics.halfspace": {"errors"},
-    "mechanics.contact": {"errors", "mechanics.halfspace"},
-    "mechanics.hereditary": {"errors", "mechanics.materials"},
+    "mechanics.fields": set(),
+    "mechanics.halfspace": {"errors", "mechanics.fields"},
+    "mechanics.contact": {"errors", "mechanics.fields", "mechanics.halfspace"},
+    "mechanics.hereditary": {"errors", "mechanics.fields", "mechanics.materials"},
     "mechanics.stepping": {
         "errors",
         "mechanics.contact",
+        "mechanics.fields",
         "mechanics.halfspace",
         "mechanics.hereditary",
         "mechanics.materials",
@@ -107,7 +109,7 @@ FORBIDDEN = {
     "study": {"matplotlib"},
 }
 #: folders whose entries are sub-packages, and how many entries they may have
-MOST_ENTRIES = {"mechanics": 9, "study": 10, "views": 9}
+MOST_ENTRIES = {"mechanics": 10, "study": 10, "views": 9}
 
 
 def room(module):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.full_contact import ROUNDED, load_certainty
 from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.fields import passes
 
 # Rounding of a sum over the cells, in parts of the sum: pairwise summation errs by a few units in the last place.
 _ROUNDING = 8 * float(np.finfo(float).eps)

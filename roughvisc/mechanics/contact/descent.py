@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.fields import passes
 
 # No step goes farther than this many times its trial: along a uniform pressure the periodic kernel has no curvature.
 # Measured on 400 solutions: the same iterations with 100, 1 % more with 10.

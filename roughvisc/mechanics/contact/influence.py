@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact import passes
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
@@ -57,12 +57,7 @@ class Influence:
         """Displacement by a pressure, in double precision."""
         self.convolutions += 1
         displacement = self.halfspace.displacement(pressure)
-        flat = displacement.reshape(-1)
-
-        def scaled(part: slice) -> None:
-            flat[part] *= self.scale
-
-        passes.of_parts(scaled, flat.size, self.threads)
+        passes.multiply(displacement, self.scale, self.threads)
         return displacement
 
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:

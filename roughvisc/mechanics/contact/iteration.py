@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.certificate import Certificate, certify
 from roughvisc.mechanics.contact.descent import (
     Step,
@@ -29,6 +28,7 @@ from roughvisc.mechanics.contact.full_contact import approach_under_load, carrie
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.contact.state import ContactState
+from roughvisc.mechanics.fields import passes
 
 # Iterations in which the duality gap must halve; otherwise a projected-gradient step is taken. Measured, like the
 # factors below, by the iterations of 400 solutions of workflows/benchmarks/solver_error.py's problems at 64 squared:
@@ -153,7 +153,9 @@ def _first(problem: Problem, start: Array | None, start_displacement: Array | No
     approximate = displacement is not None
     if displacement is None:
         displacement = problem.influence.displacement(pressure)
-    return Iterate(pressure, displacement, np.flatnonzero(pressure), approximate)
+    carried = pressure.reshape(-1)
+    contact = passes.cells_where(lambda part: carried[part] != 0, carried.size, problem.influence.threads)
+    return Iterate(pressure, displacement, contact, approximate)
 
 
 def _exact(problem: Problem, iterate: Iterate) -> Iterate:
@@ -239,14 +241,15 @@ def _result(
 ) -> ContactState:
     """The iterate in its own units."""
     pressure, displacement = iterate.pressure, iterate.displacement
-    load, approach = float(pressure.sum()), certificate.level
+    load, approach = passes.total(pressure.reshape(-1), problem.influence.threads), certificate.level
     if problem.load is not None:
         separation = problem.separation(displacement)
         approach = approach_under_load(problem, pressure, iterate.contact, separation, certificate.level)
     duality_gap, energy = max(certificate.duality_gap, 0.0), certificate.energy
     bound = math.sqrt(2 * duality_gap / energy) if energy > 0 else 0.0
-    pressure *= problem.unit
-    displacement *= problem.length
+    threads = problem.influence.threads
+    passes.multiply(pressure, problem.unit, threads)
+    passes.multiply(displacement, problem.length, threads)
     return ContactState(
         pressure=pressure,
         displacement=displacement,

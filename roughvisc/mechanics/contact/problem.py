@@ -9,9 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
@@ -64,7 +64,7 @@ class Problem:
         present: Mask | None,
     ) -> Problem:
         """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
-        lowest = float((gap if present is None else gap[present]).min())
+        lowest = passes.lowest(gap, present, halfspace.threads)
         if load is not None:
             unit = load
             length = load * halfspace.self_influence or load * halfspace.spacing[0]
@@ -72,8 +72,7 @@ class Problem:
             assert approach is not None
             length = approach - lowest
             unit = length / (halfspace.self_influence or halfspace.spacing[0])
-        gap -= lowest
-        gap /= length
+        passes.scale(gap, lowest, length, halfspace.threads)
         target = math.nan if approach is None else 1.0
         known = load is None and not halfspace.definite and present is None
         return cls(
@@ -154,17 +153,18 @@ class Problem:
 
     def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
+        threads = self.influence.threads
         if start is None or not np.any(start > 0):
             pressure, displacement = np.ones(self.gap.shape), None
             if self.load is None:
                 pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)
         else:
-            pressure = np.maximum(start, 0, out=start)
-            pressure /= self.unit
+            pressure = start
+            passes.cut_and_divide(pressure, self.unit, threads)
         if self.present is not None:
             pressure = np.where(self.present, pressure, 0.0)
-        factor = 1.0 if self.load is None else self.load / float(pressure.sum())
-        pressure *= factor
+        factor = 1.0 if self.load is None else self.load / passes.total(pressure.reshape(-1), threads)
+        passes.multiply(pressure, factor, threads)
         if displacement is not None:
-            displacement *= factor / self.length
+            passes.multiply(displacement, factor / self.length, threads)
         return pressure, displacement

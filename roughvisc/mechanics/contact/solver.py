@@ -76,9 +76,11 @@ def solve_contact(
     if present is not None and present.all():
         present = None
     if not overwrite:
-        gap = np.array(gap, dtype=float)
-        start = None if start is None else np.array(start, dtype=float)
-        start_displacement = None if start_displacement is None else np.array(start_displacement, dtype=float)
+        gap = np.array(gap, dtype=float, order="C")
+        start = None if start is None else np.array(start, dtype=float, order="C")
+        start_displacement = (
+            None if start_displacement is None else np.array(start_displacement, dtype=float, order="C")
+        )
     if load is not None and present is None and (start is None or not np.any(start > 0)):
         start, start_displacement = coarse_guess(halfspace, gap, load), None
     problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)

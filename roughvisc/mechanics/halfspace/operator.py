@@ -15,24 +15,22 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.fields.threads import blocks, side_by_side, threads_of
 from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.threads import blocks, side_by_side
 from roughvisc.mechanics.halfspace.transforms import transforms
 
 Array = NDArray[np.float64]
 Boundary = Literal["free", "periodic"]
 
-# Points of the columns transformed together, but at least so many columns; and at most so many rows and points of
-# rows: they stay in the cache (measured at 64 to 4096 squared).
-_POINTS, _COLUMNS, _ROWS, _ROW_POINTS = 1 << 13, 32, 128, 1 << 18
+# Points of the columns transformed together, but at least so many columns; and at most so many points of rows: they
+# stay in the cache (measured at 64 to 4096 squared).
+_POINTS, _COLUMNS, _ROW_POINTS = 1 << 13, 32, 1 << 18
 # Cells from which periodic transforms go by blocks too: at 1024 squared and above they take 0.7 to 0.9 of SciPy's time
 # for whole fields, and as long as ducc0's; below they are slower.
 _BLOCKED = 1024**2
 # Cells a side of a block.
 _BLOCK = 8
-# Cells from which several threads are faster than one (measured: slower at 512 squared, faster at 1024 squared).
-_THREADED = 1024**2
 
 
 class HalfSpace:
@@ -97,9 +95,7 @@ class HalfSpace:
     @property
     def threads(self) -> int:
         """How many threads work on one field."""
-        if self.shape[0] * self.shape[1] < _THREADED:
-            return 1
-        return fft.get_workers() if self.workers is None else self.workers
+        return threads_of(self.shape[0] * self.shape[1], self.workers)
 
     @cached_property
     def coarse(self) -> HalfSpace:
@@ -176,7 +172,7 @@ class HalfSpace:
         along, nx, (mx, my) = self._transforms, self.shape[0], points
         spectrum, rooms = self._working_memory(points, field.dtype)
         found = np.empty(self.shape, field.dtype) if out is None else out
-        rows = list(blocks(nx, min(_ROWS, max(_ROW_POINTS // my, 1))))
+        rows = list(blocks(nx, min(along.rows, max(_ROW_POINTS // my, 1))))
 
         def forward(rows: slice) -> None:
             along.rows_into(spectrum[rows], field[rows], my)

@@ -19,6 +19,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields.passes import weighted
+from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]
@@ -125,13 +127,10 @@ class Modes:
         own, earlier, before, after = self.coefficients(state, step, rule)
         weights = self._weights
         alpha = self.factor * self.material.glassy + float(np.sum(weights * after))
-        carried = float(np.sum(weights * before)) * state.field
-        for weight, mode in zip(weights * own, state.modes, strict=True):
-            carried += weight * mode
+        terms = [(float(np.sum(weights * before)), state.field), *zip(weights * own, state.modes, strict=True)]
         if state.earlier is not None and np.any(earlier):
-            for weight, mode in zip(weights * earlier, state.earlier, strict=True):
-                carried += weight * mode
-        return alpha, carried
+            terms += zip(weights * earlier, state.earlier, strict=True)
+        return alpha, weighted(terms, np.empty_like(state.field), threads_of(state.field.size))
 
     def advance(self, state: ModesState, step: float, rule: Rule, field: Array) -> ModesState:
         """State after a step at whose end the field was ``field``."""
@@ -140,12 +139,12 @@ class Modes:
         own, earlier, before, after = self.coefficients(state, step, rule)
         modes = np.empty_like(state.modes)
         for i, mode in enumerate(modes):
-            np.multiply(state.modes[i], own[i], out=mode)
+            terms = [(own[i], state.modes[i])]
             if earlier[i] and state.earlier is not None:
-                mode += earlier[i] * state.earlier[i]
+                terms.append((earlier[i], state.earlier[i]))
             if before[i]:
-                mode += before[i] * state.field
-            mode += after[i] * field
+                terms.append((before[i], state.field))
+            weighted([*terms, (after[i], field)], mode, threads_of(field.size))
         return ModesState(modes, field, state.modes if "bdf2" in self.rules else None, step)
 
     def restart(self, state: ModesState) -> ModesState:

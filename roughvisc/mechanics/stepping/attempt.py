@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
@@ -57,7 +58,8 @@ def attempt(
     alpha, effective, carried = predicted(scene, state.memory, length, rule)
     # what costs no convolution is not held while the contact is solved, and had again
     again = effective is None
-    gap = np.add(scene.gap, carried, out=carried if again else None)
+    threads = scene.halfspace.threads
+    gap = passes.add(scene.gap, carried, carried if again else np.empty_like(carried), threads)
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
@@ -86,11 +88,11 @@ def attempt(
     pressure, displacement = contact.pressure, contact.displacement
     if again:
         carried = predicted(scene, state.memory, length, rule)[2]
-    carried += displacement
+    passes.add(carried, displacement, carried, threads)
     if effective is not None:
         effective += pressure
-    pressure /= alpha
-    displacement /= alpha
+    passes.divide(pressure, alpha, threads)
+    passes.divide(displacement, alpha, threads)
     instant = Instant(
         time,
         pressure,

@@ -13,6 +13,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, segment_number, with_cost
 from roughvisc.mechanics.stepping.control import rule_for
@@ -68,16 +70,27 @@ def beside(
     assert now.unit_displacement is not None
     if companion is None or together is None:
         return now.pressure * scale, now.unit_displacement * scale
-    pressure = now.pressure + companion.pressure
-    pressure -= together.pressure
-    np.maximum(pressure, 0, out=pressure)
-    pressure *= scale
+    pressure = _moved(now.pressure, companion.pressure, together.pressure, scale, cut=True)
     if companion.unit_displacement is None or together.unit_displacement is None:
         return pressure, now.unit_displacement * scale
-    displacement = now.unit_displacement + companion.unit_displacement
-    displacement -= together.unit_displacement
-    displacement *= scale
-    return pressure, displacement
+    fields = now.unit_displacement, companion.unit_displacement, together.unit_displacement
+    return pressure, _moved(*fields, scale, cut=False)
+
+
+def _moved(now: Array, companion: Array, together: Array, scale: float, *, cut: bool) -> Array:
+    """``(now + companion - together) * scale``, cut at zero if that is said."""
+    found = np.empty_like(now)
+    first, second, third, out = (field.reshape(-1) for field in (now, companion, together, found))
+
+    def work(part: slice) -> None:
+        here = np.add(first[part], second[part], out=out[part])
+        here -= third[part]
+        if cut:
+            np.maximum(here, 0, out=here)
+        here *= scale
+
+    passes.of_parts(work, found.size, threads_of(found.size))
+    return found
 
 
 def difference(
@@ -115,7 +128,7 @@ def difference(
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
     unresolved = 0.0 if step.state.energy is None else step.state.energy.unresolved
     return Uncertainty(
-        pressure=stated * area * float(np.sum(np.abs(fine.pressure - coarse.pressure))) + entered,
+        pressure=stated * area * passes.apart(fine.pressure, coarse.pressure, scene.halfspace.threads) + entered,
         approach=stated * abs(fine.approach - coarse.approach),
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
         work=energy * abs(step.state.work - companion.work) + unresolved,

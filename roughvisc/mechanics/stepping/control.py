@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from roughvisc.mechanics.fields.passes import apart
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Rule
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trial
@@ -152,7 +153,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     approach = max(
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
-    difference = float(np.sum(np.abs(trial.instant.pressure - state.extrapolated(trial.length))))
+    difference = apart(trial.instant.pressure, state.extrapolated(trial.length), scene.halfspace.threads)
     pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.blind else 0.0
     ratio = trial.length / last
     if segment.control == "load":

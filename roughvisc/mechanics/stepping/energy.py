@@ -17,6 +17,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields.passes import cells_where
+from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 
@@ -115,8 +117,9 @@ def after_step(
     time, what that dissipates is the work of the mean pressure on its change, less what it stores: exact where the
     load or the approach is held.
     """
-    cells = np.flatnonzero(end[0])
-    pressure = end[0].reshape(-1).take(cells)
+    carried, threads = end[0].reshape(-1), threads_of(end[0].size)
+    cells = cells_where(lambda part: carried[part] != 0, carried.size, threads)
+    pressure = carried.take(cells)
     both = area * float(np.sum(pressure * start[1].reshape(-1).take(cells)))
     last = area * float(np.sum(pressure * end[1].reshape(-1).take(cells)))
     glassy = 0.5 * memory.factor * memory.material.glassy

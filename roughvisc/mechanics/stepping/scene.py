@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
@@ -78,7 +80,7 @@ class Scene:
 
     def lowest(self, field: Array) -> float:
         """Least value over the present cells."""
-        return float(np.min(field if self.present is None else field[self.present]))
+        return passes.lowest(field, self.present, self.halfspace.threads)
 
     def compliance(self, t: float) -> float:
         """Contact compliance. [1/Pa]"""
@@ -234,8 +236,7 @@ class State:
         """Pressure a step ahead by the last two, cut at zero; the last one where there is no other. [Pa]"""
         if self.before is None or length == 0:
             return self.now.pressure
-        ahead = _beyond(self.before.pressure, self.now.pressure, self._ratio(length), 1.0)
-        return np.maximum(ahead, 0, out=ahead)
+        return _beyond(self.before.pressure, self.now.pressure, self._ratio(length), 1.0)[0]
 
     def first_guess(self, length: float, scale: float) -> tuple[Array, Array | None]:
         """The extrapolated pressure and its unit displacement, both scaled, in memory of their own.
@@ -246,12 +247,10 @@ class State:
         if before is None or length == 0:
             return now.pressure * scale, None if now.unit_displacement is None else now.unit_displacement * scale
         ratio = self._ratio(length)
-        pressure = _beyond(before.pressure, now.pressure, ratio, scale)
-        if np.min(pressure) < 0:
-            return np.maximum(pressure, 0, out=pressure), None
-        if now.unit_displacement is None or before.unit_displacement is None:
+        pressure, was_cut = _beyond(before.pressure, now.pressure, ratio, scale)
+        if was_cut or now.unit_displacement is None or before.unit_displacement is None:
             return pressure, None
-        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale)
+        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale, cut=False)[0]
 
     def _ratio(self, length: float) -> float:
         """Of a step's length to that of the last one."""
@@ -259,13 +258,22 @@ class State:
         return length / (self.now.time - self.before.time)
 
 
-def _beyond(before: Array, now: Array, ratio: float, scale: float) -> Array:
-    """``scale * (now + ratio * (now - before))``."""
-    there = now - before
-    there *= ratio
-    there += now
-    there *= scale
-    return there
+def _beyond(before: Array, now: Array, ratio: float, scale: float, *, cut: bool = True) -> tuple[Array, bool]:
+    """``scale * (now + ratio * (now - before))``, cut at zero if that is said, and whether anything was cut."""
+    found = np.empty_like(now)
+    first, last, there = before.reshape(-1), now.reshape(-1), found.reshape(-1)
+
+    def work(part: slice) -> bool:
+        here = np.subtract(last[part], first[part], out=there[part])
+        here *= ratio
+        here += last[part]
+        here *= scale
+        below = cut and bool(here.min(initial=0.0) < 0)
+        if below:
+            np.maximum(here, 0, out=here)
+        return below
+
+    return found, any(passes.of_parts(work, found.size, threads_of(found.size)))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.errors import HinderedError, InputError, TooLargeError
-from roughvisc.mechanics.halfspace import operator
+from roughvisc.mechanics.fields import threads as threads_module
 from roughvisc.study.execution import side_by_side as side_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.simulation import available, refusal
@@ -209,7 +209,7 @@ def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatc
 
 def test_bits__do_not_depend_on_the_threads(study, tmp_path, monkeypatch):
     """With the grid counted as large: threads are in use."""
-    monkeypatch.setattr(operator, "_THREADED", 1)
+    monkeypatch.setattr(threads_module, "_THREADED", 1)
     case = vary(read_study(study(ROUGH)), {"surface.shape": [72, 60], "keep.times": 3, "solve.tolerance": 1e-2})
     found = []
     for threads in (1, 2, 3):

@@ -12,7 +12,7 @@ from scipy import fft
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.labels import annotate
-from roughvisc.mechanics.halfspace import operator as halfspace
+from roughvisc.mechanics.fields import threads as threads_module
 from roughvisc.study.simulation import scene
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.storage.records import RowsInMemory
@@ -290,7 +290,7 @@ def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
 
 def test_threads__change_no_bit(monkeypatch):
     """Nor does the next run."""
-    monkeypatch.setattr(halfspace, "_THREADED", 0)
+    monkeypatch.setattr(threads_module, "_THREADED", 0)
     rough = rv.self_affine((1e-4, 1.1e-4), (41, 45), hurst=0.8, rms_slope=0.1, shortcut=8e-6, seed=3)
     found = []
     for threads in (1, 2, 2):

@@ -7,13 +7,13 @@ used while it is in the cache. Cells are flat indices, ascending.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.halfspace.threads import blocks, side_by_side
+from roughvisc.mechanics.fields.threads import blocks, side_by_side
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,16 +29,30 @@ def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Fo
     return side_by_side(work, list(blocks(size, _PART)) or [slice(0, 0)], threads)
 
 
+def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
+    """Sum of fields times their factors, in their order; ``out`` may be the first of them."""
+    flat, found = [(factor, field.reshape(-1)) for factor, field in terms], _flat(out)
+
+    def work(part: slice) -> None:
+        here, (factor, field) = found[part], flat[0]
+        np.multiply(field[part], factor, out=here)
+        for factor, field in flat[1:]:
+            here += factor * field[part]
+
+    of_parts(work, out.size, threads)
+    return out
+
+
 def add(a: Array, b: Array, out: Array, threads: int) -> Array:
     """``out = a + b``."""
-    first, second, found = a.reshape(-1), b.reshape(-1), out.reshape(-1)
+    first, second, found = a.reshape(-1), b.reshape(-1), _flat(out)
     of_parts(lambda part: np.add(first[part], second[part], out=found[part]), out.size, threads)
     return out
 
 
 def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> None:
     """``out += factor * field``, multiplied in double precision."""
-    found, added = out.reshape(-1), field.reshape(-1)
+    found, added = _flat(out), field.reshape(-1)
 
     def work(part: slice) -> None:
         found[part] += np.multiply(added[part], factor, dtype=np.float64)
@@ -48,8 +62,50 @@ def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> 
 
 def subtract(out: Array, field: Array, threads: int) -> None:
     """``out -= field``."""
-    found, taken_off = out.reshape(-1), field.reshape(-1)
+    found, taken_off = _flat(out), field.reshape(-1)
     of_parts(lambda part: np.subtract(found[part], taken_off[part], out=found[part]), out.size, threads)
+
+
+def multiply(out: Array, factor: float, threads: int) -> None:
+    """``out *= factor``."""
+    found = _flat(out)
+    of_parts(lambda part: np.multiply(found[part], factor, out=found[part]), out.size, threads)
+
+
+def divide(out: Array, divisor: float, threads: int) -> None:
+    """``out /= divisor``."""
+    found = _flat(out)
+    of_parts(lambda part: np.divide(found[part], divisor, out=found[part]), out.size, threads)
+
+
+def scale(out: Array, origin: float, unit: float, threads: int) -> None:
+    """``out = (out - origin) / unit``."""
+    found = _flat(out)
+
+    def work(part: slice) -> None:
+        here = found[part]
+        here -= origin
+        here /= unit
+
+    of_parts(work, out.size, threads)
+
+
+def cut_and_divide(out: Array, divisor: float, threads: int) -> None:
+    """``out = max(out, 0) / divisor``."""
+    found = _flat(out)
+
+    def work(part: slice) -> None:
+        here = found[part]
+        np.maximum(here, 0, out=here)
+        here /= divisor
+
+    of_parts(work, out.size, threads)
+
+
+def apart(a: Array, b: Array, threads: int) -> float:
+    """Sum of the magnitudes of ``a - b``."""
+    first, second = a.reshape(-1), b.reshape(-1)
+    return sum(of_parts(lambda part: float(np.abs(first[part] - second[part]).sum()), a.size, threads))
 
 
 def lowest(field: Array, present: Mask | None, threads: int) -> float:
@@ -94,7 +150,7 @@ def taken(field: NDArray[Any], cells: Cells, threads: int, factor: float | None 
 
 def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
     """Set a field at some cells."""
-    field = out.reshape(-1)
+    field = _flat(out)
 
     def work(part: slice) -> None:
         field[cells[part]] = values[part]
@@ -104,7 +160,7 @@ def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
 
 def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: float = 1.0) -> None:
     """Set a field to values over their size at some cells, and to zero elsewhere."""
-    field = out.reshape(-1)
+    field = _flat(out)
     edges = [*range(0, field.size, _PART), field.size]
     ends = np.searchsorted(cells, edges)
 
@@ -134,3 +190,10 @@ def largest(vector: Array, threads: int) -> float:
         return max(float(here.max(initial=0.0)), -float(here.min(initial=0.0)))
 
     return max(of_parts(work, vector.size, threads))
+
+
+def _flat(out: NDArray[Any]) -> NDArray[Any]:
+    """The same memory as a vector: of cells that do not follow each other that would be a copy."""
+    if not out.flags.c_contiguous:
+        raise ValueError("expected a field whose cells follow each other in memory")
+    return out.reshape(-1)

@@ -12,8 +12,21 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, TypeVar
 
+from scipy import fft
+
 Part = TypeVar("Part")
 Found = TypeVar("Found")
+
+
+# Cells of a field from which several threads are faster than one (measured: slower at 512 squared, faster at 1024).
+_THREADED = 1024**2
+
+
+def threads_of(size: int, workers: int | None = None) -> int:
+    """How many threads work on a field of so many cells; None: as ``scipy.fft.set_workers`` has it."""
+    if size < _THREADED:
+        return 1
+    return fft.get_workers() if workers is None else workers
 
 
 def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: int) -> list[Found]:

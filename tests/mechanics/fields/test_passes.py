@@ -1,0 +1,120 @@
+"""Passes over a grid: what NumPy does at once, whatever the parts and the threads."""
+
+import numpy as np
+import pytest
+
+from roughvisc.mechanics.contact import long_waves, solve_contact
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.mechanics.halfspace import operator
+from roughvisc.mechanics.halfspace.operator import HalfSpace
+
+THREADS = pytest.mark.parametrize("threads", [1, 2, 3])
+
+
+@pytest.fixture(autouse=True)
+def in_small_parts(monkeypatch):
+    monkeypatch.setattr(passes, "_PART", 13)
+
+
+@THREADS
+def test_passes__do_what_numpy_does_at_once(threads):
+    rng = np.random.default_rng(0)
+    a, b, out = rng.standard_normal((3, 9, 11))
+    assert passes.add(a, b, out, threads) is out
+    assert np.array_equal(out, a + b)
+    single, onto = b.astype(np.float32), a.copy()
+    passes.add_scaled(onto, single, 0.3, threads)
+    assert np.array_equal(onto, a + 0.3 * single.astype(float))
+    present = rng.random((9, 11)) > 0.8
+    assert passes.lowest(a, None, threads) == a.min()
+    assert passes.lowest(a, present, threads) == a[present].min()
+    flat = a.reshape(-1)
+    found = passes.cells_where(lambda part: flat[part] > 0.5, a.size, threads)
+    assert np.array_equal(found, np.flatnonzero(a > 0.5))
+    assert np.array_equal(passes.taken(a, found, threads), flat[found])
+    assert passes.taken(single, found[:0], threads).dtype == np.float32
+    assert np.array_equal(passes.taken(single, found, threads, 0.3), single.reshape(-1)[found].astype(float) * 0.3)
+    values = rng.standard_normal(found.size)
+    expected = np.zeros(a.size)
+    expected[found] = values / 7.0
+    passes.spread(out, found, values, threads, 7.0)
+    assert np.array_equal(out.reshape(-1), expected)
+    expected[found] = values
+    passes.put(out, found, values, threads)
+    assert np.array_equal(out.reshape(-1), expected)
+
+
+@THREADS
+def test_passes__of_arithmetic(threads):
+    a, b, c = np.random.default_rng(1).standard_normal((3, 9, 11))
+
+    def after(change, *given):
+        out = a.copy()
+        change(out, *given, threads)
+        return out
+
+    assert np.array_equal(after(passes.subtract, b), a - b)
+    assert np.array_equal(after(passes.multiply, 0.3), a * 0.3)
+    assert np.array_equal(after(passes.divide, 0.3), a / 0.3)
+    assert np.array_equal(after(passes.scale, 0.2, 0.3), (a - 0.2) / 0.3)
+    assert np.array_equal(after(passes.cut_and_divide, 0.3), np.maximum(a, 0) / 0.3)
+    out = a.copy()
+    assert passes.weighted([(0.2, out), (0.3, b), (-2.0, c)], out, threads) is out
+    assert np.array_equal(out, 0.2 * a + 0.3 * b + -2.0 * c)
+
+
+def test_sums__are_those_of_the_parts_in_their_order_on_any_threads():
+    a, b = np.random.default_rng(2).standard_normal((2, 9 * 11))
+    parts = [slice(first, first + 13) for first in range(0, a.size, 13)]
+    for threads in (1, 2, 3):
+        assert passes.total(a, threads) == sum(a[part].sum() for part in parts)
+        assert passes.magnitude(a, threads) == sum(np.abs(a[part]).sum() for part in parts)
+        assert passes.apart(a, b, threads) == sum(np.abs(a[part] - b[part]).sum() for part in parts)
+        assert passes.largest(a - 1, threads) == np.abs(a - 1).max() > (a - 1).max()
+        assert passes.largest(a[:0], threads) == passes.total(a[:0], threads) == 0
+
+
+def test_passes__write_into_no_copy():
+    with pytest.raises(ValueError, match="follow each other in memory"):
+        passes.multiply(np.ones((3, 4)).T, 2.0, 1)
+
+
+@THREADS
+@pytest.mark.parametrize("error", [KeyError, IndexError])
+def test_error_in_a_part__ends_all(threads, error):
+    done = []
+
+    def work(part):
+        if part == 5:
+            raise error("of the part")
+        done.append(part)
+
+    with pytest.raises(error, match="of the part"):
+        threads_module.side_by_side(work, range(1000), threads)
+    assert len(done) < 1000 - 1
+
+
+def test_side_by_side__within_itself_ends():
+    def inner(part):
+        return sum(threads_module.side_by_side(lambda number: number * part, range(4), 2))
+
+    assert threads_module.side_by_side(inner, range(20), 2) == [6 * part for part in range(20)]
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
+    monkeypatch.setattr(threads_module, "_THREADED", 1)
+    for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
+        monkeypatch.setattr(operator, name, value)
+    monkeypatch.setattr(long_waves, "_FROM", 1)
+    gap = np.random.default_rng(5).random((48, 37))
+    one, *others = (
+        solve_contact(HalfSpace((48, 37), (1.0, 1.3), boundary, workers=threads), gap, load=60.0, tolerance=1e-6)
+        for threads in (1, 2, 3)
+    )
+    assert one.iterations > 3
+    for other in others:
+        assert np.array_equal(one.pressure, other.pressure)
+        assert np.array_equal(one.displacement, other.displacement)
+        assert one.approach == other.approach
