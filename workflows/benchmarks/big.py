@@ -27,7 +27,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 AREAS = (0.05, 0.3, 0.95)
 # What takes an hour is left out.
-LARGEST = {"Tamaas": 1024}
+LARGEST = {"Tamaas": 1024, "ASPHER": 4096}
 
 
 def scene(cells, area):

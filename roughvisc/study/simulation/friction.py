@@ -17,6 +17,7 @@ from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.slide import Direction
 from roughvisc.study.simulation.malloc import expect_arrays
 from roughvisc.study.simulation.notes import border_note, slope_note
+from roughvisc.study.simulation.refusal import require_memory_of_curve
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.simulation.speeds import Speeds
 from roughvisc.study.statement.body import body
@@ -136,6 +137,7 @@ def rub(
     began = time.perf_counter()
     material = complete(material)
     ground = Ground(height, "refuse", kernel=settings.kernel)
+    require_memory_of_curve((ground.gap.shape[0], ground.gap.shape[1]), settings)
     if not ground.present.all():  # of a punch, which says so itself
         raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
     expect_arrays(ground.gap.nbytes)

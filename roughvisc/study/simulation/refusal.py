@@ -16,7 +16,7 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.simulation.available import Available, memory_available
-from roughvisc.study.simulation.footprint import march_bytes
+from roughvisc.study.simulation.footprint import curve_bytes, march_bytes
 from roughvisc.study.simulation.mirror import is_mirrored
 from roughvisc.study.simulation.scene import follows, memory_wanted
 from roughvisc.study.statement.settings import Settings
@@ -79,6 +79,15 @@ def require_memory(
         if needed(cells, part=part) <= PART * there.size:
             return
     refuse(shape, partial(needed, part=part), there, _savings(settings, rows, needed, part, there, cells, in_memory))
+
+
+def require_memory_of_curve(shape: tuple[int, int], settings: Settings) -> None:
+    """Refuse a curve of friction on a surface of so many cells that takes more memory than there is."""
+    if math.prod(shape) < WORTH_ASKING:
+        return
+    needed, there = partial(curve_bytes, settings), memory_available()
+    if not _fits(there, needed(math.prod(shape))):
+        refuse(shape, needed, there, [])
 
 
 def require_surface(shape: tuple[int, int]) -> None:

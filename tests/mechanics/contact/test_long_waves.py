@@ -15,6 +15,7 @@ SHAPE, SPACING = (52, 37), (0.5, 0.7)
 @pytest.fixture
 def on_small_grids(monkeypatch):
     monkeypatch.setattr(long_waves, "_FROM", 1)
+    monkeypatch.setattr(long_waves, "_SPOTS", 0.0)
     monkeypatch.setattr(long_waves, "_TOLERANCE", 1e-11)
 
 
@@ -109,10 +110,33 @@ def test_long_waves__are_left_to_large_grids_sparse_contact_and_kernels_that_giv
     assert LongWaves.of(influence, cells, ones, 1e9) is None
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(long_waves, "_FROM", 1)
+        assert LongWaves.of(influence, cells, ones, 1e9) is None  # few spots
+        patch.setattr(long_waves, "_SPOTS", 0.0)
         assert LongWaves.of(influence, cells, ones, 1e9) is not None
         assert LongWaves.of(influence, cells, ones, 0.0) is None  # no more energy than the blocks alone
         dense = np.arange(int(0.7 * influence.work.size))
         assert LongWaves.of(influence, dense, np.ones(dense.size), 1e9) is None
+
+
+def test_spots__count_by_the_cells_whose_block_is_not_all_free(monkeypatch):
+    """Half of the free cells fill their blocks, the others do not: 0.5 times 8 blocks a side."""
+    influence = Influence(HalfSpace((64, 72), (1.0, 1.0)), 1.0)
+    mask = np.zeros((64, 72), bool)
+    mask[8:16, :8] = mask[24:32, 16:24] = True
+    mask[40:56, 4::9] = True
+    monkeypatch.setattr(long_waves, "_FROM", 1)
+    cells = np.flatnonzero(mask)
+    for spots, pay in ((3.99, True), (4.01, False)):
+        monkeypatch.setattr(long_waves, "_SPOTS", spots)
+        assert (LongWaves.of(influence, cells, np.ones(cells.size), 1e9) is not None) is pay
+
+
+def test_one_round_contact__needs_no_blocks():
+    """With them it took 117 iterations."""
+    gap = sum(np.square(x - 191.5) for x in np.indices((384, 384))) / 384.0
+    state = solve_contact(HalfSpace((384, 384), (1.0, 1.0), "free"), gap, load=0.1 * gap.size, tolerance=1e-6)
+    assert 0.1 < np.mean(state.pressure > 0) < 0.4
+    assert state.iterations < 25
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
@@ -124,6 +148,7 @@ def test_contact__is_the_same_with_both_levels(monkeypatch, boundary, given):
     known = {"load": 300.0} if given == "load" else {"approach": 1.2}
     alone = solve_contact(halfspace, gap, tolerance=1e-12, **known)
     monkeypatch.setattr(long_waves, "_FROM", 1)
+    monkeypatch.setattr(long_waves, "_SPOTS", 0.0)
     both = solve_contact(halfspace, gap, tolerance=1e-12, **known)
     assert both.converged
     assert both.iterations != alone.iterations  # the second level was there

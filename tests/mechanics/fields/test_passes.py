@@ -108,6 +108,7 @@ def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
     for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
         monkeypatch.setattr(operator, name, value)
     monkeypatch.setattr(long_waves, "_FROM", 1)
+    monkeypatch.setattr(long_waves, "_SPOTS", 0.0)
     gap = np.random.default_rng(5).random((48, 37))
     one, *others = (
         solve_contact(HalfSpace((48, 37), (1.0, 1.3), boundary, workers=threads), gap, load=60.0, tolerance=1e-6)

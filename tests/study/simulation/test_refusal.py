@@ -19,6 +19,7 @@ from roughvisc.study.simulation import available, refusal
 from roughvisc.study.simulation.available import Available, cores, memory_available, threads_for
 from roughvisc.study.simulation.footprint import PROCESS, curve_bytes
 from roughvisc.study.simulation.scene import Ground
+from roughvisc.study.simulation.speeds import Speeds
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.store import open_result
@@ -138,6 +139,18 @@ def test_curves_of_friction__run_side_by_side_as_memory_allows(study, limited):
     assert side_module.side_by_side(cases, 2) == 2
     limited(1.9 * each / refusal.PART)
     assert side_module.side_by_side(cases, 2) == 1
+
+
+def test_curve_of_friction__is_refused_where_it_cannot_fit(study, limited, tmp_path, monkeypatch, invoke):
+    monkeypatch.setattr(Speeds, "add", lambda *_: pytest.fail("a speed was solved"))
+    head = ROUGH.partition("[[program]]")[0]
+    path = study(head + '[friction]\npressure = "20 kPa"\nspeeds = ["1 mm/s"]\n[solve]\nboundary = "periodic"\n')
+    limited(40e6)
+    status, _, wrong = invoke("run", str(path), "--no-plots")
+    assert status == 2
+    assert "study.toml: 600 x 512 cells need about" in wrong.replace("\n", " ")
+    assert "what would fit: 300 x 256 cells" in wrong.replace("\n", " ")
+    assert not list(tmp_path.glob("results/**/*.nc")), "nothing is kept of it"
 
 
 # ----------------------------------------------------------------------------------------------------------------
