@@ -35,8 +35,8 @@ from roughvisc.mechanics.fields import passes
 _FROM, _SPARSE = 384, 0.6
 # Blocks a side, times the part of the free cells whose block is not all free, from which they pay: about as many spots
 # lie side by side. Within a spot that is wider than a block they do harm. Measured at 512 to 2048 squared, with
-# shortest waves of 4 to 128 cells and 2 to 50 % in contact: 29 iterations in place of 39 at 64, 24 in place of 25 at 45,
-# 20 in place of 16 at 35, and 135 in place of 19 on one round contact.
+# shortest waves of 4 to 128 cells and 2 to 50 % in contact: 29 iterations rather than 39 at 64, 24 for 25 at 45, 20
+# for 16 at 35, and 135 for 19 on one round contact.
 _SPOTS = 45.0
 # Of the local compliance found: measured, the fewest iterations lie between half of it and all of it.
 _SHARE = 0.7
