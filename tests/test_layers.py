@@ -15,7 +15,14 @@ PACKAGE = ROOT / "roughvisc"
 _LABELS = {"errors", "labels", "notebook", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
-_SIMULATION = {*_STORAGE, "study.storage", "study.progress", "mechanics.contact", "mechanics.sliding"}
+_SIMULATION = {
+    *_STORAGE,
+    "study.storage",
+    "study.progress",
+    "mechanics.contact",
+    "mechanics.fields",
+    "mechanics.sliding",
+}
 _EXECUTION = {*_SIMULATION, "study.simulation"}
 _AUDIT = {*_SIMULATION, "study.simulation", "mechanics.closed_forms"}
 _COST = {*_EXECUTION, "study.execution", "study.audit"}

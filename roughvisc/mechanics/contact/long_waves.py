@@ -124,21 +124,31 @@ class LongWaves:
         influence, cells = self.influence, self.cells
         own = influence.of_one_block
         diagonal = np.where(cells > 0, cells * self.local + cells * cells * own, 1)
-        answer, left = np.zeros(cells.size), sums
-        search = eased = left / diagonal
-        start = squared = float((left * eased).sum())
+        answer, left = np.zeros(cells.size), sums.copy()
+        eased = left / diagonal
+        search = eased.copy()
+        start = squared = _product(left, eased)
         for _ in range(_MOST):
             if not squared > _TOLERANCE**2 * start:
                 break
-            response = cells * (influence.of_blocks(cells * search) + self.local * search)
-            length = squared / float((search * response).sum())
-            answer = answer + length * search
-            left = left - length * response
-            eased = left / diagonal
-            before, squared = squared, float((left * eased).sum())
-            search = eased + squared / before * search
+            response = influence.of_blocks(cells * search)
+            response += self.local * search
+            response *= cells
+            length = squared / _product(search, response)
+            answer += length * search
+            response *= length
+            left -= response
+            np.divide(left, diagonal, out=eased)
+            before, squared = squared, _product(left, eased)
+            search *= squared / before
+            search += eased
         answer *= influence.scale
         return answer
+
+
+def _product(a: Array, b: Array) -> float:
+    """Inner product; a matrix product's last bits would depend on the threads."""
+    return float(np.einsum("i,i", a, b))
 
 
 def _blocks(shape: tuple[int, int], coarse: tuple[int, int], cells: Cells, threads: int) -> NDArray[np.intp]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from roughvisc.labels import annotate
 from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.fields.passes import of_parts
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.scene import Scene, Step
@@ -81,12 +82,8 @@ class Rows:
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
         arrays: dict[str, Array] = {}
         if window.whole:
-            gap = self._ground.gap + step.displacement
-            self._settle(gap, step.level)
-            gap[contact] = 0.0
-            mean_gap = float(np.nanmean(gap))
-            fields = {"pressure": shown.pressure, "gap": gap, "displacement": step.displacement}
-            arrays = {name: fields[name] for name in self._settings.fields if kept}
+            mean_gap = self._mean_open_gap(step, contact)
+            arrays = {name: self._field(name, step, contact) for name in self._settings.fields if kept}
         else:
             assert step.effective is not None, "a window asks for a memory of pressures"
             mean_gap = self._mean_gap(window, step.effective, step.level)
@@ -168,6 +165,29 @@ class Rows:
             self._fill("gap", index, window, gap)
             mean_gap = float(np.nanmean(gap))
         return {"contact_fraction": fraction, "mean_gap": mean_gap}
+
+    def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
+        """A field of a step on the whole domain, in memory that nobody changes."""
+        if name != "gap":
+            return step.shown.pressure if name == "pressure" else step.displacement
+        gap = self._ground.gap + step.displacement
+        self._settle(gap, step.level)
+        gap[contact] = 0.0
+        return gap
+
+    def _mean_open_gap(self, step: Step, contact: NDArray[np.bool_]) -> float:
+        """Mean gap of the present cells of the whole domain, where it is zero in the contact. [m]"""
+        fields = (self._ground.gap, step.displacement, contact, self._ground.present)
+        gap, displacement, closed, present = (field.reshape(-1) for field in fields)
+
+        def of_part(part: slice) -> float:
+            here = gap[part] + displacement[part]
+            here -= step.level
+            np.maximum(here, 0.0, out=here)
+            return float(here.sum(where=present[part] & ~closed[part]))
+
+        total = sum(of_parts(of_part, gap.size, step.scene.halfspace.threads))
+        return total / np.count_nonzero(present)
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
         """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
