@@ -26,7 +26,9 @@ _PART = 1 << 17
 
 def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Found]:
     """What some work gives of each part of a vector of some size, in their order."""
-    return side_by_side(work, list(blocks(size, _PART)) or [slice(0, 0)], threads)
+    if size <= _PART:
+        return [work(slice(0, size))]
+    return side_by_side(work, list(blocks(size, _PART)), threads)
 
 
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
@@ -162,12 +164,13 @@ def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: f
     """Set a field to values over their size at some cells, and to zero elsewhere."""
     field = _flat(out)
     edges = [*range(0, field.size, _PART), field.size]
-    ends = np.searchsorted(cells, edges)
+    ends = np.searchsorted(cells, edges) if len(edges) > 2 else (0, cells.size)
 
     def work(number: int) -> None:
-        field[edges[number] : edges[number + 1]] = 0
+        field[edges[number] : edges[number + 1]].fill(0)
         part = slice(ends[number], ends[number + 1])
-        field[cells[part]] = values[part] if size == 1 else values[part] / size
+        here = values[part] if size == 1 else values[part] / size
+        field[cells[part]] = here.astype(field.dtype, copy=False)
 
     side_by_side(work, range(len(edges) - 1), threads)
 
