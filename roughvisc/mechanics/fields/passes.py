@@ -127,10 +127,16 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
 
     def work(part: slice) -> Cells:
         found = np.flatnonzero(test(part))
-        found += part.start
+        if part.start:
+            found += part.start
         return found
 
-    return np.concatenate(of_parts(work, size, threads))
+    return joined(of_parts(work, size, threads))
+
+
+def joined(parts: list[Cells]) -> Cells:
+    """Cells of all parts; the first itself where it is alone."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def taken(field: NDArray[Any], cells: Cells, threads: int, factor: float | None = None) -> NDArray[Any]:

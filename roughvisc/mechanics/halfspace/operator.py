@@ -172,7 +172,7 @@ class HalfSpace:
         along, nx, (mx, my) = self._transforms, self.shape[0], points
         spectrum, rooms = self._working_memory(points, field.dtype)
         found = np.empty(self.shape, field.dtype) if out is None else out
-        rows = list(blocks(nx, min(along.rows, max(_ROW_POINTS // my, 1))))
+        rows = list(blocks(nx, min(along.rows_together(my, field.dtype), max(_ROW_POINTS // my, 1))))
 
         def forward(rows: slice) -> None:
             along.rows_into(spectrum[rows], field[rows], my)

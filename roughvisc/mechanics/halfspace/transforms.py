@@ -20,6 +20,11 @@ from roughvisc.mechanics.halfspace import ducc
 
 Array = NDArray[np.float64]
 
+# Rows that are transformed together; but eight long ones in single precision by ducc0, which takes as many into its
+# registers: where rows lie a power of two apart, more take twice as long (measured at 1024 to 8192 points; three times
+# as long, back from 8192). Of shorter rows, and in double precision, more are faster.
+_ROWS, _LONG = 128, 1024
+
 
 @dataclass(frozen=True)
 class Transforms:
@@ -37,8 +42,8 @@ class Transforms:
         Whether what they give is.
     fills : bool
         Whether those of rows take an array, as ``out``, to write what they give into.
-    rows : int
-        Rows that are transformed together.
+    long_rows : int
+        Long rows in single precision that are transformed together.
     """
 
     images: int
@@ -50,7 +55,11 @@ class Transforms:
     field_back: Callable[..., NDArray[Any]]
     is_complex: bool
     fills: bool = False
-    rows: int = 128
+    long_rows: int = _ROWS
+
+    def rows_together(self, points: int, kind: np.dtype[Any]) -> int:
+        """Rows of so many points that are transformed together."""
+        return self.long_rows if points >= _LONG and kind == np.float32 else _ROWS
 
     def rows_into(self, out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
         """Transform rows of so many points, zeros behind them, into an array."""
@@ -104,8 +113,6 @@ _SCIPY = (
     Transforms(1, fft.rfft, fft.fft, fft.irfft, fft.ifft, fft.rfft2, fft.irfft2, True),
     Transforms(2, fft.dct, fft.dct, fft.idct, fft.idct, fft.dctn, fft.idctn, False),
 )
-# Eight rows at once are what ducc0 takes into its registers: where rows lie a power of two apart, more take twice as
-# long in single precision (measured at 1024 to 8192 points; three times as long, back from 8192).
 _DUCC0 = (
     Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True, True, 8),
     Transforms(2, ducc.dct, ducc.dct, ducc.idct, ducc.idct, ducc.dctn, ducc.idctn, False),

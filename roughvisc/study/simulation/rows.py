@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roughvisc.labels import annotate
 from roughvisc.mechanics.contact.neighbours import staircase
-from roughvisc.mechanics.fields.passes import of_parts
+from roughvisc.mechanics.fields.threads import blocks, side_by_side
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.scene import Scene, Step
@@ -36,6 +36,8 @@ _SUMMED = 0.5
 _AT_MOST = 3.0
 #: Error of a pressure at the edge of contact, over the mean one.
 _SOLVER_AT_EDGE = 3.0
+#: Cells of the rows whose gap is summed at once: they stay in the cache.
+_TOGETHER = 1 << 17
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -82,7 +84,7 @@ class Rows:
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
         arrays: dict[str, Array] = {}
         if window.whole:
-            mean_gap = self._mean_open_gap(step, contact)
+            mean_gap = self._mean_of_gap(step, contact)
             arrays = {name: self._field(name, step, contact) for name in self._settings.fields if kept}
         else:
             assert step.effective is not None, "a window asks for a memory of pressures"
@@ -168,26 +170,25 @@ class Rows:
 
     def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
         """A field of a step on the whole domain, in memory that nobody changes."""
-        if name != "gap":
-            return step.shown.pressure if name == "pressure" else step.displacement
-        gap = self._ground.gap + step.displacement
-        self._settle(gap, step.level)
-        gap[contact] = 0.0
+        fields = {"pressure": step.shown.pressure, "displacement": step.displacement}
+        return self._gap(step, contact) if name == "gap" else fields[name]
+
+    def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice = slice(None)) -> Array:
+        """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
+        gap = self._ground.gap[rows] + step.displacement[rows]
+        self._settle(gap, step.level, rows)
+        gap[contact[rows]] = 0.0
         return gap
 
-    def _mean_open_gap(self, step: Step, contact: NDArray[np.bool_]) -> float:
-        """Mean gap of the present cells of the whole domain, where it is zero in the contact. [m]"""
-        fields = (self._ground.gap, step.displacement, contact, self._ground.present)
-        gap, displacement, closed, present = (field.reshape(-1) for field in fields)
+    def _mean_of_gap(self, step: Step, contact: NDArray[np.bool_]) -> float:
+        """Its mean over the present cells, from some rows at a time. [m]"""
+        present = self._ground.present
 
-        def of_part(part: slice) -> float:
-            here = gap[part] + displacement[part]
-            here -= step.level
-            np.maximum(here, 0.0, out=here)
-            return float(here.sum(where=present[part] & ~closed[part]))
+        def total(rows: slice) -> float:
+            return float(np.sum(self._gap(step, contact, rows), where=present[rows]))
 
-        total = sum(of_parts(of_part, gap.size, step.scene.halfspace.threads))
-        return total / np.count_nonzero(present)
+        rows = list(blocks(contact.shape[0], max(_TOGETHER // contact.shape[1], 1)))
+        return sum(side_by_side(total, rows, step.scene.halfspace.threads)) / np.count_nonzero(present)
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
         """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
