@@ -66,13 +66,15 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     lowest = problem.lowest_of(separation)
 
     def judged(part: slice) -> tuple[float, ...]:
-        carried, own, here = (field.take(contact[part]) for field in fields)
-        excess = 0.0 if problem.load is not None else (carried * (here - problem.target)).sum()
-        sums = (carried * own).sum(), carried.sum(), here.sum(), (carried * (here - lowest)).sum(), excess
-        return *sums, here.max(initial=1.0), here.min(initial=-1.0), own.max(initial=0.0)
+        cells = contact[part]
+        carried, own, here = (field.take(cells) for field in fields)
+        excess = 0.0 if problem.load is not None else float((carried * (here - problem.target)).sum())
+        extremes = float(here.max(initial=1.0)), -float(here.min(initial=-1.0))
+        sums = (carried * own).sum(), carried.sum(), here.sum(), (carried * (here - lowest)).sum()
+        return *extremes, excess, *map(float, sums)
 
-    of_parts = np.array(passes.of_parts(judged, contact.size, problem.influence.threads))
-    energy, load, height, own_duality_gap, excess = map(float, of_parts[:, :5].sum(axis=0))
+    highest, deepest, *sums = zip(*passes.of_parts(judged, contact.size, problem.influence.threads), strict=True)
+    excess, energy, load, height, own_duality_gap = map(sum, sums)
     if problem.load is not None:
         level = height / contact.size
         duality_gap = own_duality_gap
@@ -80,11 +82,12 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         level = problem.target
         duality_gap = _under_approach(problem, displacement, load, excess, own_duality_gap, lowest)
     # with rounding of the sums above; a pressure of nothing has no error to speak of
-    largest = max(float(of_parts[:, 5].max()), -float(of_parts[:, 6].min()))
+    largest = max(*highest, *deepest)
     converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0
     hopeless = contact.size == separation.size and problem.remaining < -ROUNDED  # no load is enough
     if converged and not problem.sees_load:
-        rounding = _ROUNDING * max(largest, float(of_parts[:, 7].max()))
+        own = problem.influence.at(displacement, contact)
+        rounding = _ROUNDING * max(largest, float(own.max()))
         here = problem.influence.at(separation, contact)
         converged, hopeless = load_certainty(problem, contact, separation, here, load, rounding)
     return Certificate(duality_gap, energy, level, converged, hopeless)

@@ -187,7 +187,7 @@ def minimum_along(trial: Trial, curvature: float) -> float:
 
 def admissible_fraction(trial: Trial, minimum: float) -> tuple[float, bool]:
     """Fraction of a trial to take, and whether the border of the feasible set cut it."""
-    if np.any((trial.held > 0) & (trial.pressure == 0)):
+    if ((trial.held > 0) & (trial.pressure == 0)).any():
         # whole if f falls by it, so that these cells leave the contact
         return (1.0, minimum > 1) if minimum > _HALF_WAY else (minimum, False)
     if minimum <= 1:

@@ -27,6 +27,8 @@ class Influence:
 
     Attributes
     ----------
+    threads : int
+        How many work on one field.
     convolutions : int
         Displacements and applications of the preconditioner so far.
     work : ndarray, shape (nx, ny)
@@ -35,14 +37,10 @@ class Influence:
 
     def __init__(self, halfspace: HalfSpace, scale: float) -> None:
         self.halfspace = halfspace
+        self.threads = halfspace.threads
         self.scale = scale
         self.convolutions = 0
         self.work = np.empty(halfspace.shape)
-
-    @property
-    def threads(self) -> int:
-        """How many work on one field."""
-        return self.halfspace.threads
 
     def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
         """Values of a field at some cells, as flat indices."""

@@ -134,7 +134,9 @@ class Problem:
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load."""
-        return vector if self.load is None else vector - float(np.mean(vector))
+        if self.load is not None:
+            vector = vector - passes.total(vector, self.influence.threads) / vector.size
+        return vector
 
     def preconditioned(self, residual: Array, free_set: Cells) -> Array:
         """About the change of pressure that a residual asks for, but for the scale; keeps a given load."""

@@ -57,7 +57,9 @@ def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> 
     found, added = _flat(out), field.reshape(-1)
 
     def work(part: slice) -> None:
-        found[part] += np.multiply(added[part], factor, dtype=np.float64)
+        here = added[part].astype(np.float64)
+        here *= factor
+        found[part] += here
 
     of_parts(work, out.size, threads)
 
@@ -134,8 +136,8 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
     return joined(of_parts(work, size, threads))
 
 
-def joined(parts: list[Cells]) -> Cells:
-    """Cells of all parts; the first itself where it is alone."""
+def joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """What was found of all parts; of a part that is alone, itself."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
@@ -146,11 +148,9 @@ def taken(field: NDArray[Any], cells: Cells, threads: int, factor: float | None 
     found, values = np.empty(cells.size, field.dtype if factor is None else np.float64), field.reshape(-1)
 
     def work(part: slice) -> None:
-        here = values.take(cells[part])
-        if factor is None:
-            found[part] = here
-        else:
-            np.multiply(here, factor, out=found[part], dtype=np.float64)
+        found[part] = values.take(cells[part])
+        if factor is not None:
+            found[part] *= factor
 
     of_parts(work, cells.size, threads)
     return found
@@ -169,16 +169,18 @@ def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
 def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: float = 1.0) -> None:
     """Set a field to values over their size at some cells, and to zero elsewhere."""
     field = _flat(out)
-    edges = [*range(0, field.size, _PART), field.size]
-    ends = np.searchsorted(cells, edges) if len(edges) > 2 else (0, cells.size)
 
-    def work(number: int) -> None:
-        field[edges[number] : edges[number + 1]].fill(0)
-        part = slice(ends[number], ends[number + 1])
-        here = values[part] if size == 1 else values[part] / size
-        field[cells[part]] = here.astype(field.dtype, copy=False)
+    def work(part: slice) -> None:
+        field[part].fill(0)
+        here, there = values, cells
+        if part.stop - part.start < field.size:
+            of_part = slice(*cells.searchsorted((part.start, part.stop)))
+            here, there = values[of_part], cells[of_part]
+        if size != 1:
+            here = here / size
+        field[there] = here.astype(field.dtype, copy=False)
 
-    side_by_side(work, range(len(edges) - 1), threads)
+    of_parts(work, field.size, threads)
 
 
 def total(vector: Array, threads: int) -> float:
@@ -194,11 +196,7 @@ def magnitude(vector: Array, threads: int) -> float:
 def largest(vector: Array, threads: int) -> float:
     """Largest magnitude in a vector; zero of none."""
 
-    def work(part: slice) -> float:
-        here = vector[part]
-        return max(float(here.max(initial=0.0)), -float(here.min(initial=0.0)))
-
-    return max(of_parts(work, vector.size, threads))
+    return max(of_parts(lambda part: float(np.abs(vector[part]).max(initial=0.0)), vector.size, threads))
 
 
 def _flat(out: NDArray[Any]) -> NDArray[Any]:
