@@ -6,6 +6,8 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from queue import SimpleQueue
 from typing import Any, Literal
@@ -23,9 +25,11 @@ from roughvisc.mechanics.halfspace.transforms import transforms
 Array = NDArray[np.float64]
 Boundary = Literal["free", "periodic"]
 
-# Points of the columns transformed together, but at least so many columns; and at most so many points of rows: they
-# stay in the cache (measured at 64 to 4096 squared).
-_POINTS, _COLUMNS, _ROW_POINTS = 1 << 13, 32, 1 << 18
+# Bytes of the columns transformed together, but at least so many columns; and at most so many rows and points of them:
+# they stay in the cache (measured at 64 to 8192 squared).
+_COLUMN_BYTES, _COLUMNS, _ROWS, _ROW_POINTS = 1 << 20, 32, 128, 1 << 18
+# Bytes that the processor fetches at once.
+_LINE = 64
 # Cells from which periodic transforms go by blocks too: at 1024 squared and above they take 0.7 to 0.9 of SciPy's time
 # for whole fields, and as long as ducc0's; below they are slower.
 _BLOCKED = 1024**2
@@ -172,48 +176,57 @@ class HalfSpace:
         along, nx, (mx, my) = self._transforms, self.shape[0], points
         spectrum, rooms = self._working_memory(points, field.dtype)
         found = np.empty(self.shape, field.dtype) if out is None else out
-        rows = list(blocks(nx, min(along.rows_together(my, field.dtype), max(_ROW_POINTS // my, 1))))
+        number, own = spectrum.dtype, mx == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:
-            along.rows_into(spectrum[rows], field[rows], my)
+            with _lent(rooms) as room:
+                along.rows_into(spectrum[rows], field[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
 
         def across(block: slice) -> None:
-            room = rooms.get()
-            columns = room[:, : block.stop - block.start]
-            columns[:nx] = spectrum[:, block]
-            columns[nx:] = 0
-            columns = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
-            along.multiply(columns, symbol[:, block])
-            columns = along.columns_back(columns, axis=0, overwrite_x=True, workers=1)
-            spectrum[:, block] = columns[:nx]
-            rooms.put(room)
+            with _lent(rooms) as room:
+                columns = there = spectrum[:, block]
+                if not own:
+                    columns = _as(room, number, (mx, block.stop - block.start))
+                    columns[:nx] = there
+                    columns[nx:] = 0
+                changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
+                along.multiply(changed, symbol[:, block])
+                changed = along.columns_back(changed, axis=0, overwrite_x=True, workers=1)
+                if changed is not there:
+                    there[...] = changed[:nx]
 
         def back(rows: slice) -> None:
-            along.rows_back_into(found[rows], spectrum[rows], my)
+            with _lent(rooms) as room:
+                along.rows_back_into(found[rows], spectrum[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
 
+        rows = list(blocks(nx, _rows_together(my)))
         side_by_side(forward, rows, self.threads)
-        side_by_side(across, list(blocks(spectrum.shape[1], _together(mx, spectrum.shape[1]))), self.threads)
+        side_by_side(across, list(blocks(spectrum.shape[1], _columns_together(mx, number))), self.threads)
         side_by_side(back, rows, self.threads)
         return found
 
     def _working_memory(
         self, points: tuple[int, int], kind: np.dtype[Any]
-    ) -> tuple[NDArray[Any], SimpleQueue[NDArray[Any]]]:
-        """For transforms along y, and some columns of their transforms for each thread."""
-        mx, count = points[0], self._transforms.width(points[1])
+    ) -> tuple[NDArray[Any], SimpleQueue[NDArray[np.uint8]]]:
+        """For transforms along y, and for some rows or columns of each thread."""
         number = np.result_type(kind, np.complex64) if self._transforms.is_complex else kind
-        rooms: SimpleQueue[NDArray[Any]] = SimpleQueue()
-        for room in self._memory[1][: self.threads]:
-            rooms.put(_as(room, number, (mx, _together(mx, count))))
-        return _as(self._memory[0], number, (self.shape[0], count)), rooms
+        spectrum, own = self._memory
+        rooms: SimpleQueue[NDArray[np.uint8]] = SimpleQueue()
+        for room in own[: self.threads]:
+            rooms.put(room)
+        return _as(spectrum, number, (self.shape[0], self._transforms.width(points[1]))), rooms
 
     @cached_property
-    def _memory(self) -> tuple[NDArray[Any], list[NDArray[Any]]]:
+    def _memory(self) -> tuple[NDArray[np.uint8], list[NDArray[np.uint8]]]:
         """Bytes to work in: taken anew each time, half of it is page faults."""
-        (mx, my), size = self._points, 16 if self._transforms.is_complex else 8
+        (mx, my), number = self._points, np.dtype(complex if self._transforms.is_complex else float)
         count = self._transforms.width(my)
-        rooms = [np.empty(size * mx * _together(mx, count), np.uint8) for _ in range(self.threads)]
-        return np.empty(size * self.shape[0] * count, np.uint8), rooms
+        room = max(
+            _bytes(number, (mx, min(_columns_together(mx, np.dtype(np.complex64)), count))),
+            _bytes(np.dtype(float), (min(_rows_together(my), self.shape[0]), my)),
+        )
+        spectrum = np.empty(_bytes(number, (self.shape[0], count)), np.uint8)
+        return spectrum, [np.empty(room, np.uint8) for _ in range(self.threads)]
 
     def approximate_inverse(
         self, displacement: NDArray[np.float32], out: NDArray[np.float32] | None = None
@@ -254,11 +267,40 @@ class HalfSpace:
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
 
 
-def _together(points: int, count: int) -> int:
-    """Columns of so many points that are transformed together, of a count of them."""
-    return min(max(_POINTS // points, _COLUMNS), count)
+def _rows_together(points: int) -> int:
+    """Rows of so many points that are transformed together."""
+    return min(_ROWS, max(_ROW_POINTS // points, 1))
+
+
+def _columns_together(points: int, number: np.dtype[Any]) -> int:
+    """Columns of so many numbers that are transformed together."""
+    return max(_COLUMN_BYTES // (points * number.itemsize), _COLUMNS)
+
+
+@contextmanager
+def _lent(rooms: SimpleQueue[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
+    """One of the rooms, till it is put back."""
+    room = rooms.get()
+    try:
+        yield room
+    finally:
+        rooms.put(room)
 
 
 def _as(memory: NDArray[np.uint8], number: np.dtype[Any], shape: tuple[int, int]) -> NDArray[Any]:
-    """The first bytes of some memory as an array."""
-    return memory[: shape[0] * shape[1] * number.itemsize].view(number).reshape(shape)
+    """The first bytes of some memory as an array, whose rows do not lie a power of two apart.
+
+    Of rows that do, the processor keeps few in its cache: transforms of them take up to three times as long.
+    """
+    row = _row_bytes(number, shape[1])
+    return memory[: shape[0] * row].view(number).reshape(shape[0], -1)[:, : shape[1]]
+
+
+def _bytes(number: np.dtype[Any], shape: tuple[int, int]) -> int:
+    """Bytes of such an array."""
+    return shape[0] * _row_bytes(number, shape[1])
+
+
+def _row_bytes(number: np.dtype[Any], count: int) -> int:
+    """An odd number of lines for each row."""
+    return (-(-count * number.itemsize // _LINE) | 1) * _LINE

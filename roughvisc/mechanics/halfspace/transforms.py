@@ -20,11 +20,6 @@ from roughvisc.mechanics.halfspace import ducc
 
 Array = NDArray[np.float64]
 
-# Rows that are transformed together; but eight long ones in single precision by ducc0, which takes as many into its
-# registers: where rows lie a power of two apart, more take twice as long (measured at 1024 to 8192 points; three times
-# as long, back from 8192). Of shorter rows, and in double precision, more are faster.
-_ROWS, _LONG = 128, 1024
-
 
 @dataclass(frozen=True)
 class Transforms:
@@ -42,8 +37,6 @@ class Transforms:
         Whether what they give is.
     fills : bool
         Whether those of rows take an array, as ``out``, to write what they give into.
-    long_rows : int
-        Long rows in single precision that are transformed together.
     """
 
     images: int
@@ -55,25 +48,21 @@ class Transforms:
     field_back: Callable[..., NDArray[Any]]
     is_complex: bool
     fills: bool = False
-    long_rows: int = _ROWS
 
-    def rows_together(self, points: int, kind: np.dtype[Any]) -> int:
-        """Rows of so many points that are transformed together."""
-        return self.long_rows if points >= _LONG and kind == np.float32 else _ROWS
+    def rows_into(self, out: NDArray[Any], rows: NDArray[Any], room: NDArray[Any]) -> None:
+        """Transform rows, zeros behind them, into an array; the room takes as many rows of all points."""
+        if not self.fills:
+            out[...] = self.of_rows(rows, n=room.shape[1], axis=1, workers=1)
+            return
+        given = rows.shape[1]
+        room[:, :given] = rows
+        room[:, given:] = 0
+        self.of_rows(room, n=room.shape[1], axis=1, workers=1, out=out)
 
-    def rows_into(self, out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
-        """Transform rows of so many points, zeros behind them, into an array."""
-        self._into(self.of_rows, out, rows, points)
-
-    def rows_back_into(self, out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
+    def rows_back_into(self, out: NDArray[Any], rows: NDArray[Any], room: NDArray[Any]) -> None:
         """Transform them back into an array, as many points of them as it takes."""
-        self._into(self.rows_back, out, rows, points)
-
-    def _into(self, transform: Callable[..., NDArray[Any]], out: NDArray[Any], rows: NDArray[Any], points: int) -> None:
-        if self.fills and (transform is self.of_rows or out.shape[1] == points):
-            transform(rows, n=points, axis=1, workers=1, out=out)
-        else:
-            out[...] = transform(rows, n=points, axis=1, workers=1)[:, : out.shape[1]]
+        filled = {"out": room} if self.fills else {}
+        out[...] = self.rows_back(rows, n=room.shape[1], axis=1, workers=1, **filled)[:, : out.shape[1]]
 
     def width(self, points: int) -> int:
         """Numbers that so many points of a row have as their transform."""
@@ -114,6 +103,6 @@ _SCIPY = (
     Transforms(2, fft.dct, fft.dct, fft.idct, fft.idct, fft.dctn, fft.idctn, False),
 )
 _DUCC0 = (
-    Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True, True, 8),
+    Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True, True),
     Transforms(2, ducc.dct, ducc.dct, ducc.idct, ducc.idct, ducc.dctn, ducc.idctn, False),
 )

@@ -105,7 +105,7 @@ def test_side_by_side__within_itself_ends():
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
     monkeypatch.setattr(threads_module, "_THREADED", 1)
-    for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
+    for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
         monkeypatch.setattr(operator, name, value)
     monkeypatch.setattr(long_waves, "_FROM", 1)
     monkeypatch.setattr(long_waves, "_SPOTS", 0.0)

@@ -62,7 +62,7 @@ def test_approximate_inverse__inverts_what_is_far_from_the_border(boundary):
 def in_small_blocks(monkeypatch):
     """Blocks and threads as on a large grid."""
     monkeypatch.setattr(threads_module, "_THREADED", 1)
-    for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
+    for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
         monkeypatch.setattr(operator, name, value)
 
 
@@ -95,7 +95,7 @@ def test_fields__are_the_same_by_blocks(monkeypatch, boundary, mirrored):
     pressure = np.random.default_rng(4).random((33, 46))
     made = {"boundary": boundary, "mirrored": mirrored}
     whole = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
-    for name, value in {"_BLOCKED": 1, "_POINTS": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
+    for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
         monkeypatch.setattr(operator, name, value)
     blocked = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
     for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6), strict=True):
