@@ -74,7 +74,7 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         return *extremes, excess, *map(float, sums)
 
     highest, deepest, *sums = zip(*passes.of_parts(judged, contact.size, problem.influence.threads), strict=True)
-    excess, energy, load, height, own_duality_gap = map(sum, sums)
+    excess, energy, load, height, own_duality_gap = (float(sum(each)) for each in sums)
     if problem.load is not None:
         level = height / contact.size
         duality_gap = own_duality_gap

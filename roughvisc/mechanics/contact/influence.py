@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ class Influence:
         self.threads = halfspace.threads
         self.scale = scale
         self.convolutions = 0
-        self.work = np.empty(halfspace.shape)
+        self.work = empty(halfspace.shape)
 
     def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
         """Values of a field at some cells, as flat indices."""

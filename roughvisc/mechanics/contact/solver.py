@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.contact.iteration import solved
 from roughvisc.mechanics.contact.problem import Array, Problem
 from roughvisc.mechanics.contact.state import ContactState
+from roughvisc.mechanics.fields.reuse import empty, reused
+from roughvisc.mechanics.fields.threads import blocks, side_by_side
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 # A cold start on so many cells a side is guessed on every so-many-eth cell, and taken from there if no more than this
@@ -81,10 +83,11 @@ def solve_contact(
         start_displacement = (
             None if start_displacement is None else np.array(start_displacement, dtype=float, order="C")
         )
-    if load is not None and present is None and (start is None or not np.any(start > 0)):
-        start, start_displacement = coarse_guess(halfspace, gap, load), None
-    problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
-    return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)
+    with reused():
+        if load is not None and present is None and (start is None or not np.any(start > 0)):
+            start, start_displacement = coarse_guess(halfspace, gap, load), None
+        problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
+        return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)
 
 
 def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
@@ -97,5 +100,11 @@ def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
     found = solve_contact(coarse, few, load=load / _STRIDE**2, tolerance=_COARSE_TOLERANCE, overwrite=True).pressure
     if np.count_nonzero(found) > _SPARSE * found.size:
         return None
-    cells = [np.minimum(np.arange(n) // _STRIDE, m - 1) for n, m in zip(gap.shape, few.shape, strict=True)]
-    return found[np.ix_(*cells)]
+    rows, columns = (np.minimum(np.arange(n) // _STRIDE, m - 1) for n, m in zip(gap.shape, few.shape, strict=True))
+    wide, guess = found.take(columns, axis=1), empty(gap.shape)
+
+    def spread(part: slice) -> None:
+        guess[part] = wide.take(rows[part], axis=0)
+
+    side_by_side(spread, list(blocks(gap.shape[0], _STRIDE)), halfspace.threads)
+    return guess

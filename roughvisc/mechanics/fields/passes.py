@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import blocks, side_by_side
 
 Array = NDArray[np.float64]
@@ -31,6 +32,11 @@ def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Fo
     return side_by_side(work, list(blocks(size, _PART)), threads)
 
 
+def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int) -> list[Found]:
+    """The same of parts of a field that are whole rows."""
+    return side_by_side(work, list(blocks(shape[0], max(_PART // shape[1], 1))), threads)
+
+
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
     """Sum of fields times their factors, in their order; ``out`` may be the first of them."""
     flat, found = [(factor, field.reshape(-1)) for factor, field in terms], _flat(out)
@@ -43,6 +49,11 @@ def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> 
 
     of_parts(work, out.size, threads)
     return out
+
+
+def times(field: Array, factor: float, threads: int) -> Array:
+    """``factor * field``, in memory of its own."""
+    return weighted([(factor, field)], empty(field.shape), threads)
 
 
 def add(a: Array, b: Array, out: Array, threads: int) -> Array:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import blocks, side_by_side, threads_of
 from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
@@ -175,7 +176,7 @@ class HalfSpace:
         """
         along, nx, (mx, my) = self._transforms, self.shape[0], points
         spectrum, rooms = self._working_memory(points, field.dtype)
-        found = np.empty(self.shape, field.dtype) if out is None else out
+        found = empty(self.shape, field.dtype) if out is None else out
         number, own = spectrum.dtype, mx == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:

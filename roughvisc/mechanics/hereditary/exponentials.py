@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields.passes import weighted
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 
@@ -130,14 +131,14 @@ class Modes:
         terms = [(float(np.sum(weights * before)), state.field), *zip(weights * own, state.modes, strict=True)]
         if state.earlier is not None and np.any(earlier):
             terms += zip(weights * earlier, state.earlier, strict=True)
-        return alpha, weighted(terms, np.empty_like(state.field), threads_of(state.field.size))
+        return alpha, weighted(terms, empty(state.field.shape), threads_of(state.field.size))
 
     def advance(self, state: ModesState, step: float, rule: Rule, field: Array) -> ModesState:
         """State after a step at whose end the field was ``field``."""
         if step == 0:
             return ModesState(state.modes, field, None, 0.0)
         own, earlier, before, after = self.coefficients(state, step, rule)
-        modes = np.empty_like(state.modes)
+        modes = empty(state.modes.shape)
         for i, mode in enumerate(modes):
             terms = [(own[i], state.modes[i])]
             if earlier[i] and state.earlier is not None:

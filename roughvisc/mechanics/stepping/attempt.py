@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
@@ -59,7 +60,7 @@ def attempt(
     # what costs no convolution is not held while the contact is solved, and had again
     again = effective is None
     threads = scene.halfspace.threads
-    gap = passes.add(scene.gap, carried, carried if again else np.empty_like(carried), threads)
+    gap = passes.add(scene.gap, carried, carried if again else empty(carried.shape), threads)
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:

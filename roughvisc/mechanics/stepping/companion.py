@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, segment_number, with_cost
@@ -68,18 +69,19 @@ def beside(
         [Pa], and at unit compliance [Pa m], in memory of their own.
     """
     assert now.unit_displacement is not None
+    threads = threads_of(now.pressure.size)
     if companion is None or together is None:
-        return now.pressure * scale, now.unit_displacement * scale
+        return passes.times(now.pressure, scale, threads), passes.times(now.unit_displacement, scale, threads)
     pressure = _moved(now.pressure, companion.pressure, together.pressure, scale, cut=True)
     if companion.unit_displacement is None or together.unit_displacement is None:
-        return pressure, now.unit_displacement * scale
+        return pressure, passes.times(now.unit_displacement, scale, threads)
     fields = now.unit_displacement, companion.unit_displacement, together.unit_displacement
     return pressure, _moved(*fields, scale, cut=False)
 
 
 def _moved(now: Array, companion: Array, together: Array, scale: float, *, cut: bool) -> Array:
     """``(now + companion - together) * scale``, cut at zero if that is said."""
-    found = np.empty_like(now)
+    found = empty(now.shape)
     first, second, third, out = (field.reshape(-1) for field in (now, companion, together, found))
 
     def work(part: slice) -> None:
@@ -179,15 +181,22 @@ def _energies(state: State) -> tuple[float, float]:
 
 def _undecided(scene: Scene, step: Step, coarse: Instant, displacement: Array) -> tuple[int, int]:
     """Cells in contact that may be out of it, and cells out of contact that may be in it."""
-    fine = step.shown.pressure
-    contact = fine > 0
-    inside = contact & (fine <= np.abs(fine - coarse.pressure))
-    gap = scene.gap + step.displacement - step.level
-    moved = step.displacement - step.level - (displacement - coarse.approach)
-    outside = ~contact & ((coarse.pressure > 0) | (gap <= np.abs(moved)))
-    if scene.present is not None:
-        outside &= scene.present
-    return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
+    fields = step.shown.pressure, coarse.pressure, scene.gap, step.displacement, displacement
+    flat = [field.reshape(-1) for field in fields]
+    present = None if scene.present is None else scene.present.reshape(-1)
+
+    def work(part: slice) -> tuple[int, int]:
+        fine, other, gap, own, others = (field[part] for field in flat)
+        contact = fine > 0
+        inside = contact & (fine <= np.abs(fine - other))
+        sunk = own - step.level
+        outside = ~contact & ((other > 0) | (gap + sunk <= np.abs(sunk - (others - coarse.approach))))
+        if present is not None:
+            outside &= present[part]
+        return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
+
+    found = passes.of_parts(work, scene.gap.size, scene.halfspace.threads)
+    return sum(inside for inside, _ in found), sum(outside for _, outside in found)
 
 
 def caught_up(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
@@ -245,7 +246,10 @@ class State:
         """
         now, before = self.now, self.before
         if before is None or length == 0:
-            return now.pressure * scale, None if now.unit_displacement is None else now.unit_displacement * scale
+            threads = threads_of(now.pressure.size)
+            known = now.unit_displacement
+            pressure = passes.times(now.pressure, scale, threads)
+            return pressure, None if known is None else passes.times(known, scale, threads)
         ratio = self._ratio(length)
         pressure, was_cut = _beyond(before.pressure, now.pressure, ratio, scale)
         if was_cut or now.unit_displacement is None or before.unit_displacement is None:
@@ -260,7 +264,7 @@ class State:
 
 def _beyond(before: Array, now: Array, ratio: float, scale: float, *, cut: bool = True) -> tuple[Array, bool]:
     """``scale * (now + ratio * (now - before))``, cut at zero if that is said, and whether anything was cut."""
-    found = np.empty_like(now)
+    found = empty(now.shape)
     first, last, there = before.reshape(-1), now.reshape(-1), found.reshape(-1)
 
     def work(part: slice) -> bool:

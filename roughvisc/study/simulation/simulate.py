@@ -13,6 +13,7 @@ from scipy import fft
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.labels import annotate
+from roughvisc.mechanics.fields.reuse import reused
 from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.mechanics.halfspace.sheet import Base
@@ -212,7 +213,7 @@ def _press(
     rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
     from roughvisc.study.progress import reporting  # slow to import
 
-    with reporting(progress, "pressing") as report:
+    with reused(), reporting(progress, "pressing") as report:
         _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")

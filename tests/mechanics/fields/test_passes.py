@@ -119,3 +119,20 @@ def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
         assert np.array_equal(one.pressure, other.pressure)
         assert np.array_equal(one.displacement, other.displacement)
         assert one.approach == other.approach
+
+
+def test_rows__are_whole_and_come_in_their_order(monkeypatch):
+    monkeypatch.setattr(passes, "_PART", 20)
+    field = np.arange(7 * 9.0).reshape(7, 9)
+    found = passes.of_rows(lambda rows: (rows, float(field[rows].sum())), field.shape, 2)
+    assert [rows for rows, _ in found] == [slice(0, 2), slice(2, 4), slice(4, 6), slice(6, 7)]
+    assert [value for _, value in found] == [
+        field[r].sum() for r in (slice(0, 2), slice(2, 4), slice(4, 6), slice(6, 7))
+    ]
+
+
+def test_times__leaves_the_field_as_it_was():
+    field = np.arange(6.0).reshape(2, 3)
+    found = passes.times(field, 2.0, 1)
+    assert found.tolist() == [[0, 2, 4], [6, 8, 10]]
+    assert field.tolist() == [[0, 1, 2], [3, 4, 5]]

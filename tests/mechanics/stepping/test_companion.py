@@ -13,7 +13,8 @@ from roughvisc.mechanics.stepping import attempt, companion
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
-from roughvisc.study.simulation.rows import keeps_its_word, stated
+from roughvisc.study.simulation.rows import keeps_its_word
+from roughvisc.study.simulation.stated import stated
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {

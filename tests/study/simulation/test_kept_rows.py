@@ -11,8 +11,9 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
-from roughvisc.study.simulation.rows import Rows, keeps_its_word, stated
+from roughvisc.study.simulation.rows import Rows, keeps_its_word
 from roughvisc.study.simulation.scene import Ground, prepare
+from roughvisc.study.simulation.stated import stated
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowsInMemory
 from roughvisc.variables import FIELDS, STATUS_MEANINGS

@@ -8,7 +8,8 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.study.simulation.rows import keeps_its_word, stated
+from roughvisc.study.simulation.rows import keeps_its_word
+from roughvisc.study.simulation.stated import stated
 
 BALL = rv.sphere(1.0, 1.6, 17)
 MATERIALS = {

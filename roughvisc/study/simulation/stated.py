@@ -1,0 +1,106 @@
+"""What is stated of a row: how far off its pressure, force, approach, area and energies may be."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.stepping.scene import Step
+
+#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
+#: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
+_INHERITED, _INHERITED_APPROACH = 0.02, 0.005
+#: The least that is stated of a pressure without a past, in units of the tolerance: measured there too.
+_LEAST = 0.015
+#: Part of the contact solver's error that is left in an energy, a sum over steps in which it has either sign: measured
+#: there too.
+_SUMMED = 0.5
+#: Error of a pressure at the edge of contact, over the mean one.
+_SOLVER_AT_EDGE = 3.0
+
+
+def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
+    """Area in contact and area out of it that the contact solver's error may put on the other side. [m2]
+
+    Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
+    """
+    shown, scene = step.shown, step.scene
+    if not contact.any() or not step.residual > 0:
+        return 0.0, 0.0
+    since = step.state.began if step.state.before is None else step.state.before.time
+    threads, area = scene.halfspace.threads, scene.halfspace.cell_area
+    mean = passes.total(shown.pressure.reshape(-1), threads) / np.count_nonzero(contact)
+    pressure = _SOLVER_AT_EDGE * step.residual * mean
+    closed = pressure * scene.halfspace.self_influence * scene.compliance(step.state.now.time - since)
+
+    def counted(rows: slice) -> tuple[int, int]:
+        here = contact[rows]
+        inside = here & (shown.pressure[rows] <= pressure)
+        outside = ~here & (scene.gap[rows] + step.displacement[rows] - step.level <= closed)
+        if scene.present is not None:
+            outside &= scene.present[rows]
+        return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
+
+    found = passes.of_rows(counted, contact.shape, threads)
+    return area * sum(inside for inside, _ in found), area * sum(outside for _, outside in found)
+
+
+def stated(
+    step: Step, series_error: float, area: float, in_doubt: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, float]:
+    """Work and energies of a step, and what is stated of its accuracy.
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    series_error : float
+        Relative error of the series that stands for the material.
+    area : float
+        Counted contact area. [m2]
+    in_doubt : pair of float
+        Area in contact and out of it that the contact solver leaves in doubt. [m2]
+
+    Notes
+    -----
+    The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
+    under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
+    the approach. The series' error is one of the largest values so far: what is left after unloading is a
+    difference of such values.
+    """
+    state, unknown, shown = step.state, step.uncertainty, step.shown
+    largest_force, largest_approach = state.largest_force, state.largest_approach
+    remembers, unit = step.scene.remembers, step.scene.tolerance if largest_force > 0 else 0.0
+    solved = step.residual + _INHERITED * unit if remembers else max(step.residual, _LEAST * unit)
+    force = approach = 0.0
+    if step.control == "approach" or not step.given:
+        force = unknown.force + solved * shown.force + series_error * largest_force
+    if step.control == "load" or not step.given:
+        approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
+        approach += _INHERITED_APPROACH * unit * largest_approach if remembers else 0.0
+    pressure = solved
+    if largest_force > 0:
+        pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
+    relative = max(
+        pressure,
+        force / largest_force if largest_force > 0 else 0.0,
+        approach / largest_approach if largest_approach > 0 else 0.0,
+    )
+    carried = _SUMMED * solved + series_error
+    return {
+        "work": step.work,
+        "stored_energy": step.stored,
+        "dissipated_energy": step.dissipated,
+        "stated_error": relative,
+        "time_error": step.time_error,
+        "residual": step.residual,
+        "residual_bound": step.bound,
+        "pressure_error": pressure,
+        "force_error": force,
+        "approach_error": approach,
+        "work_error": unknown.work + carried * abs(step.work),
+        "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
+        "contact_area_lower": max(area - unknown.inside - in_doubt[0], 0.0),
+        "contact_area_upper": area + unknown.outside + in_doubt[1],
+    }
