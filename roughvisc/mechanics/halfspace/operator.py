@@ -139,7 +139,7 @@ class HalfSpace:
         ndarray, shape (nx, ny)
             Displacement; with periodic boundaries the mean of a half-space's is zero. [m]
         """
-        return self._convolved(pressure, self._symbol)
+        return self._convolved(pressure, self._symbol_by_columns)
 
     def displacement_single(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
@@ -157,17 +157,38 @@ class HalfSpace:
         return self._convolved(pressure, self._single_symbol)
 
     @cached_property
-    def _single_symbol(self) -> NDArray[np.float32]:
-        return (self._symbol / self.largest_influence).astype(np.float32)
+    def _symbol_by_columns(self) -> list[NDArray[Any]]:
+        return self._by_columns(self._symbol, self._points)
 
-    def _convolved(self, pressure: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+    @cached_property
+    def _single_symbol(self) -> list[NDArray[Any]]:
+        return self._by_columns((self._symbol / self.largest_influence).astype(np.float32), self._points)
+
+    def _by_columns(self, symbol: NDArray[Any], points: tuple[int, int]) -> list[NDArray[Any]]:
+        """A symbol by the columns that are transformed together; whole where whole fields are.
+
+        In single precision, in which most is computed, those of a block lie together: to fetch them from rows that are
+        far apart takes as long as half of a transform.
+        """
+        if points == self.shape and not self._goes_by_blocks:
+            return [symbol]
+        number = np.result_type(symbol.dtype, np.complex64) if self._transforms.is_complex else symbol.dtype
+        parts = [symbol[:, block] for block in blocks(symbol.shape[1], _columns_together(points[0], number))]
+        return [np.ascontiguousarray(part) for part in parts] if symbol.dtype == np.float32 else parts
+
+    @property
+    def _goes_by_blocks(self) -> bool:
+        """Whether transforms on the cells themselves do."""
+        return self.shape[0] * self.shape[1] >= _BLOCKED
+
+    def _convolved(self, pressure: NDArray[Any], symbol: list[NDArray[Any]]) -> NDArray[Any]:
         """Convolution in the precision of both."""
         if self.boundary == "periodic":
             return self._filtered(pressure, symbol)
         return self._by_blocks(pressure, symbol, self._points)
 
     def _by_blocks(
-        self, field: NDArray[Any], symbol: NDArray[Any], points: tuple[int, int], out: NDArray[Any] | None = None
+        self, field: NDArray[Any], symbol: list[NDArray[Any]], points: tuple[int, int], out: NDArray[Any] | None = None
     ) -> NDArray[Any]:
         """Convolution on so many points, in the precision of field and symbol.
 
@@ -183,7 +204,8 @@ class HalfSpace:
             with _lent(rooms) as room:
                 along.rows_into(spectrum[rows], field[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
 
-        def across(block: slice) -> None:
+        def across(number_of_block: int) -> None:
+            block = columns_of[number_of_block]
             with _lent(rooms) as room:
                 columns = there = spectrum[:, block]
                 if not own:
@@ -191,7 +213,7 @@ class HalfSpace:
                     columns[:nx] = there
                     columns[nx:] = 0
                 changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
-                along.multiply(changed, symbol[:, block])
+                along.multiply(changed, symbol[number_of_block])
                 changed = along.columns_back(changed, axis=0, overwrite_x=True, workers=1)
                 if changed is not there:
                     there[...] = changed[:nx]
@@ -201,8 +223,9 @@ class HalfSpace:
                 along.rows_back_into(found[rows], spectrum[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
 
         rows = list(blocks(nx, _rows_together(my)))
+        columns_of = list(blocks(spectrum.shape[1], _columns_together(mx, number)))
         side_by_side(forward, rows, self.threads)
-        side_by_side(across, list(blocks(spectrum.shape[1], _columns_together(mx, number))), self.threads)
+        side_by_side(across, range(len(columns_of)), self.threads)
         side_by_side(back, rows, self.threads)
         return found
 
@@ -254,17 +277,20 @@ class HalfSpace:
         return self._filtered(displacement, self._inverse_symbol, out)
 
     @cached_property
-    def _inverse_symbol(self) -> NDArray[np.float32]:
+    def _inverse_symbol(self) -> list[NDArray[Any]]:
         symbol = periodic_symbol(self.kernel, self.surface_shape, self.spacing)
         symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
-        return self._transforms.cropped(1 / symbol, self.shape).astype(np.float32)
+        return self._by_columns(self._transforms.cropped(1 / symbol, self.shape).astype(np.float32), self.shape)
 
-    def _filtered(self, field: NDArray[Any], symbol: NDArray[Any], out: NDArray[Any] | None = None) -> NDArray[Any]:
+    def _filtered(
+        self, field: NDArray[Any], symbol: list[NDArray[Any]], out: NDArray[Any] | None = None
+    ) -> NDArray[Any]:
         """Convolution on the cells themselves."""
-        if field.size >= _BLOCKED:
+        if self._goes_by_blocks:
             return self._by_blocks(field, symbol, self.shape, out)
+        [whole] = symbol
         field_q = self._transforms.of_field(field, workers=1)
-        self._transforms.multiply(field_q, symbol)
+        self._transforms.multiply(field_q, whole)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
 
 
