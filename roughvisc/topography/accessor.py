@@ -16,7 +16,8 @@ import xarray as xr
 METHODS = {
     name: f"roughvisc.topography.{module}"
     for module, names in {
-        "conditioning": "level mask_outliers fill gaussian_filter resample crop rotate90 invert combine taper mirror",
+        "conditioning": "level mask_outliers fill gaussian_filter resample band_limit crop rotate90 invert combine "
+        "taper mirror",
         "parameters": "parameters",
         "spectrum": "psd",
         "fitting": "fit_self_affine",

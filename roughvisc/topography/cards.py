@@ -2,7 +2,8 @@
 
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
 Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
-their order in the file: crop, rotate90, invert, level, outliers, fill, filter, resample, taper, mirror.
+their order in the file: crop, rotate90, invert, level, outliers, fill, filter, band_limit,
+resample, taper, mirror.
 """
 
 from __future__ import annotations
@@ -126,8 +127,8 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
     steps : mapping
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
-        cut-off, or a table of cutoff, keep and periodic), ``resample`` (cells), ``taper`` (width) and ``mirror``.
-        They act in this order; false leaves a step out.
+        cut-off, or a table of cutoff, keep and periodic), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
+        and ``mirror``. They act in this order; false leaves a step out.
 
     Returns
     -------
@@ -232,6 +233,7 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "outliers": lambda h, value: conditioning.mask_outliers(h, **_table("outliers", value, ("window", "threshold"))),
     "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
     "filter": _filter,
+    "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
     "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),
     "mirror": _switch("mirror", conditioning.mirror),

@@ -4,7 +4,7 @@ Every function takes a grid and gives a new one; what was done stands in the att
 NaN, and stay so until :func:`fill`. The same steps are methods of the accessor ``h.roughvisc``.
 """
 
-from roughvisc.topography.bandwidth import gaussian_filter, level, resample
+from roughvisc.topography.bandwidth import band_limit, gaussian_filter, level, resample
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90, taper
 from roughvisc.topography.missing_points import fill, mask_outliers
 
@@ -13,6 +13,7 @@ __all__ = [
     "mask_outliers",
     "fill",
     "resample",
+    "band_limit",
     "gaussian_filter",
     "crop",
     "rotate90",

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import examples, shapes
 
 from roughvisc.errors import InputError
+from roughvisc.topography import blocks
 from roughvisc.topography.bandwidth import less_polynomial
 from roughvisc.topography.conditioning import (
+    band_limit,
     combine,
     crop,
     fill,
@@ -51,6 +53,7 @@ ALL_STEPS = {
     "mask_outliers": mask_outliers,
     "fill": fill,
     "resample": lambda h: resample(h, (21, 40)),
+    "band_limit": lambda h: band_limit(h, (21, 40)),
     "gaussian_filter": lambda h: gaussian_filter(h, 2e-5),
     "crop": lambda h: crop(h, x=(1e-5, 5e-5)),
     "rotate90": rotate90,
@@ -252,6 +255,56 @@ def test_resample__averages_whole_cells_and_leaves_out_missing_ones():
     assert np.isnan(coarse[1, 1])  # three of four are missing
     assert float(coarse[2, 1]) == pytest.approx((18 + 19 + 22 + 23) / 4)
     assert float(resample(from_array(values, CELL), (4, 2))[3, 0]) == pytest.approx((0.5 * 16.5 + 20.5) / 1.5)
+
+
+@examples(40)
+@given(old=shapes(3, 24), new=shapes(2, 30), wave=st.tuples(st.integers(0, 23), st.integers(0, 23)))
+def test_band_limit__keeps_the_cosines_that_both_grids_hold_and_no_others(old, new, wave):
+    """Closed form: a cosine with so many half waves along each side, at the centres of the cells."""
+
+    def cosine(shape):
+        x, y = ((np.arange(n) + 0.5) / n for n in shape)
+        return np.outer(np.cos(np.pi * wave[0] * x), np.cos(np.pi * wave[1] * y))
+
+    assume(all(k < n for k, n in zip(wave, old, strict=True)))
+    found = band_limit(from_array(3.0 + cosine(old), CELL), new)
+    held = all(k < m for k, m in zip(wave, new, strict=True))
+    np.testing.assert_allclose(found, 3.0 + held * cosine(new), atol=1e-12)
+    for axis, d, n, m in zip(("x", "y"), CELL, old, new, strict=True):
+        np.testing.assert_allclose(found[axis], (np.arange(m) + 0.5) * n * d / m, rtol=1e-12)
+
+
+def test_band_limit__keeps_the_mean_and_more_of_the_slope_than_means_do():
+    h = rough((90, 77))
+    fine, few, means = h, band_limit(h, (45, 39)), resample(h, (45, 39))
+    assert float(few.mean()) == pytest.approx(float(fine.mean()), abs=1e-15)
+    assert float(means.std()) < float(few.std()) < float(fine.std())
+    assert "band-limited: 90 x 77 to 45 x 39 cells" in few.attrs["history"]
+
+
+def test_band_limit__bridges_missing_points_and_keeps_them_missing():
+    h = rough((30, 21))
+    holed = h.where((h.x > 8 * CELL[0]) | (h.y > 6 * CELL[1]))
+    found = band_limit(holed, (15, 7))
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(resample(holed, (15, 7))))
+    whole = band_limit(fill(holed), (15, 7))
+    np.testing.assert_allclose(found, whole.where(found.notnull()), rtol=1e-12)
+    assert "filled" not in found.coords
+    np.testing.assert_array_equal(whole["filled"], resample(fill(holed), (15, 7))["filled"])
+
+
+def test_band_limit__by_blocks_of_rows_is_the_same(monkeypatch):
+    h = rough((40, 33))
+    expected = band_limit(h, (13, 50))
+    monkeypatch.setattr(blocks, "BLOCK", 2000)
+    np.testing.assert_array_equal(band_limit(h, (13, 50)), expected)
+
+
+def test_band_limit__refuses_absent_cells():
+    with pytest.raises(InputError, match=r"band_limit: cells are absent.*take resample"):
+        band_limit(flat_punch(2e-5, 1e-4, 21), 11)
+    with pytest.raises(InputError, match="shape"):
+        band_limit(rough(), 1)
 
 
 def test_resample__finer_is_linear_between_centres_and_keeps_identity():

@@ -49,6 +49,7 @@ from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.parameters import labels_of, parameters_of
+from roughvisc.topography.bandwidth import band_limit, resample
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 
@@ -185,7 +186,9 @@ def _surface(case: Case) -> _Surface:
 
 def _half_slope(height: xr.DataArray) -> float:
     """Root mean square slope on cells twice as long; missing where there are too few cells."""
-    return rms_slope(coarser(height, 2.0)) if min(height.shape) >= _HALVED else math.nan
+    if min(height.shape) < _HALVED:
+        return math.nan
+    return rms_slope(coarser(height, 2.0, resample if height.attrs.get("missing") == "absent" else band_limit))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:

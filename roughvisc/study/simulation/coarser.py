@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
@@ -32,11 +33,16 @@ def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> t
     return counts[0], counts[1]
 
 
-def coarser(height: xr.DataArray, factor: float) -> xr.DataArray:
-    """A surface on cells about so many times longer: an indenter made anew, anything else by means over blocks. [m]"""
+def coarser(
+    height: xr.DataArray, factor: float, by: Callable[[xr.DataArray, tuple[int, int]], xr.DataArray] = resample
+) -> xr.DataArray:
+    """A surface on cells about so many times longer: an indenter made anew, anything else by means over blocks. [m]
+
+    ``by`` may say what else gives a height on another number of cells.
+    """
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
-    return resample(height, coarser_shape(shape, factor, False)) if few is None else few
+    return by(height, coarser_shape(shape, factor, False)) if few is None else few
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:

@@ -161,7 +161,8 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
 def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[str, list[int]]:
     """Key of a study and its value that make the surface's cells so many times longer.
 
-    An analytic profile is made anew; anything else is averaged over blocks, which conserves its volume.
+    An analytic profile is made anew; anything else keeps the waves that the cells can hold, or means over them where
+    the material ends within the grid.
     """
     cells = shape_of(case, shape, coarsening)
     if not is_data(case):
@@ -169,7 +170,9 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[
     if coarsening < 1:
         raise InputError(f"setting: coarsening is {coarsening!r}: expected at least 1, the scan has no finer grid")
     mirrored = 2 if case.settings.surface.mirror else 1
-    return "surface.resample", [max(2, n // mirrored) for n in cells]
+    surface = case.settings.surface
+    ends = surface.missing == "absent" or getattr(surface, "generate", "") == "flat_punch"
+    return f"surface.{'resample' if ends else 'band_limit'}", [max(2, n // mirrored) for n in cells]
 
 
 def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:

@@ -195,9 +195,9 @@ def test_plan__says_what_runs_side_by_side_and_what_half_the_resolution_costs(st
     # on a quarter of the cells: a quarter of all that is not the process
     assert float(planned.half_memory[0]) - 200e6 == pytest.approx((float(planned.memory[0]) - 200e6) / 4, rel=0.01)
     assert 0.15 < float(planned.half_wall_time[0] / planned.wall_time[0]) < 0.25
-    # of a wave of eight cells, means over two keep cos(pi / 8), and differences of these sin(pi / 4) / 2 sin(pi / 8)
+    # a wave of eight cells is kept whole, and differences of it over two cells are sin(pi / 4) / 2 sin(pi / 8)
     wave = rv.wavy(1e-6, 1e-4, 1e-3, (80, 80), waves=1).drop_attrs()
-    kept = math.cos(math.pi / 8) * math.sin(math.pi / 4) / (2 * math.sin(math.pi / 8))
+    kept = math.sin(math.pi / 4) / (2 * math.sin(math.pi / 8))
     assert plan_module._half_slope(wave) / plan_module.rms_slope(wave) == pytest.approx(kept, rel=0.02)
     monkeypatch.setattr(plan_module, "memory_available", lambda: Available(500e6, "free in this machine"))
     planned = rv.plan(several)

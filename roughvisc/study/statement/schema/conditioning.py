@@ -114,6 +114,7 @@ class Prepared(Section):
 class Conditioned(Prepared):
     """What every surface may have done to it: the steps of a face, then those of the profile that is pressed."""
 
+    band_limit: optional(SHAPE) = None
     resample: optional(SHAPE) = None
     taper: optional(SIZE) = None
     mirror: Flag = False
