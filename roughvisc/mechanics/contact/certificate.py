@@ -46,15 +46,15 @@ class Certificate:
         return self.converged or self.hopeless
 
 
-def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array, separation: Array) -> Certificate:
+def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array) -> Certificate:
     """Judge a pressure.
 
     Parameters
     ----------
     problem : Problem
         What is asked.
-    pressure, displacement, separation : ndarray, shape (nx, ny)
-        The pressure, its displacement, and the gap with that at zero approach.
+    pressure, displacement : ndarray, shape (nx, ny)
+        The pressure, and its displacement.
     contact : ndarray of int
         Cells that carry pressure, as flat indices.
 
@@ -62,19 +62,27 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     -------
     Certificate
     """
-    fields = [field.reshape(-1) for field in (pressure, displacement, separation)]
-    lowest = problem.lowest_of(separation)
+    carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
 
-    def judged(part: slice) -> tuple[float, ...]:
-        cells = contact[part]
-        carried, own, here = (field.take(cells) for field in fields)
-        excess = 0.0 if problem.load is not None else float((carried * (here - problem.target)).sum())
-        extremes = float(here.max(initial=1.0)), -float(here.min(initial=-1.0))
-        sums = (carried * own).sum(), carried.sum(), here.sum(), (carried * (here - lowest)).sum()
-        return *extremes, excess, *map(float, sums)
+    def judged(part: slice, few: slice) -> tuple[float, ...]:
+        apart, cells = problem.apart(displaced, part), contact[few]
+        lowest = problem.lowest_of(apart, part)
+        if part.start:
+            cells = cells - part.start
+        here = apart.take(cells)
+        del apart
+        p, u = carried[part].take(cells), displaced[part].take(cells)
+        excess = 0.0 if problem.load is not None else float((p * (here - problem.target)).sum())
+        sums = p.sum(), (p * u).sum(), here.sum(), (p * (here - lowest)).sum()
+        return lowest, excess, float(here.max(initial=1.0)), -float(here.min(initial=-1.0)), *map(float, sums)
 
-    highest, deepest, *sums = zip(*passes.of_parts(judged, contact.size, problem.influence.threads), strict=True)
-    excess, energy, load, height, own_duality_gap = (float(sum(each)) for each in sums)
+    found = passes.with_cells(judged, pressure.size, contact, problem.influence.threads)
+    lowest = min(of_part[0] for of_part in found)
+    _, excesses, highest, deepest, loads, *rest = zip(*found, strict=True)
+    excess, load = float(sum(excesses)), float(sum(loads))
+    energy, height, above = (float(sum(each)) for each in rest)
+    # above the lowest of each part, and that above the lowest of all: nothing cancels
+    own_duality_gap = above + sum((of_part[0] - lowest) * of_part[4] for of_part in found if of_part[4])
     if problem.load is not None:
         level = height / contact.size
         duality_gap = own_duality_gap
@@ -84,10 +92,10 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     # with rounding of the sums above; a pressure of nothing has no error to speak of
     largest = max(*highest, *deepest)
     converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0
-    hopeless = contact.size == separation.size and problem.remaining < -ROUNDED  # no load is enough
+    hopeless = contact.size == pressure.size and problem.remaining < -ROUNDED  # no load is enough
     if converged and not problem.sees_load:
-        own = problem.influence.at(displacement, contact)
-        rounding = _ROUNDING * max(largest, float(own.max()))
+        rounding = _ROUNDING * max(largest, float(problem.influence.at(displacement, contact).max()))
+        separation = problem.separation(displacement)
         here = problem.influence.at(separation, contact)
         converged, hopeless = load_certainty(problem, contact, separation, here, load, rounding)
     return Certificate(duality_gap, energy, level, converged, hopeless)

@@ -76,7 +76,7 @@ class Step:
 def conjugate_gradient(
     problem: Problem,
     pressure: Array,
-    separation: Array,
+    displacement: Array,
     level: float,
     energy: float,
     *,
@@ -84,14 +84,14 @@ def conjugate_gradient(
     previous: Step | None,
     measured: bool,
 ) -> Trial:
-    """Preconditioned trial, conjugate to the previous step; uses up the separation.
+    """Preconditioned trial, conjugate to the previous step.
 
     Parameters
     ----------
     problem : Problem
         What is asked.
-    pressure, separation : ndarray, shape (nx, ny)
-        The pressure so far, and the gap with its displacement at zero approach.
+    pressure, displacement : ndarray, shape (nx, ny)
+        The pressure so far, and its displacement.
     level : float
         Approach of the contact.
     energy : float
@@ -103,8 +103,8 @@ def conjugate_gradient(
     measured : bool
         Whether to measure the change that the preconditioner asks for.
     """
-    free_set, threads = problem.free_set(pressure, separation, level), problem.influence.threads
-    residual, held = problem.influence.at(separation, free_set), problem.influence.at(pressure, free_set)
+    threads = problem.influence.threads
+    free_set, residual, held = problem.free_set(pressure, displacement, level)
     residual -= level if problem.load is None else passes.total(residual, threads) / residual.size
     search, caution = problem.answered(residual, free_set, held, energy)
     asked = caution * passes.magnitude(search, threads) if measured else math.nan
@@ -157,9 +157,9 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
     return search
 
 
-def projected_gradient(problem: Problem, pressure: Array, separation: Array, level: float) -> Trial:
+def projected_gradient(problem: Problem, pressure: Array, displacement: Array, level: float) -> Trial:
     """Trial along the negative gradient, projected onto what is admissible: descends in any case."""
-    stiffest = problem.influence.largest
+    stiffest, separation = problem.influence.largest, problem.separation(displacement)
     moved = pressure - (separation - level) / stiffest
     if problem.present is not None:
         moved = np.where(problem.present, moved, -math.inf)

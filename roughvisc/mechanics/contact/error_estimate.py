@@ -65,8 +65,8 @@ def _of_next_step(problem: Problem, pressure: Array, contact: Cells, displacemen
     """
     separation = problem.separation(displacement)
     load = float(pressure.sum())
-    free_set = problem.free_set(pressure, separation, level)
-    residual = separation.take(free_set) - level
+    free_set, residual, _ = problem.free_set(pressure, displacement, level)
+    residual -= level
     amiss = 0.0 if problem.load is not None else abs(float(residual.sum())) / separation.size
     uniform = stiffness(problem, contact, separation) * amiss if amiss else 0.0
     step = float(np.abs(problem.preconditioned(residual, free_set)).sum()) / problem.influence.scale

@@ -78,12 +78,12 @@ class Influence:
         self.convolutions += 1
         return self.halfspace.approximate_inverse(displacement).astype(float)
 
-    def of_blocks(self, loads: Array) -> Array:
-        """Displacement of blocks of cells by their loads, both flat: no convolution to speak of."""
-        blocks = self.halfspace.coarse
-        cells = blocks.cell_area / self.halfspace.cell_area
-        displacement = blocks.displacement(loads.reshape(blocks.shape) / cells)
-        displacement *= self.scale
+    def of_blocks(self, loads: NDArray[Any]) -> NDArray[Any]:
+        """Displacement of blocks of cells by their loads, both flat, in one precision: no convolution to speak of."""
+        blocks, single = self.halfspace.coarse, loads.dtype == np.float32
+        pressure: NDArray[Any] = loads.reshape(blocks.shape) / (blocks.cell_area / self.halfspace.cell_area)
+        displacement: NDArray[Any] = blocks.displacement_single(pressure) if single else blocks.displacement(pressure)
+        displacement *= self.scale * (blocks.largest_influence if single else 1.0)
         return displacement.reshape(-1)
 
     @property

@@ -109,7 +109,7 @@ def solved(
     asked: tuple[float, float] | None = None  # change of the pressure asked for, at which duality gap
     for iteration in range(max_iterations + 1):
         last = iteration == max_iterations
-        iterate, certificate, separation = _certified(problem, iterate, last)
+        iterate, certificate = _certified(problem, iterate, last)
         if certificate.settled or last:
             break
         if carries_excess(problem, iterate.contact):
@@ -120,12 +120,12 @@ def solved(
         search = search.after(certificate.duality_gap)
 
         if search.spacer:
-            trial = projected_gradient(problem, iterate.pressure, separation, certificate.level)
+            trial = projected_gradient(problem, iterate.pressure, iterate.displacement, certificate.level)
         else:
             trial = conjugate_gradient(
                 problem,
                 iterate.pressure,
-                separation,
+                iterate.displacement,
                 certificate.level,
                 certificate.energy,
                 step_length=search.step_length,
@@ -164,13 +164,12 @@ def _exact(problem: Problem, iterate: Iterate) -> Iterate:
     return Iterate(iterate.pressure, displacement, iterate.contact, approximate=False)
 
 
-def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate, Certificate, Array]:
-    """The iterate and its certificate, which is never accepted of an approximate displacement; and its separation."""
+def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate, Certificate]:
+    """The iterate and its certificate, which is never accepted of an approximate displacement."""
     while True:
-        separation = problem.separation(iterate.displacement)
-        certificate = certify(problem, iterate.pressure, iterate.contact, iterate.displacement, separation)
+        certificate = certify(problem, iterate.pressure, iterate.contact, iterate.displacement)
         if not (iterate.approximate and (certificate.settled or last)):
-            return iterate, certificate, separation
+            return iterate, certificate
         iterate = _exact(problem, iterate)
 
 

@@ -114,23 +114,38 @@ class Problem:
         """Gap under pressure at zero approach, in the work array: there until that is used for something else."""
         return passes.add(self.gap, displacement, self.influence.work, self.influence.threads)
 
-    def lowest_of(self, separation: Array) -> float:
-        """Least separation of the present cells."""
-        return passes.lowest(separation, self.present, self.influence.threads)
+    def apart(self, displaced: Array, part: slice) -> Array:
+        """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
+        return self.gap.reshape(-1)[part] + displaced[part]
 
-    def free_set(self, pressure: Array, separation: Array, level: float) -> Cells:
-        """Cells that may change pressure: those in contact and those that would penetrate."""
-        apart, carried = separation.reshape(-1), pressure.reshape(-1)
+    def lowest_of(self, apart: Array, part: slice) -> float:
+        """Least separation of some present cells; infinite if none of them is."""
+        if self.present is None:
+            return float(apart.min())
+        return float(apart.min(where=self.present.reshape(-1)[part], initial=math.inf))
+
+    def free_set(self, pressure: Array, displacement: Array, level: float) -> tuple[Cells, Array, Array]:
+        """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there."""
+        carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
         present = None if self.present is None else self.present.reshape(-1)
 
-        def free(part: slice) -> Mask:
-            mask = apart[part] < level
+        def free(part: slice) -> tuple[Cells, Array, Array]:
+            apart, here = self.apart(displaced, part), carried[part]
+            mask = apart < level
             if present is not None:
                 mask &= present[part]
-            mask |= carried[part] > 0
-            return mask
+            mask |= here > 0
+            cells = np.flatnonzero(mask)
+            values = apart.take(cells), here.take(cells)
+            if part.start:
+                cells += part.start
+            return cells, *values
 
-        return passes.cells_where(free, separation.size, self.influence.threads)
+        found = passes.of_parts(free, pressure.size, self.influence.threads)
+        parts = [list(each) for each in zip(*found, strict=True)]
+        del found
+        cells, apart, held = (passes.joined(parts.pop(0)) for _ in range(3))  # the parts go as they are joined
+        return cells, apart, held
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load."""

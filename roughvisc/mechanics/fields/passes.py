@@ -37,6 +37,17 @@ def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int
     return side_by_side(work, list(blocks(shape[0], max(_PART // shape[1], 1))), threads)
 
 
+def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, threads: int) -> list[Found]:
+    """What some work gives of each part of a field of some size, and of those of some cells that lie in it."""
+
+    def of_part(part: slice) -> Found:
+        if part.stop - part.start == size:
+            return work(part, slice(0, cells.size))
+        return work(part, slice(*cells.searchsorted((part.start, part.stop))))
+
+    return of_parts(of_part, size, threads)
+
+
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
     """Sum of fields times their factors, in their order; ``out`` may be the first of them."""
     flat, found = [(factor, field.reshape(-1)) for factor, field in terms], _flat(out)
@@ -147,7 +158,7 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
     return joined(of_parts(work, size, threads))
 
 
-def joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """What was found of all parts; of a part that is alone, itself."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -181,17 +192,12 @@ def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: f
     """Set a field to values over their size at some cells, and to zero elsewhere."""
     field = _flat(out)
 
-    def work(part: slice) -> None:
+    def work(part: slice, few: slice) -> None:
         field[part].fill(0)
-        here, there = values, cells
-        if part.stop - part.start < field.size:
-            of_part = slice(*cells.searchsorted((part.start, part.stop)))
-            here, there = values[of_part], cells[of_part]
-        if size != 1:
-            here = here / size
-        field[there] = here.astype(field.dtype, copy=False)
+        here = values[few] if size == 1 else values[few] / size
+        field[cells[few]] = here.astype(field.dtype, copy=False)
 
-    of_parts(work, field.size, threads)
+    with_cells(work, field.size, cells, threads)
 
 
 def total(vector: Array, threads: int) -> float:

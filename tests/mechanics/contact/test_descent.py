@@ -55,7 +55,7 @@ def test_preconditioned_step__descends_as_it_says(known):
     pressure = some_pressure(problem)
     separation, level = judged(problem, matrix, pressure)
     trial = descent.conjugate_gradient(
-        problem, pressure, separation.copy(), level, 1.0, step_length=0.2, previous=None, measured=True
+        problem, pressure, separation - problem.gap, level, 1.0, step_length=0.2, previous=None, measured=True
     )
     after = applied(trial, pressure)
     assert trial.change == pytest.approx(trial.pressure - trial.held)
@@ -67,11 +67,11 @@ def test_preconditioned_step__descends_as_it_says(known):
         assert after.sum() == pytest.approx(problem.load)
     # without the cut, the change is the one asked for times the step's length
     short = descent.conjugate_gradient(
-        problem, pressure, separation.copy(), level, 1.0, step_length=1e-3, previous=None, measured=True
+        problem, pressure, separation - problem.gap, level, 1.0, step_length=1e-3, previous=None, measured=True
     )
     assert np.abs(short.change).sum() == pytest.approx(1e-3 * short.asked, rel=1e-6)
     silent = descent.conjugate_gradient(
-        problem, pressure, separation.copy(), level, 1.0, step_length=1e-3, previous=None, measured=False
+        problem, pressure, separation - problem.gap, level, 1.0, step_length=1e-3, previous=None, measured=False
     )
     assert math.isnan(silent.asked)
 
@@ -91,9 +91,11 @@ def test_next_step__is_conjugate_to_the_step_really_taken(known):
             np.arange(change.size), change, (displaced / unit).reshape(SHAPE), unit, float(change @ displaced)
         )
         options = {"step_length": 1e-4, "measured": False}
-        plain = descent.conjugate_gradient(problem, pressure, separation.copy(), level, 1.0, previous=None, **options)
+        plain = descent.conjugate_gradient(
+            problem, pressure, separation - problem.gap, level, 1.0, previous=None, **options
+        )
         trial = descent.conjugate_gradient(
-            problem, pressure, separation.copy(), level, 1.0, previous=previous, **options
+            problem, pressure, separation - problem.gap, level, 1.0, previous=previous, **options
         )
         if trial.change == pytest.approx(plain.change, rel=1e-12):
             continue  # the direction itself where it leads away from the previous step
@@ -118,7 +120,7 @@ def test_projected_gradient__is_the_nearest_admissible_point_down_the_slope(know
         pressure[~present] = 0
         pressure *= 1 if problem.load is None else problem.load / pressure.sum()
     separation, level = judged(problem, matrix, pressure)
-    trial = descent.projected_gradient(problem, pressure, separation, level)
+    trial = descent.projected_gradient(problem, pressure, separation - problem.gap, level)
     after = applied(trial, pressure)
     assert after.min() >= 0
     assert absent is False or not after[~present].any()
@@ -183,7 +185,7 @@ def test_step__ends_where_the_energy_is_least_along_it(known, single, step_lengt
     separation, level = judged(problem, matrix, pressure)
     displacement = separation - problem.gap
     trial = descent.conjugate_gradient(
-        problem, pressure, separation.copy(), level, 1.0, step_length=step_length, previous=None, measured=False
+        problem, pressure, separation - problem.gap, level, 1.0, step_length=step_length, previous=None, measured=False
     )
     whole = applied(trial, pressure) - pressure
     curvature = whole.ravel() @ matrix @ whole.ravel()
@@ -213,7 +215,7 @@ def test_safeguarding_step__is_one_and_is_not_conjugated_to():
     problem, matrix = scaled({"load": 3.0})
     pressure = some_pressure(problem)
     separation, level = judged(problem, matrix, pressure)
-    trial = descent.projected_gradient(problem, pressure, separation, level)
+    trial = descent.projected_gradient(problem, pressure, separation - problem.gap, level)
     iterate = Iterate(pressure, separation - problem.gap, np.arange(pressure.size), False)
     _, after, taken = iteration._stepped(problem, iterate, Search(0.7, True, False, 5.0, 3), trial)
     assert taken is None

@@ -17,6 +17,7 @@ def on_small_grids(monkeypatch):
     monkeypatch.setattr(long_waves, "_FROM", 1)
     monkeypatch.setattr(long_waves, "_SPOTS", 0.0)
     monkeypatch.setattr(long_waves, "_TOLERANCE", 1e-11)
+    monkeypatch.setattr(long_waves, "_KIND", float)
 
 
 def spots():
@@ -155,3 +156,17 @@ def test_contact__is_the_same_with_both_levels(monkeypatch, boundary, given):
     assert both.iterations != alone.iterations  # the second level was there
     assert np.abs(both.pressure - alone.pressure).sum() < 3e-6 * alone.pressure.sum()
     assert both.approach == pytest.approx(alone.approach, rel=1e-6)
+
+
+@BODIES
+@pytest.mark.parametrize("size", [1.0, 1e-60, 1e60])
+def test_equations_of_the_blocks__are_solved_in_single_precision(on_small_grids, monkeypatch, boundary, mirrored, size):
+    """The answer to a residual of any size, to what single precision leaves."""
+    _, _, waves = waves_of(boundary, mirrored)
+    sums = waves.cells * np.random.default_rng(4).standard_normal(waves.cells.size)
+    double = waves._answered(sums)
+    monkeypatch.setattr(long_waves, "_KIND", np.float32)
+    monkeypatch.setattr(long_waves, "_TOLERANCE", 1e-5)
+    single = waves._answered(size * sums)
+    assert single.dtype == np.float64
+    assert np.abs(single / size - double).max() < 1e-4 * np.abs(double).max()
