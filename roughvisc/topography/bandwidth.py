@@ -142,7 +142,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int]) -> xr.DataArray:
     """
     h = checked(h, "resample")
     shape = counts("shape", shape)
-    heights, filled = averaged(h, *(_weights(old, new) for old, new in zip(h.shape, shape, strict=True)))
+    heights, filled = _means(h, shape)
     return _on_cells(h, heights, filled, "resampled")
 
 
@@ -180,9 +180,14 @@ def band_limit(h: xr.DataArray, shape: int | tuple[int, int]) -> xr.DataArray:
     whole = h if all(np.isfinite(h.values[rows]).all() for rows in row_blocks(h.shape)) else fill(h)
     heights, filled = _cosines(whole.values, shape), None
     if whole is not h or "filled" in h.coords:
-        means, filled = averaged(h, *(_weights(old, new) for old, new in zip(h.shape, shape, strict=True)))
+        means, filled = _means(h, shape)
         heights[np.isnan(means)] = np.nan
     return _on_cells(h, heights, filled, "band-limited")
+
+
+def _means(h: xr.DataArray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray | None]:
+    """Means over other cells, linear between centres where they are finer, and where a filled point has a part."""
+    return averaged(h, *(_weights(old, new) for old, new in zip(h.shape, shape, strict=True)))
 
 
 def _cosines(heights: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

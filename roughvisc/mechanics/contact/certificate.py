@@ -65,7 +65,7 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
 
     def judged(part: slice, few: slice) -> tuple[float, ...]:
-        apart, cells = problem.apart(displaced, part), contact[few]
+        apart, cells = problem.separation_of(displaced, part), contact[few]
         lowest = problem.lowest_of(apart, part)
         if part.start:
             cells = cells - part.start
@@ -73,16 +73,17 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         del apart
         p, u = carried[part].take(cells), displaced[part].take(cells)
         excess = 0.0 if problem.load is not None else float((p * (here - problem.target)).sum())
-        sums = p.sum(), (p * u).sum(), here.sum(), (p * (here - lowest)).sum()
-        return lowest, excess, float(here.max(initial=1.0)), -float(here.min(initial=-1.0)), *map(float, sums)
+        sums = p.sum(), excess, (p * u).sum(), here.sum(), (p * (here - lowest)).sum()
+        return lowest, float(here.max(initial=1.0)), -float(here.min(initial=-1.0)), *map(float, sums)
 
     found = passes.with_cells(judged, pressure.size, contact, problem.influence.threads)
-    lowest = min(of_part[0] for of_part in found)
-    _, excesses, highest, deepest, loads, *rest = zip(*found, strict=True)
-    excess, load = float(sum(excesses)), float(sum(loads))
-    energy, height, above = (float(sum(each)) for each in rest)
+    lows, highest, deepest, loads, *sums = zip(*found, strict=True)
+    lowest, load = min(lows), float(sum(loads))
+    excess, energy, height, above = (float(sum(each)) for each in sums)
     # above the lowest of each part, and that above the lowest of all: nothing cancels
-    own_duality_gap = above + sum((of_part[0] - lowest) * of_part[4] for of_part in found if of_part[4])
+    own_duality_gap = above + sum(
+        (low - lowest) * carrying for low, carrying in zip(lows, loads, strict=True) if carrying
+    )
     if problem.load is not None:
         level = height / contact.size
         duality_gap = own_duality_gap

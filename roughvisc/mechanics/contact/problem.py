@@ -114,7 +114,7 @@ class Problem:
         """Gap under pressure at zero approach, in the work array: there until that is used for something else."""
         return passes.add(self.gap, displacement, self.influence.work, self.influence.threads)
 
-    def apart(self, displaced: Array, part: slice) -> Array:
+    def separation_of(self, displaced: Array, part: slice) -> Array:
         """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
         return self.gap.reshape(-1)[part] + displaced[part]
 
@@ -130,7 +130,7 @@ class Problem:
         present = None if self.present is None else self.present.reshape(-1)
 
         def free(part: slice) -> tuple[Cells, Array, Array]:
-            apart, here = self.apart(displaced, part), carried[part]
+            apart, here = self.separation_of(displaced, part), carried[part]
             mask = apart < level
             if present is not None:
                 mask &= present[part]

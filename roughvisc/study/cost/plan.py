@@ -44,7 +44,7 @@ from roughvisc.study.simulation.available import Available, memory_available
 from roughvisc.study.simulation.coarser import coarser
 from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.refusal import PART, too_large
-from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
+from roughvisc.study.simulation.scene import Ground, follows, is_absent, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
@@ -176,19 +176,20 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
+        missing = case.settings.surface.missing
+        ground = Ground(height, missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
     return _Surface(
-        height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height), _half_slope(height)
+        height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height), _half_slope(height, missing)
     )
 
 
-def _half_slope(height: xr.DataArray) -> float:
+def _half_slope(height: xr.DataArray, missing: str = Settings.missing) -> float:
     """Root mean square slope on cells twice as long; missing where there are too few cells."""
     if min(height.shape) < _HALVED:
         return math.nan
-    return rms_slope(coarser(height, 2.0, resample if height.attrs.get("missing") == "absent" else band_limit))
+    return rms_slope(coarser(height, 2.0, resample if is_absent(height, missing) else band_limit))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:

@@ -222,10 +222,15 @@ def _checked(height: xr.DataArray) -> xr.DataArray:
     return height
 
 
+def is_absent(height: xr.DataArray, missing: str) -> bool:
+    """Whether there is no material where heights are missing: the settings or the surface say so."""
+    return missing == "absent" or height.attrs.get("missing") == "absent"
+
+
 def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:
     if not present.any():
         raise InputError("height is missing everywhere: expected at least one finite height")
-    absent = missing == "absent" or height.attrs.get("missing") == "absent"
+    absent = is_absent(height, missing)
     if not present.all() and not absent:
         row, column = np.argwhere(~present)[0]
         raise InputError(

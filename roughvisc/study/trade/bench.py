@@ -83,6 +83,7 @@ class Bench:
 
     def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
+        self._absent = height.attrs.get("missing") == "absent"
         self._path, self._report = result_path(folder, "run"), report
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
@@ -126,7 +127,7 @@ class Bench:
         if expected > self.left:
             raise NotRun(f"would take about {expected:.2g} s, {self.left:.0f} s are left of the budget")
         try:
-            case = changed(self.case, self.shape, setting)
+            case = changed(self.case, self.shape, setting, self._absent)
             took, dataset, steps = self._timed(case, label)
             if setting.method == "fast" and took > _TELLING:
                 self._calibration *= max(took, 1e-3) / max(expected, 1e-3)

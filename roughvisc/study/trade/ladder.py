@@ -136,8 +136,8 @@ def shape_of(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[int
     return shape if coarsening == 1 else coarser_shape(shape, coarsening, not is_data(case))
 
 
-def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
-    """The case under a setting.
+def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool = False) -> Case:
+    """The case under a setting; ``absent``: the surface says that there is no material where heights are missing.
 
     Raises
     ------
@@ -153,16 +153,16 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
     if setting.precision is not None:
         changes["keep.precision"] = setting.precision
     if setting.coarsening != 1:
-        key, value = grid_change(case, shape, setting.coarsening)
+        key, value = grid_change(case, shape, setting.coarsening, absent)
         changes[key] = value
     return vary(case, changes)
 
 
-def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[str, list[int]]:
+def grid_change(case: Case, shape: tuple[int, int], coarsening: float, absent: bool = False) -> tuple[str, list[int]]:
     """Key of a study and its value that make the surface's cells so many times longer.
 
     An analytic profile is made anew; anything else keeps the waves that the cells can hold, or means over them where
-    the material ends within the grid.
+    the material ends within the grid: ``absent``, the surface itself says so.
     """
     cells = shape_of(case, shape, coarsening)
     if not is_data(case):
@@ -170,8 +170,7 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[
     if coarsening < 1:
         raise InputError(f"setting: coarsening is {coarsening!r}: expected at least 1, the scan has no finer grid")
     mirrored = 2 if case.settings.surface.mirror else 1
-    surface = case.settings.surface
-    ends = surface.missing == "absent" or getattr(surface, "generate", "") == "flat_punch"
+    ends = absent or case.settings.surface.missing == "absent"
     return f"surface.{'resample' if ends else 'band_limit'}", [max(2, n // mirrored) for n in cells]
 
 

@@ -308,6 +308,15 @@ def test_scan__shows_what_coarsening_makes_of_the_surface(tmp_path):
     assert few.values == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 
+def test_card_of_a_punch__is_made_coarser_by_means(tmp_path):
+    """Its material ends within the grid, which the study does not say: waves would be refused."""
+    (tmp_path / "punch.toml").write_text('generate = "flat_punch"\nradius = 2e-4\nsize = 1e-3\nshape = [31, 28]\n')
+    text = ROUGH[: ROUGH.index("[surface]")] + '[surface]\nfile = "punch.toml"\n\n' + ROUGH[ROUGH.index("[material]") :]
+    ds = measured(case_of(tmp_path, text), Setting(1e-2), Setting(1e-2, coarsening=2.0))
+    assert not any(ds.note.values)
+    assert np.isfinite(ds.run_time).all()
+
+
 def _cosines_at(old, new):
     """Values at the centres of fewer cells, from values at more, by the cosines that fewer cells hold."""
     waves = np.pi * np.arange(new)
