@@ -14,13 +14,12 @@ PACKAGE = ROOT / "roughvisc"
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
 _LABELS = {"errors", "labels", "notebook", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
-_STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary"}
+_STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary", "mechanics.fields"}
 _SIMULATION = {
     *_STORAGE,
     "study.storage",
     "study.progress",
     "mechanics.contact",
-    "mechanics.fields",
     "mechanics.sliding",
 }
 _EXECUTION = {*_SIMULATION, "study.simulation"}

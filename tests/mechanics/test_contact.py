@@ -438,7 +438,7 @@ def convolved(monkeypatch):
     kinds = []
 
     def noted(kind, sound):
-        return lambda self, pressure: kinds.append(kind) or sound(self, pressure)
+        return lambda self, *given: kinds.append(kind) or sound(self, *given)
 
     monkeypatch.setattr(HalfSpace, "displacement", noted("double", HalfSpace.displacement))
     monkeypatch.setattr(HalfSpace, "displacement_single", noted("single", HalfSpace.displacement_single))

@@ -13,7 +13,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-Cells = NDArray[np.intp]
+Cells = passes.Cells
 
 
 class Influence:
@@ -52,10 +52,10 @@ class Influence:
         """Largest eigenvalue of the influence, or a bound on it."""
         return self.halfspace.largest_influence * self.scale
 
-    def displacement(self, pressure: Array) -> Array:
-        """Displacement by a pressure, in double precision."""
+    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+        """Displacement by a pressure, in double precision; into some memory on large grids, where that is given."""
         self.convolutions += 1
-        displacement = self.halfspace.displacement(pressure)
+        displacement = self.halfspace.displacement(pressure, out)
         passes.multiply(displacement, self.scale, self.threads)
         return displacement
 

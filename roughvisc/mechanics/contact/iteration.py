@@ -159,8 +159,8 @@ def _first(problem: Problem, start: Array | None, start_displacement: Array | No
 
 
 def _exact(problem: Problem, iterate: Iterate) -> Iterate:
-    """The same pressure with its displacement computed anew in double precision."""
-    displacement = problem.influence.displacement(iterate.pressure)
+    """The same pressure with its displacement computed anew in double precision, in the place of the old one."""
+    displacement = problem.influence.displacement(iterate.pressure, out=iterate.displacement)
     return Iterate(iterate.pressure, displacement, iterate.contact, approximate=False)
 
 

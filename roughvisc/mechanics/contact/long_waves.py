@@ -158,7 +158,7 @@ def _product(a: NDArray[Any], b: NDArray[Any]) -> float:
 def _blocks(shape: tuple[int, int], coarse: tuple[int, int], cells: Cells, threads: int) -> NDArray[np.intp]:
     """Block of each cell, as flat indices."""
     rows, columns = (np.arange(n) * m // n for n, m in zip(shape, coarse, strict=True))
-    begins, found = np.arange(shape[0] + 1) * shape[1], np.empty_like(cells)
+    begins, found = np.arange(shape[0] + 1) * shape[1], np.empty(cells.size, np.intp)
 
     def work(part: slice) -> None:
         here = cells[part]

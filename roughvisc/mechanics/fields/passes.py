@@ -18,7 +18,7 @@ from roughvisc.mechanics.fields.threads import blocks, side_by_side
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Cells = NDArray[np.intp]
+Cells = NDArray[np.int32] | NDArray[np.int64]
 Found = TypeVar("Found")
 
 # Cells of a part.
@@ -114,6 +114,20 @@ def scale(out: Array, origin: float, unit: float, threads: int) -> None:
         here /= unit
 
     of_parts(work, out.size, threads)
+
+
+def cut(out: Array, threads: int) -> bool:
+    """``out = max(out, 0)``, and whether that has changed anything."""
+    found = _flat(out)
+
+    def work(part: slice) -> bool:
+        here = found[part]
+        below = bool(here.min(initial=0.0) < 0)
+        if below:
+            np.maximum(here, 0, out=here)
+        return below
+
+    return any(of_parts(work, out.size, threads))
 
 
 def cut_and_divide(out: Array, divisor: float, threads: int) -> None:

@@ -126,20 +126,22 @@ class HalfSpace:
         unit[0, 0] = 1
         return float(self.displacement(unit)[0, 0])
 
-    def displacement(self, pressure: Array) -> Array:
+    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Surface displacement under a pressure: one convolution.
 
         Parameters
         ----------
         pressure : ndarray, shape (nx, ny)
             Pressure over the contact modulus. [-]
+        out : ndarray, shape (nx, ny), optional
+            Memory for what is returned, which large grids use.
 
         Returns
         -------
         ndarray, shape (nx, ny)
             Displacement; with periodic boundaries the mean of a half-space's is zero. [m]
         """
-        return self._convolved(pressure, self._symbol_by_columns)
+        return self._convolved(pressure, self._symbol_by_columns, out)
 
     def displacement_single(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
         """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
@@ -181,11 +183,13 @@ class HalfSpace:
         """Whether transforms on the cells themselves do."""
         return self.shape[0] * self.shape[1] >= _BLOCKED
 
-    def _convolved(self, pressure: NDArray[Any], symbol: list[NDArray[Any]]) -> NDArray[Any]:
+    def _convolved(
+        self, pressure: NDArray[Any], symbol: list[NDArray[Any]], out: NDArray[Any] | None = None
+    ) -> NDArray[Any]:
         """Convolution in the precision of both."""
         if self.boundary == "periodic":
-            return self._filtered(pressure, symbol)
-        return self._by_blocks(pressure, symbol, self._points)
+            return self._filtered(pressure, symbol, out)
+        return self._by_blocks(pressure, symbol, self._points, out)
 
     def _by_blocks(
         self, field: NDArray[Any], symbol: list[NDArray[Any]], points: tuple[int, int], out: NDArray[Any] | None = None

@@ -125,13 +125,18 @@ class Modes:
 
     def predict(self, state: ModesState, step: float, rule: Rule) -> tuple[float, Array]:
         """``alpha`` [1/Pa] and the carried field of a step ahead. [s]"""
+        alpha, terms = self.terms(state, step, rule)
+        return alpha, weighted(terms, empty(state.field.shape), threads_of(state.field.size))
+
+    def terms(self, state: ModesState, step: float, rule: Rule) -> tuple[float, list[tuple[float, Array]]]:
+        """The same, the carried field as the terms of which it is the sum."""
         own, earlier, before, after = self.coefficients(state, step, rule)
         weights = self._weights
         alpha = self.factor * self.material.glassy + float(np.sum(weights * after))
         terms = [(float(np.sum(weights * before)), state.field), *zip(weights * own, state.modes, strict=True)]
         if state.earlier is not None and np.any(earlier):
             terms += zip(weights * earlier, state.earlier, strict=True)
-        return alpha, weighted(terms, empty(state.field.shape), threads_of(state.field.size))
+        return alpha, terms
 
     def advance(self, state: ModesState, step: float, rule: Rule, field: Array) -> ModesState:
         """State after a step at whose end the field was ``field``."""
@@ -183,18 +188,18 @@ class Modes:
         """Contact compliance over shear compliance. [-]"""
         return 0.5 * (1 - self.material.poisson)
 
-    def products(self, modes: Array, dual: tuple[Array, Array], cells: NDArray[np.intp]) -> Array:
+    def products(self, modes: Array, displacement: Array, cells: NDArray[np.integer], pressure: Array) -> Array:
         """Inner product ``p K z_i`` of a pressure with each exponential, summed over the cells. [Pa2 m]
 
-        ``dual`` is the pressure and its displacement at unit compliance, ``cells`` where the pressure is not zero.
+        The pressure is that on some cells and zero elsewhere; ``displacement`` is that by it at unit compliance.
         """
         fields = modes[: len(self.material.times)]
         if self.acts_on == "pressure":  # the kernel is symmetric; where nothing was ever in contact z is zero
-            return np.einsum("mxy,xy->m", fields, dual[1])
+            return np.einsum("mxy,xy->m", fields, displacement)
         displaced = fields[:, 1] if self.acts_on == "both" else fields
-        flat = displaced.reshape(len(displaced), dual[0].size)
+        flat = displaced.reshape(len(displaced), displacement.size)
         # einsum, not a matrix product: the same bits whatever the number of threads
-        return np.einsum("mc,c->m", flat.take(cells, axis=1), dual[0].reshape(-1).take(cells))
+        return np.einsum("mc,c->m", flat.take(cells, axis=1), pressure)
 
     @property
     def _weights(self) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +12,11 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial, total_displacement
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure
 def rest(scene: Scene) -> State:
     nothing = np.zeros(scene.halfspace.shape)
     given = any(segment.control == "approach" for segment in scene.program.segments[:1])
-    now = Instant(0.0, nothing, 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
+    now = Instant(0.0, Sparse.of(nothing), 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
     at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes) else None
     return State(now, nothing, scene.memory.start(scene.halfspace.shape), energy=at_rest)
 
@@ -47,32 +47,34 @@ def attempt(
     length: float,
     rule: Rule,
     share: float = 1.0,
-    guess: Callable[[float], tuple[Array, Array | None]] | None = None,
+    guess: tuple[Array, Array | None] | None = None,
     stated: bool = False,
 ) -> Trial:
     """Contact state a step ahead, where the load or the approach has a given value.
 
-    ``share`` scales the contact solver's tolerance; ``guess`` gives a pressure near the one sought and its displacement
-    at unit compliance, both times a number and in memory of their own; ``stated`` asks for an estimate of the error
-    that the solver leaves.
+    ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought and its displacement at
+    unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves.
     """
-    alpha, effective, carried = predicted(scene, state.memory, length, rule)
-    # what costs no convolution is not held while the contact is solved, and had again
-    again = effective is None
+    alpha, effective, field = predicted(scene, state.memory, length, rule)
+    # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
+    carried = None if effective is None else field
     threads = scene.halfspace.threads
-    gap = passes.add(scene.gap, carried, carried if again else empty(carried.shape), threads)
+    gap = passes.add(scene.gap, field, field if carried is None else empty(field.shape), threads)
+    del field
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
-        if again:
-            carried = predicted(scene, state.memory, length, rule)[2]
         nothing = np.zeros_like(gap)
-        return Trial(Instant(time, nothing, 0.0, approach, nothing), carried, effective, length, rule, control)
+        instant = Instant(time, Sparse.of(nothing), 0.0, approach, nothing)
+        return Trial(instant, carried, effective, length, rule, control)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
-    start, start_displacement = state.first_guess(length, alpha) if guess is None else guess(alpha)
+    start, start_displacement = state.first_guess(length) if guess is None else guess
+    passes.multiply(start, alpha, threads)
+    if start_displacement is not None:
+        passes.multiply(start_displacement, alpha, threads)
     contact = solve_contact(
         scene.halfspace,
         gap,
@@ -87,16 +89,15 @@ def attempt(
     )
     del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
-    if again:
-        carried = predicted(scene, state.memory, length, rule)[2]
-    passes.add(carried, displacement, carried, threads)
+    if carried is not None:
+        passes.add(carried, displacement, carried, threads)
     if effective is not None:
         effective += pressure
     passes.divide(pressure, alpha, threads)
     passes.divide(displacement, alpha, threads)
     instant = Instant(
         time,
-        pressure,
+        Sparse.of(pressure),
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
         displacement,
@@ -130,23 +131,25 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
     """State after an accepted trial."""
     now = trial.instant
     assert now.unit_displacement is not None
-    fields = {"pressure": now.pressure, "displacement": now.unit_displacement}
-    both = scene.memory.acts_on == "both"
-    field = np.stack(list(fields.values())) if both else fields[scene.memory.acts_on]
+    acts_on = scene.memory.acts_on
+    field = now.unit_displacement if acts_on == "displacement" else now.pressure
+    if acts_on == "both":
+        field = np.stack([field, now.unit_displacement])
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
-    if both:  # held once
-        now = replace(now, pressure=field[0], unit_displacement=field[1])
+    if acts_on == "both":  # held once
+        now = replace(now, contact=Sparse.of(field[0]), unit_displacement=field[1])
     touching = now.force > 0
     assert state.now.unit_displacement is not None
     spent = energy_after(scene, state, trial)
     if spent is None:
+        assert trial.displacement is not None
         work = state.work + work_between(scene, state, now.pressure, trial.displacement, jumped=state.unresolved)
     else:
         work = spent.stored + spent.dissipated
     return replace(
         state,
         now=now,
-        displacement=trial.displacement if spent is None else NO_FIELD,
+        displacement=NO_FIELD if spent is not None or trial.displacement is None else trial.displacement,
         before=state.now if trial.length > 0 else None,
         memory=memory,
         largest_force=max(state.largest_force, now.force),
@@ -174,8 +177,8 @@ def energy_after(scene: Scene, state: State, trial: Trial) -> energy.Energy | No
         state.memory,
         trial.length,
         trial.rule,
-        (before.pressure, before.unit_displacement),
-        (now.pressure, now.unit_displacement),
+        before.unit_displacement,
+        (now.contact, now.unit_displacement),
         scene.halfspace.cell_area,
         fresh=state.before is None,
         jumped=state.unresolved,
@@ -219,8 +222,8 @@ def with_cost(state: State, trial: Trial) -> State:
 
 def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
-    shown, converged = trial, trial.converged
-    pressure, level = state.now.pressure, state.now.approach
+    shown, converged, moved = trial, trial.converged, displacement_after(scene, state, trial)
+    contact, level = state.now.contact, state.now.approach
     if not trial.apart and trial.length > 0 and scene.keeps(state.now.time) and scene.is_soft(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
@@ -228,11 +231,14 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
         shown = attempt(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
         state = with_cost(state, shown)
         converged = converged and shown.converged
-        pressure, level = shown.instant.pressure, shown.instant.approach
-    now = replace(state.now, pressure=pressure)
+        if shown.displacement is None:
+            moved = total_displacement(scene, alone, shown.instant, shown.length, shown.rule)
+        else:
+            moved = Sum.whole(shown.displacement)
+        contact, level = shown.instant.contact, shown.instant.approach
     return Step(
-        shown=now,
-        displacement=shown.displacement,
+        shown=replace(state.now, contact=contact),
+        moved=moved,
         effective=shown.effective,
         level=level,
         control=trial.control,
@@ -244,6 +250,13 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
         scene=scene,
         state=state,
     )
+
+
+def displacement_after(scene: Scene, state: State, trial: Trial) -> Sum:
+    """Total displacement after a trial that has led to a state. [m]"""
+    if trial.displacement is None:
+        return total_displacement(scene, state, state.now)
+    return Sum.whole(trial.displacement)
 
 
 def segment_number(state: State) -> int:

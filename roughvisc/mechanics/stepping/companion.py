@@ -8,20 +8,26 @@ Energies are sums over the steps, whose error follows the second order closely: 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.threads import threads_of
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Rule
-from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, segment_number, with_cost
+from roughvisc.mechanics.stepping.attempt import (
+    attempt,
+    committed,
+    displacement_after,
+    restarted,
+    segment_number,
+    with_cost,
+)
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.domain import is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_CONTACT, Instant, Scene, State, Step, Trial
 from roughvisc.mechanics.stepping.tangential import tangential_force
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -45,19 +51,17 @@ _ENTERED = 0.3
 
 def bare(state: State) -> State:
     """A companion's state without what it is never asked for, so that it holds few fields."""
-    before = None if state.before is None else replace(state.before, pressure=NO_FIELD, unit_displacement=None)
+    before = None if state.before is None else replace(state.before, contact=NO_CONTACT, unit_displacement=None)
     return replace(state, before=before)
 
 
 def beside(
-    scale: float, now: Instant, companion: Instant | None = None, together: Instant | None = None
-) -> tuple[Array, Array]:
+    now: Instant, companion: Instant | None = None, together: Instant | None = None
+) -> tuple[Array, Array | None]:
     """Where the companion of a state may be: as far from it as when both were last at the same instant.
 
     Parameters
     ----------
-    scale : float
-        What pressure and displacement are multiplied by. [-]
     now : Instant
         The state's.
     companion, together : Instant or None
@@ -69,34 +73,19 @@ def beside(
         [Pa], and at unit compliance [Pa m], in memory of their own.
     """
     assert now.unit_displacement is not None
-    threads = threads_of(now.pressure.size)
-    if companion is None or together is None:
-        return passes.times(now.pressure, scale, threads), passes.times(now.unit_displacement, scale, threads)
-    pressure = _moved(now.pressure, companion.pressure, together.pressure, scale, cut=True)
-    if companion.unit_displacement is None or together.unit_displacement is None:
-        return pressure, passes.times(now.unit_displacement, scale, threads)
-    fields = now.unit_displacement, companion.unit_displacement, together.unit_displacement
-    return pressure, _moved(*fields, scale, cut=False)
-
-
-def _moved(now: Array, companion: Array, together: Array, scale: float, *, cut: bool) -> Array:
-    """``(now + companion - together) * scale``, cut at zero if that is said."""
-    found = empty(now.shape)
-    first, second, third, out = (field.reshape(-1) for field in (now, companion, together, found))
-
-    def work(part: slice) -> None:
-        here = np.add(first[part], second[part], out=out[part])
-        here -= third[part]
-        if cut:
-            np.maximum(here, 0, out=here)
-        here *= scale
-
-    passes.of_parts(work, found.size, threads_of(found.size))
-    return found
+    threads = now.contact.threads
+    pressure, displaced = now.contact.times(1.0), [(1.0, now.unit_displacement)]
+    if companion is not None and together is not None:
+        companion.contact.add_to(pressure, 1.0)
+        together.contact.add_to(pressure, -1.0)
+        passes.cut(pressure, threads)
+        if companion.unit_displacement is not None and together.unit_displacement is not None:
+            displaced += [(1.0, companion.unit_displacement), (-1.0, together.unit_displacement)]
+    return pressure, passes.weighted(displaced, empty(pressure.shape), threads)
 
 
 def difference(
-    scene: Scene, step: Step, companion: State, displacement: Array, earlier: Array | None, asked: bool
+    scene: Scene, step: Step, companion: State, moved: Sum, earlier: Sparse | None, asked: bool
 ) -> Uncertainty:
     """What is stated of a step, from where its companion is at the same time.
 
@@ -108,8 +97,10 @@ def difference(
         The step.
     companion : State
         Its companion after a step of its own.
-    displacement, earlier : ndarray, shape (nx, ny)
-        Displacement after that step [m], and pressure before it [Pa], if there was one.
+    moved : Sum
+        Displacement after that step. [m]
+    earlier : Sparse or None
+        Pressure before it, if there was one. [Pa]
     asked : bool
         Whether the area's part is wanted too.
 
@@ -120,11 +111,11 @@ def difference(
     """
     fine, coarse = step.state.now, companion.now
     area = scene.halfspace.cell_area
-    inside, outside = _undecided(scene, step, coarse, displacement) if asked else (0, 0)
+    inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
     (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
     entered, soft = 0.0, scene.is_soft(scene.program.duration)
     if earlier is not None and soft:
-        entered = _ENTERED * area * float(np.sum(fine.pressure, where=earlier == 0))
+        entered = _ENTERED * area * float(np.sum(fine.pressure, where=earlier.field() == 0))
     stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
     if soft:
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
@@ -135,7 +126,7 @@ def difference(
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
         work=energy * abs(step.state.work - companion.work) + unresolved,
         dissipated=energy * abs(lost - companion_lost) + unresolved,
-        friction=stated * _friction_apart(scene, step, coarse.pressure, displacement) if scene.motions else 0.0,
+        friction=stated * _friction_apart(scene, step, coarse.pressure, moved.field()) if scene.motions else 0.0,
         inside=area * inside,
         outside=area * outside,
         stored_excess=(kept - companion_kept) / -3,
@@ -179,18 +170,19 @@ def _energies(state: State) -> tuple[float, float]:
     return (0.0, 0.0) if state.energy is None else (state.energy.stored, state.energy.dissipated)
 
 
-def _undecided(scene: Scene, step: Step, coarse: Instant, displacement: Array) -> tuple[int, int]:
+def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[int, int]:
     """Cells in contact that may be out of it, and cells out of contact that may be in it."""
-    fields = step.shown.pressure, coarse.pressure, scene.gap, step.displacement, displacement
-    flat = [field.reshape(-1) for field in fields]
+    flat = scene.gap.reshape(-1)
     present = None if scene.present is None else scene.present.reshape(-1)
 
     def work(part: slice) -> tuple[int, int]:
-        fine, other, gap, own, others = (field[part] for field in flat)
+        fine, other, own, others = (
+            field.part(part) for field in (step.shown.contact, coarse.contact, step.moved, moved)
+        )
         contact = fine > 0
         inside = contact & (fine <= np.abs(fine - other))
         sunk = own - step.level
-        outside = ~contact & ((other > 0) | (gap + sunk <= np.abs(sunk - (others - coarse.approach))))
+        outside = ~contact & ((other > 0) | (flat[part] + sunk <= np.abs(sunk - (others - coarse.approach))))
         if present is not None:
             outside &= present[part]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
@@ -200,11 +192,15 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, displacement: Array) -
 
 
 def caught_up(
-    scene: Scene, state: State, segment: Segment, together: Instant | None, rule: Rule | None = None
+    scene: Scene,
+    state: State,
+    segment: Segment,
+    guess: tuple[Array, Array | None],
+    rule: Rule | None = None,
 ) -> tuple[State, Trial] | None:
     """State whose companion has come to the same instant by one step, and that step; None if it outgrew the grid.
 
-    ``together`` is the state's instant where the companion is, if it is known.
+    ``guess`` is where the companion may be, as of :func:`beside`; it is used up.
     """
     companion = state.companion
     assert companion is not None
@@ -212,7 +208,6 @@ def caught_up(
     length = time - companion.now.time
     value = segment.value(time - companion.began, companion.start)
     rule = rule or rule_for(scene, companion, length, _GROWTH)
-    guess = partial(beside, now=state.now, companion=companion.now, together=together)
     trial = attempt(scene, companion, segment.control, value, length, rule, _SHARE, guess)
     trial = replace(trial, instant=replace(trial.instant, time=time))
     if is_outgrown(scene, trial.instant):
@@ -224,12 +219,13 @@ def caught_up(
 
 
 def compared(
-    scene: Scene, step: Step, companion_trial: Trial, earlier: Array | None = None, asked: bool = True
+    scene: Scene, step: Step, companion_trial: Trial, earlier: Sparse | None = None, asked: bool = True
 ) -> Step:
     """A step with what its companion says of it."""
     companion = step.state.companion
     assert companion is not None
-    return stating(step, difference(scene, step, companion, companion_trial.displacement, earlier, asked))
+    moved = displacement_after(scene, companion, companion_trial)
+    return stating(step, difference(scene, step, companion, moved, earlier, asked))
 
 
 def of_a_pair(waiting: Step, step: Step) -> Step:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from roughvisc.mechanics.fields.passes import apart
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Rule
 from roughvisc.mechanics.stepping.program import Segment
@@ -153,7 +151,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     approach = max(
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
-    difference = apart(trial.instant.pressure, state.extrapolated(trial.length), scene.halfspace.threads)
+    difference = apart(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.halfspace.threads)
     pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.blind else 0.0
     ratio = trial.length / last
     if segment.control == "load":
@@ -172,7 +170,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
 
 def _unresolved_approach(scene: Scene, now: Instant) -> float:
     """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
-    pressure = now.force / (now.pressure.size * scene.halfspace.cell_area)
+    pressure = now.force / (now.contact.size * scene.halfspace.cell_area)
     return _ROUNDING * scene.compliance(now.time) * pressure * scene.halfspace.largest_influence
 
 
@@ -197,7 +195,7 @@ def _fading(scene: Scene, state: State, trial: Trial, event: float) -> float:
 
 def _receding(state: State, trial: Trial) -> bool:
     """Whether fewer cells are in contact after a step than before it."""
-    return bool(np.count_nonzero(trial.instant.pressure) < np.count_nonzero(state.now.pressure))
+    return trial.instant.contact.count < state.now.contact.count
 
 
 def growth(state: State, segment: Segment, time: float, event: float) -> float:

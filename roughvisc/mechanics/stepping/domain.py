@@ -6,14 +6,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import padded
 from roughvisc.mechanics.stepping.attempt import predicted
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State
-
-Array = NDArray[np.float64]
 
 # The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
 _BEYOND = 1.05
@@ -23,13 +21,14 @@ def is_outgrown(scene: Scene, instant: Instant) -> bool:
     """Whether the grid is too small: contact cannot be excluded beyond it, or has reached the domain's border."""
     if scene.outside < math.inf:
         return _BEYOND * instant.approach >= scene.outside
-    return at_edge(scene, instant.pressure)
+    return at_edge(scene, instant.contact)
 
 
-def at_edge(scene: Scene, pressure: Array) -> bool:
+def at_edge(scene: Scene, contact: Sparse) -> bool:
     """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
     if scene.halfspace.boundary != "free" or scene.accept_edge:
         return False
+    pressure = contact.field()
     borders = (-1,) if scene.halfspace.mirrored else (0, -1)
     return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
 
@@ -59,9 +58,10 @@ def _on_larger(scene: Scene, state: State, offset: tuple[int, int]) -> State:
     memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
 
     def moved(instant: Instant) -> Instant:
-        if not instant.pressure.size:  # of a companion
+        if not instant.contact.size:  # of a companion
             return instant
-        return replace(instant, pressure=padded(instant.pressure, shape, offset), unit_displacement=None)
+        contact = Sparse.of(padded(instant.pressure, shape, offset))
+        return replace(instant, contact=contact, unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
     glassy, _, carried = predicted(scene, memory, 0.0, "linear")

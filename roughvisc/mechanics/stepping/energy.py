@@ -17,8 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields.passes import cells_where
-from roughvisc.mechanics.fields.threads import threads_of
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 
@@ -77,8 +76,8 @@ def after_step(
     state: ModesState,
     step: float,
     rule: Rule,
-    start: tuple[Array, Array],
-    end: tuple[Array, Array],
+    start: Array,
+    end: tuple[Sparse, Array],
     area: float,
     fresh: bool = False,
     jumped: bool = False,
@@ -96,8 +95,10 @@ def after_step(
         Length; zero is a jump, which is quasi-static: its work is stored. [s]
     rule : Rule
         How pressure is taken to run within the step.
-    start, end : pair of ndarray, shape (nx, ny)
-        Pressure [Pa] and its displacement at unit compliance [Pa m] at both ends.
+    start : ndarray, shape (nx, ny)
+        Displacement at unit compliance at its start. [Pa m]
+    end : Sparse, and ndarray, shape (nx, ny)
+        Pressure at its end [Pa], and its displacement at unit compliance [Pa m].
     area : float
         Of a cell. [m2]
     fresh : bool
@@ -117,23 +118,21 @@ def after_step(
     time, what that dissipates is the work of the mean pressure on its change, less what it stores: exact where the
     load or the approach is held.
     """
-    carried, threads = end[0].reshape(-1), threads_of(end[0].size)
-    cells = cells_where(lambda part: carried[part] != 0, carried.size, threads)
-    pressure = carried.take(cells)
-    both = area * float(np.sum(pressure * start[1].reshape(-1).take(cells)))
-    last = area * float(np.sum(pressure * end[1].reshape(-1).take(cells)))
+    cells, pressure = end[0].not_zero()
+    both = area * float(np.sum(pressure * start.take(cells)))
+    last = area * float(np.sum(pressure * end[1].take(cells)))
     glassy = 0.5 * memory.factor * memory.material.glassy
     if step == 0:
         stored = energy.stored + glassy * (last - energy.pressure)
-        crossing = area * memory.products(state.modes, end, cells)
+        crossing = area * memory.products(state.modes, end[1], cells, pressure)
         return replace(energy, stored=stored, pressure=last, beside=crossing)
     weights = memory.factor * np.array(memory.material.compliances)
     first = energy.pressure
     own, earlier, before, after = (c[: weights.size] for c in memory.coefficients(state, step, rule))
-    ahead = area * memory.products(state.modes, end, cells)  # <p_n+1, z_n>
+    ahead = area * memory.products(state.modes, end[1], cells, pressure)  # <p_n+1, z_n>
     behind = np.zeros_like(ahead)
     if state.earlier is not None and np.any(earlier):
-        behind = area * memory.products(state.earlier, end, cells)
+        behind = area * memory.products(state.earlier, end[1], cells, pressure)
     # z_n+1 = own z_n + earlier z_n-1 + before p_n + after p_n+1
     beside = own * ahead + earlier * behind + before * both + after * last
     crossed = own * energy.own + earlier * energy.crossed + before * energy.beside + after * ahead

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.attempt import attempt, committed, step_of, trial_at_rest, with_cost
@@ -53,7 +52,7 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
         if companion is not None and not is_outgrown(scene, trial.instant):
             start = segment.value(0.0, companion.start)
             companion_trial = attempt(
-                scene, companion, segment.control, start, 0.0, "linear", guess=partial(beside, now=trial.instant)
+                scene, companion, segment.control, start, 0.0, "linear", guess=beside(trial.instant)
             )
             state = with_cost(state, companion_trial)
             companion = bare(committed(scene, companion, companion_trial))

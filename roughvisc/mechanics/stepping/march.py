@@ -15,6 +15,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roughvisc.mechanics.stepping.apart import closing_time
 from roughvisc.mechanics.stepping.attempt import (
     attempt,
@@ -26,7 +29,7 @@ from roughvisc.mechanics.stepping.attempt import (
     trial_at_rest,
     with_cost,
 )
-from roughvisc.mechanics.stepping.companion import bare, caught_up, compared, of_a_pair, sharpened, stating
+from roughvisc.mechanics.stepping.companion import bare, beside, caught_up, compared, of_a_pair, sharpened, stating
 from roughvisc.mechanics.stepping.control import (
     error_limit,
     estimate,
@@ -39,8 +42,10 @@ from roughvisc.mechanics.stepping.control import (
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.events import entering, jump, next_event
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
+
+Array = NDArray[np.float64]
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
 
@@ -85,17 +90,27 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
                 yield step
             del step  # its fields are not needed while the next one is computed
         else:
-            through = _through if segment.slide is None else through_slide
-            for step in through(scene, state, segment):
-                scene, state = step.scene, step.state
-                corner = state.segment < len(segments) and state.now.time == state.began
-                if not (corner and segments[state.segment].duration == 0 and scene.can_jump):
-                    yield step
-                del step
+            through = (_through if segment.slide is None else through_slide)(scene, state, segment)
+            del state  # nor are its
+            scene, state = yield from _without_jumps(through)
 
 
-def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
-    """Accepted steps through a segment; the last one has entered the next segment.
+def _without_jumps(steps: Through) -> Through:
+    """The same but for the left-hand state of a jump that the material follows at once."""
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as end:
+            return end.value
+        state, segments = step.state, step.scene.program.segments
+        corner = state.segment < len(segments) and state.now.time == state.began
+        if not (corner and segments[state.segment].duration == 0 and step.scene.can_jump):
+            yield step
+        del step, state
+
+
+def _through(scene: Scene, state: State, segment: Segment) -> Through:
+    """Accepted steps through a segment; the last one has entered the next segment. In the end scene and state.
 
     Steps go in pairs: the companion takes both as one, and the first is yielded when that has said how far it is off.
     """
@@ -126,7 +141,16 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
                 waiting.clear()
             continue
         alone = state.behind == 0 and trial.instant.time < end
-        judged = None if outgrown else _judged(scene, state, segment, trial, error, alone)
+        fresh = state.before is None and scene.time_step is None
+        judged = None
+        if not outgrown:
+            accepted, guess = _accepted(scene, state, trial, error), None
+            if state.companion is not None and not (scene.remembers and alone):
+                guess = beside(accepted.now, state.companion.now, state.before if state.behind else None)
+                if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
+                    state = base = _without_fields(state)
+            judged = _judged(scene, state, accepted, segment, trial, guess)
+            del accepted, guess
         if judged is None:  # the grid is too small for this step, or for the companion's
             while waiting:
                 yield waiting.pop()
@@ -135,7 +159,6 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             continue
         while waiting:
             yield of_a_pair(waiting.pop(), judged)
-        fresh = state.before is None and scene.time_step is None
         if alone and (fresh or (scene.remembers and scene.keeps(judged.shown.time))):
             waiting.append(judged)
             base = state if fresh else judged.state
@@ -144,6 +167,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
             yield judged
         state = judged.state
         del trial, judged  # their fields are not needed while the next step is computed
+    return scene, state
 
 
 def _closing(scene: Scene, state: State, segment: Segment, event: float) -> float:
@@ -192,23 +216,43 @@ def _shortened(
     return replace(start, pace=pace, iterations=state.iterations, convolutions=state.convolutions)
 
 
-def _judged(scene: Scene, state: State, segment: Segment, trial: Trial, error: float, alone: bool) -> Step | None:
-    """The accepted step, with what the companion says of it unless it waits for another; None if that outgrew."""
+def _without_fields(state: State) -> State:
+    """Its numbers, and its companion."""
+    now = replace(state.now, contact=NO_CONTACT, unit_displacement=None)
+    return replace(state, now=now, before=None, displacement=NO_FIELD, memory=None)
+
+
+def _accepted(scene: Scene, state: State, trial: Trial, error: float) -> State:
+    """State after a trial, whose companion is still behind."""
     time = trial.instant.time
     accepted = committed(scene, state, trial)
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
     accepted = replace(accepted, pace=state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
-    if state.unresolved:  # the first short step stands for the jump
-        accepted = restarted(scene, accepted, trial.length)
-    companion_trial = None
-    if scene.remembers and alone:
-        companion = bare(state) if state.companion is None else state.companion
-        accepted = replace(accepted, companion=companion, behind=1)
-    elif state.companion is not None:
-        found = caught_up(scene, accepted, segment, state.before if state.behind else None)
+    # the first short step stands for a jump
+    return restarted(scene, accepted, trial.length) if state.unresolved else accepted
+
+
+def _judged(
+    scene: Scene,
+    state: State,
+    accepted: State,
+    segment: Segment,
+    trial: Trial,
+    guess: tuple[Array, Array | None] | None,
+) -> Step | None:
+    """The accepted step, with what the companion says of it unless it waits for another; None if that outgrew.
+
+    ``guess`` is where the companion may be, None where it waits; of the state before, numbers are asked for else.
+    """
+    time, companion_trial = trial.instant.time, None
+    if guess is not None:
+        found = caught_up(scene, accepted, segment, guess)
         if found is None:
             return None
         accepted, companion_trial = found
+    elif scene.remembers and state.behind == 0 and time < scene.program.corners[state.segment + 1]:
+        companion = bare(state) if state.companion is None else state.companion
+        accepted = replace(accepted, companion=companion, behind=1)
     if time == scene.program.corners[state.segment + 1]:
         accepted = entering(scene, accepted)
     step = step_of(scene, accepted, trial)
@@ -216,7 +260,7 @@ def _judged(scene: Scene, state: State, segment: Segment, trial: Trial, error: f
     if companion_trial is None:
         return step
     assert state.companion is not None
-    step = compared(scene, step, companion_trial, state.companion.now.pressure, asked)
+    step = compared(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
         end = scene.program.corners[state.segment + 1]
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
@@ -233,7 +277,7 @@ def _touched(scene: Scene, state: State, time: float) -> float:
 def _carried_apart(scene: Scene, state: State, segment: Segment, until: float, end: float) -> Step:
     """One exact step without contact; the companion takes the same."""
     while state.behind:
-        found = caught_up(scene, state, segment, None)
+        found = caught_up(scene, state, segment, beside(state.now))
         if found is None:
             scene, state = enlarged(scene, state, state.now.time)
         else:
@@ -245,7 +289,7 @@ def _carried_apart(scene: Scene, state: State, segment: Segment, until: float, e
     companion_trial = None
     if carried.companion is not None:
         apart = carried.companion.now.force == 0
-        found = caught_up(scene, carried, segment, None, "linear" if apart else "right")
+        found = caught_up(scene, carried, segment, beside(carried.now), "linear" if apart else "right")
         if found is None:  # the companion is in contact, beyond the grid
             return _carried_apart(*enlarged(scene, state, until), segment, until, end)
         carried, companion_trial = found

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any
 
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
+from roughvisc.mechanics.hereditary.exponentials import Memory, Modes, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
@@ -32,6 +33,7 @@ Mask = NDArray[np.bool_]
 _SOFT = 0.1
 #: In place of a field that is not held.
 NO_FIELD = np.zeros((0, 0))
+NO_CONTACT = Sparse.whole(NO_FIELD)
 
 
 @dataclass(frozen=True)
@@ -155,8 +157,8 @@ class Instant:
     ----------
     time : float
         [s]
-    pressure : ndarray, shape (nx, ny)
-        [Pa]
+    contact : Sparse
+        The cells in contact and their pressure. [Pa]
     force, approach : float
         [N], [m]
     unit_displacement : ndarray, shape (nx, ny), or None
@@ -164,10 +166,15 @@ class Instant:
     """
 
     time: float
-    pressure: Array
+    contact: Sparse
     force: float
     approach: float
     unit_displacement: Array | None = None
+
+    @property
+    def pressure(self) -> Array:
+        """Pressure on all cells, not to be changed; had anew each time where the contact is sparse. [Pa]"""
+        return self.contact.field()
 
 
 @dataclass(frozen=True)
@@ -233,28 +240,36 @@ class State:
     iterations: int = 0
     convolutions: int = 0
 
-    def extrapolated(self, length: float) -> Array:
-        """Pressure a step ahead by the last two, cut at zero; the last one where there is no other. [Pa]"""
-        if self.before is None or length == 0:
-            return self.now.pressure
-        return _beyond(self.before.pressure, self.now.pressure, self._ratio(length), 1.0)[0]
+    def extrapolated(self, length: float) -> tuple[Array, bool]:
+        """Pressure a step ahead by the last two, cut at zero, and whether it was; the last where there is no other.
 
-    def first_guess(self, length: float, scale: float) -> tuple[Array, Array | None]:
-        """The extrapolated pressure and its unit displacement, both scaled, in memory of their own.
+        In memory of its own. [Pa]
+        """
+        now, before = self.now.contact, self.before
+        if before is None or length == 0:
+            return now.times(1.0), False
+        ratio = self._ratio(length)
+        pressure = now.times(1 + ratio)
+        before.contact.add_to(pressure, -ratio)
+        return pressure, passes.cut(pressure, now.threads)
+
+    def first_guess(self, length: float) -> tuple[Array, Array | None]:
+        """The extrapolated pressure and its unit displacement, in memory of their own.
 
         The latter is None where it would cost a convolution: where pressure is cut at zero.
         """
-        now, before = self.now, self.before
-        if before is None or length == 0:
-            threads = threads_of(now.pressure.size)
-            known = now.unit_displacement
-            pressure = passes.times(now.pressure, scale, threads)
-            return pressure, None if known is None else passes.times(known, scale, threads)
-        ratio = self._ratio(length)
-        pressure, was_cut = _beyond(before.pressure, now.pressure, ratio, scale)
-        if was_cut or now.unit_displacement is None or before.unit_displacement is None:
+        pressure, was_cut = self.extrapolated(length)
+        known, before = self.now.unit_displacement, self.before
+        if was_cut or known is None:
             return pressure, None
-        return pressure, _beyond(before.unit_displacement, now.unit_displacement, ratio, scale, cut=False)[0]
+        threads = threads_of(known.size)
+        if before is None or length == 0:
+            return pressure, passes.times(known, 1.0, threads)
+        if before.unit_displacement is None:
+            return pressure, None
+        ratio = self._ratio(length)
+        terms = [(1 + ratio, known), (-ratio, before.unit_displacement)]
+        return pressure, passes.weighted(terms, empty(known.shape), threads)
 
     def _ratio(self, length: float) -> float:
         """Of a step's length to that of the last one."""
@@ -262,22 +277,15 @@ class State:
         return length / (self.now.time - self.before.time)
 
 
-def _beyond(before: Array, now: Array, ratio: float, scale: float, *, cut: bool = True) -> tuple[Array, bool]:
-    """``scale * (now + ratio * (now - before))``, cut at zero if that is said, and whether anything was cut."""
-    found = empty(now.shape)
-    first, last, there = before.reshape(-1), now.reshape(-1), found.reshape(-1)
+def total_displacement(scene: Scene, state: State, now: Instant, length: float = 0.0, rule: Rule = "right") -> Sum:
+    """Displacement of the half-space at an instant that is a step ahead of a state, or is its own. [m]
 
-    def work(part: slice) -> bool:
-        here = np.subtract(last[part], first[part], out=there[part])
-        here *= ratio
-        here += last[part]
-        here *= scale
-        below = cut and bool(here.min(initial=0.0) < 0)
-        if below:
-            np.maximum(here, 0, out=here)
-        return below
-
-    return found, any(passes.of_parts(work, found.size, threads_of(found.size)))
+    The memory must be one of displacements.
+    """
+    assert isinstance(scene.memory, Modes)
+    assert now.unit_displacement is not None
+    alpha, terms = scene.memory.terms(state.memory, length, rule)
+    return Sum((*terms, (alpha, now.unit_displacement)))
 
 
 @dataclass(frozen=True)
@@ -288,7 +296,7 @@ class Step:
     ----------
     shown : Instant
         What to report: the state's present instant, its pressure resolved where the material cannot jump.
-    displacement : ndarray, shape (nx, ny)
+    moved : Sum
         Total displacement of the half-space then. [m]
     effective : ndarray or None
         Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
@@ -313,7 +321,7 @@ class Step:
     """
 
     shown: Instant
-    displacement: Array
+    moved: Sum
     effective: Array | None
     level: float
     control: Control
@@ -324,6 +332,16 @@ class Step:
     converged: bool
     scene: Scene
     state: State
+
+    @property
+    def displacement(self) -> Array:
+        """The same on all cells, not to be changed; had anew each time where it is no field of its own. [m]"""
+        return self.moved.field()
+
+    def with_fields(self) -> Step:
+        """The same with all its fields at hand, for what asks for them again and again."""
+        shown = replace(self.shown, contact=Sparse.whole(self.shown.pressure))
+        return replace(self, shown=shown, moved=Sum.whole(self.displacement))
 
     @property
     def time_error(self) -> float:
@@ -348,10 +366,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step that was computed and is not yet accepted."""
+    """A step that was computed and is not yet accepted; the total displacement is None where the state will tell."""
 
     instant: Instant
-    displacement: Array
+    displacement: Array | None
     effective: Array | None
     length: float
     rule: Rule
@@ -367,3 +385,7 @@ class Trial:
     def apart(self) -> bool:
         """Whether the surfaces are apart."""
         return self.instant.force == 0
+
+
+#: Steps through a part of a program, and the scene and the state in which they end.
+Through = Generator[Step, None, tuple[Scene, State]]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.stepping.attempt import work_between
@@ -155,10 +156,12 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     if any(s.control != "load" for s in scene.program.segments) or scene.present is not None:
         raise InputError("method='seed' treats given loads and complete surfaces only; use method='fast'")
     largest_step = scene.time_step or scene.program.duration / 100
-    state = State(Instant(0.0, np.zeros_like(scene.gap), 0.0, 0.0), np.zeros_like(scene.gap), None)
+    state = State(Instant(0.0, Sparse.whole(np.zeros_like(scene.gap)), 0.0, 0.0), np.zeros_like(scene.gap), None)
     if scene.program.segments and scene.program.segments[0].duration > 0:
         nothing, unknown = np.zeros_like(scene.gap), math.nan
-        yield Step(state.now, nothing, None, 0.0, "load", True, unknown, unknown, UNKNOWN, True, scene, state)
+        yield Step(
+            state.now, Sum.whole(nothing), None, 0.0, "load", True, unknown, unknown, UNKNOWN, True, scene, state
+        )
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
         state = replace(state, segment=index, began=state.now.time, start=state.now.force)
@@ -198,10 +201,11 @@ def _advance(
         solution = SeedSolution(np.zeros_like(gap), np.zeros_like(gap), float(np.min(gap)), 0, 0, True)
     else:
         solution = conjugate_gradients(halfspace, gap, glassy, load, epsilon=1e-2 * scene.tolerance)
-    if at_edge(scene, solution.pressure):
+    contact = Sparse.whole(solution.pressure)
+    if at_edge(scene, contact):
         raise edge_error(scene, time)
     increments.append((time, solution.pressure - state.now.pressure))
-    now = Instant(time, solution.pressure, load, solution.level)
+    now = Instant(time, contact, load, solution.level)
     displacement = past + solution.displacement
     state = replace(
         state,
@@ -215,7 +219,7 @@ def _advance(
     )
     return state, Step(
         shown=now,
-        displacement=displacement,
+        moved=Sum.whole(displacement),
         effective=None,
         level=solution.level,
         control="load",

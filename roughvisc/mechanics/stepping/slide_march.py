@@ -8,19 +8,18 @@ cells at once, and tells what the length of the steps leaves unknown: that falls
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, step_of, with_cost
 from roughvisc.mechanics.stepping.companion import bare, beside, compared, of_a_pair, stating
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.events import entering
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -30,8 +29,8 @@ _SHARE = 0.3
 _COMPANION_SHARE = 2.5
 
 
-def through_slide(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
-    """Accepted steps through a slide; the last one has entered the next segment.
+def through_slide(scene: Scene, state: State, segment: Segment) -> Through:
+    """Accepted steps through a slide; the last one has entered the next segment. In the end scene and state.
 
     Parameters
     ----------
@@ -62,13 +61,14 @@ def through_slide(scene: Scene, state: State, segment: Segment) -> Iterator[Step
         else:
             yield step
         del step
+    return scene, state
 
 
 def _further(scene: Scene, state: State, segment: Segment, arrival: float, length: float) -> Step:
     """The step over the next cell, with what the companion says of it where it has come along."""
     assert segment.slide is not None
     end = scene.program.corners[state.segment + 1]
-    guess = partial(beside, now=state.now)
+    guess = beside(state.now)
     trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, guess)
     accepted = _accepted(scene, with_cost(state, trial), segment.slide, trial, 1)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
@@ -83,7 +83,7 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     if companion_trial is None or earlier is None:
         return step
     asked = scene.keeps(arrival) or (state.behind > 0 and scene.keeps(state.now.time))
-    entered = _rolled(earlier.now.pressure, segment.slide, state.behind + 1)
+    entered = Sparse.of(_rolled(earlier.now.pressure, segment.slide, state.behind + 1))
     step = compared(scene, step, companion_trial, entered, asked)
     step = replace(step, state=replace(step.state, slid=_sharpened(step, state.uncertainty)))
     # after a single step the companion knows no more than before
@@ -98,7 +98,7 @@ def _tried(
     length: float,
     cells: int,
     share: float,
-    guess: Callable[[float], tuple[np.ndarray, np.ndarray | None]],
+    guess: tuple[np.ndarray, np.ndarray | None],
 ) -> Trial:
     """A step over so many cells, each of which takes a length. [s]"""
     assert segment.slide is not None
@@ -123,7 +123,7 @@ def _followed(scene: Scene, accepted: State, state: State, segment: Segment, len
     assert segment.slide is not None
     cells = state.behind + 1
     together = state.before if state.behind else None
-    guess = partial(beside, now=accepted.now, companion=companion.now, together=together)
+    guess = beside(accepted.now, companion.now, together)
     share = _COMPANION_SHARE * _SHARE
     trial = _tried(scene, companion, segment, accepted.now.time, length, cells, share, guess)
     followed = bare(_accepted(scene, companion, segment.slide, trial, cells))
@@ -150,7 +150,8 @@ def _moved(scene: Scene, state: State, slide: Slide, cells: int) -> State:
 
     def moved(one: Instant) -> Instant:
         displacement = None if one.unit_displacement is None else _rolled(one.unit_displacement, slide, cells)
-        return replace(one, pressure=_rolled(one.pressure, slide, cells), unit_displacement=displacement)
+        contact = Sparse.of(_rolled(one.pressure, slide, cells))
+        return replace(one, contact=contact, unit_displacement=displacement)
 
     return replace(
         state,

@@ -68,6 +68,7 @@ class Rows:
 
     def add(self, step: Step, converged: bool, wall_time: float, kept: bool = True) -> None:
         """Take up an accepted step; ``converged``: all of those since the last one that is kept."""
+        step = step.with_fields()
         shown, window = step.shown, self._ground.window
         contact = shown.pressure > 0
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area

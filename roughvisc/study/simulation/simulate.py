@@ -283,6 +283,8 @@ def _march(
         report(step.shown.time, scene.program.duration)
         if keeper is not None and settings.method == "fast":
             keeper.passed(reached)
+        else:
+            reached = replace(reached, state=None)
         del step  # its fields are not needed while the next one is computed
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
@@ -35,7 +36,7 @@ log = logging.getLogger("roughvisc")
 _SHARE = 0.05
 #: Between two libraries in the account of what a run was computed with.
 _THEN = "; then "
-_KINDS = (State, Pace, Slid, Instant, Uncertainty, Energy, ModesState, HistoryState, Block)
+_KINDS = (State, Pace, Slid, Instant, Sparse, Uncertainty, Energy, ModesState, HistoryState, Block)
 _TYPES = {kind.__name__: kind for kind in _KINDS}
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
@@ -189,9 +190,10 @@ def test_area_in_doubt__is_counted_cell_by_cell():
     fine = np.array([[4.0, 4.0, 4.0, 4.0], [4.0, 4.0, 4.0, 0.0], [0.0] * 4])
     coarse = np.array([[4.0, 3.0, 0.0, 7.9], [8.1, 4.0, 0.0, 0.5], [0.0] * 4])
     level, moved = 0.05, np.array([[0.0] * 4, [0.0] * 4, [0.02, 0.06, 0.2, 0.06]])
-    state = State(Instant(1.0, fine, 1.0, level, nothing), nothing, None)
-    step = Step(state.now, nothing, None, level, "load", True, 0.0, 0.0, Uncertainty(), True, scene, state)
-    found = companion._undecided(scene, step, Instant(1.0, coarse, 1.0, level + 0.01), 0.01 - moved)
+    state = State(Instant(1.0, Sparse.whole(fine), 1.0, level, nothing), nothing, None)
+    step = Step(state.now, Sum.whole(nothing), None, level, "load", True, 0.0, 0.0, Uncertainty(), True, scene, state)
+    other = Instant(1.0, Sparse.whole(coarse), 1.0, level + 0.01)
+    found = companion._undecided(scene, step, other, Sum.whole(0.01 - moved))
     # in contact, doubtful: nothing is left (0, 2) and (1, 2), more than twice as much (1, 0)
     # out of it: the companion touches (1, 3); as near as both differ (2, 1), not so (2, 0) and (2, 2); absent (2, 3)
     assert found == (3, 2)

@@ -11,6 +11,7 @@ from scipy.integrate import quad
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
@@ -47,7 +48,8 @@ def carried(material, fields, lengths, rule, acts_on="displacement", boundary="f
     pairs = [(field, halfspace.displacement(field)) for field in fields]
     for number, (length, start, end) in enumerate(zip(lengths, *zip(*pairwise(pairs), strict=True), strict=True)):
         now = "euler" if rule == "bdf2" and number == 0 else rule
-        found = energy.after_step(found, memory, state, length, now, start, end, AREA, fresh=fresh)
+        held = Sparse.whole(end[0]), end[1]
+        found = energy.after_step(found, memory, state, length, now, start[1], held, AREA, fresh=fresh)
         kept = {"displacement": end[1], "pressure": end[0], "both": np.stack(end)}[acts_on]
         state = memory.advance(state, length, now, kept)
     return found
@@ -148,7 +150,7 @@ def test_step_that_stands_for_a_jump__works_as_a_held_load():
     halfspace, memory = HalfSpace(SHAPE, SPACING), Modes(material)
     rest, pressure = pressures(1)
     state = memory.start(SHAPE)
-    ends = (rest, rest), (pressure, halfspace.displacement(pressure))
+    ends = rest, (Sparse.whole(pressure), halfspace.displacement(pressure))
     found = energy.after_step(
         energy.at_rest(memory), memory, state, step, "euler", *ends, AREA, fresh=True, jumped=True
     )

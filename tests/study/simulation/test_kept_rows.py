@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
@@ -154,11 +155,11 @@ class Kept:
         pressure, source = rng.random(shape) * (rng.random(shape) < part), 1e-3 * rng.random(shape)
         if self.scene.present is not None:
             pressure, source = pressure * self.scene.present, source * self.scene.present
-        shown = Instant(time, pressure, force, 0.25)
+        shown = Instant(time, Sparse.of(pressure), force, 0.25)
         state = State(shown, pressure, None, largest_force=1.0, iterations=iterations, convolutions=2 * iterations)
         step = Step(
-            shown, self.scene.halfspace.displacement(source), source, level, "load", True, 0.0, 0.0, Uncertainty(),
-            converged, self.scene, state,
+            shown, Sum.whole(self.scene.halfspace.displacement(source)), source, level, "load", True, 0.0, 0.0,
+            Uncertainty(), converged, self.scene, state,
         )  # fmt: skip
         self.rows.add(step, converged, 7.0)
         whole = np.zeros((2, *window.domain))
@@ -283,9 +284,11 @@ def test_corrected_area__of_one_cell_is_less_by_its_four_faces():
     kept = Kept(BALL, edge="accept")
     pressure = np.zeros(BALL.shape)
     pressure[4, 7] = 1.0
-    shown = Instant(0.0, pressure, 1.0, 0.1)
+    shown = Instant(0.0, Sparse.of(pressure), 1.0, 0.1)
     state = State(shown, pressure, None)
-    step = Step(shown, 0 * pressure, None, 0.0, "load", True, 0.0, 0.0, Uncertainty(), True, kept.scene, state)
+    step = Step(
+        shown, Sum.whole(0 * pressure), None, 0.0, "load", True, 0.0, 0.0, Uncertainty(), True, kept.scene, state
+    )
     kept.rows.add(step, True, 0.0)
     ds = kept.rows.dataset()
     assert ds.contact_area_corrected[0] == pytest.approx(ds.contact_area[0] * (1 - 4 * 0.088))
@@ -297,10 +300,11 @@ def test_rows__keep_nothing_of_larger_arrays():
     ground, store = Ground(BALL), RowsInMemory()
     scene = Scene(HalfSpace(BALL.shape, ground.spacing), ground.gap, MATERIAL, Modes(MATERIAL), PROGRAM)
     pair = np.ones((2, *BALL.shape))
-    shown = Instant(0.0, pair[0], 1.0, 0.1)
+    shown = Instant(0.0, Sparse.of(pair[0]), 1.0, 0.1)
     own = np.ones(BALL.shape)
     step = Step(
-        shown, own, pair[1], 0.0, "load", True, 0.0, 0.0, Uncertainty(), True, scene, State(shown, own, None)
+        shown, Sum.whole(own), pair[1], 0.0, "load", True, 0.0, 0.0, Uncertainty(), True, scene,
+        State(shown, own, None),
     )  # fmt: skip
     Rows(ground, settings, store).add(step, True, 0.0)
     kept = store.arrays(0)

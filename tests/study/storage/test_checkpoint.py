@@ -20,6 +20,7 @@ import pytest
 import xarray as xr
 
 from roughvisc.errors import InUseError
+from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
@@ -220,7 +221,7 @@ def test_direct__keeps_every_pressure(whole, tmp_path):
 
 def test_checkpoint__holds_the_state_exactly(tmp_path):
     strange = np.array([[0.1, -0.0, np.inf], [np.nan, 5e-324, 1 / 3]])
-    now = Instant(0.1 + 0.2, strange.T, np.float64(1e-310), -0.0)
+    now = Instant(0.1 + 0.2, Sparse.of(strange.T), np.float64(1e-310), -0.0)
     modes = ModesState(np.zeros((0, 2, 3)), strange, None, 1 / 3)
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
@@ -253,7 +254,8 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
 def after_steps(count):
     """How far a run has come after so many steps of a second."""
     nothing = np.zeros((3, 2))
-    return [Reached(State(Instant(float(n), nothing, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
+    at_rest = Sparse.of(nothing)
+    return [Reached(State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
 
 
 def last_saved(folder):

@@ -36,7 +36,7 @@ def test_expected_errors__shrink_with_the_grid_down_to_the_tolerance():
 def scaled_displacement(monkeypatch):
     """A kernel one per cent too soft."""
     sound = HalfSpace.displacement
-    monkeypatch.setattr(HalfSpace, "displacement", lambda self, p: 1.01 * sound(self, p))
+    monkeypatch.setattr(HalfSpace, "displacement", lambda self, *given: 1.01 * sound(self, *given))
 
 
 def forgetful_recursion(monkeypatch):
