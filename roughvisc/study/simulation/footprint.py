@@ -7,18 +7,20 @@ from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
 from roughvisc.study.statement.settings import Settings
 
 #: What the interpreter and the libraries take, measured. [byte]
-PROCESS = 200e6
+PROCESS = 210e6
 #: Fields of the surface: heights and gaps, and the marks of present cells.
 _SURFACE = 2.1
 #: Fields of a march without a past, and what a contact on all cells adds to them.
-_ELASTIC, _IN_CONTACT = 8.1, 4.3
+_ELASTIC, _IN_CONTACT = 8.5, 9.0
 #: Spectrum, symbols and what a transform gives.
-_TRANSFORMS = {"periodic": 2.0, "free": 5.4}
+_TRANSFORMS = {"periodic": 2.0, "free": 6.0}
 #: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
-#: and after a step.
-_COMPANION, _EXPONENTIAL = 5.25, 5.0
+#: and after a step, and in the checkpoint that may be asked for.
+_COMPANION, _EXPONENTIAL = 1.5, 5.2
+#: What the direct history adds beside the companion: total displacements and effective pressures.
+_DIRECT = 6.5
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
-_SHOWN = 7.0
+_SHOWN = 3.0
 #: Fields of the state while the file is written, and frames that are in memory then.
 _STATE, _FRAMES_TOGETHER = 6.0, 8
 #: Rows wait for the disk until they take more. [byte]
@@ -81,7 +83,7 @@ def march_bytes(
                 solved += _SHOWN + _EXPONENTIAL * modes
     elif isinstance(memory, History):
         past = 1.5 * history_bytes(contact * cells, steps)
-        solved += _COMPANION
+        solved += _COMPANION + _DIRECT
     frames = rows * len(settings.fields) * field
     surface = _SURFACE * field + past
     if in_memory:

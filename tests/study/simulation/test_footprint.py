@@ -5,6 +5,7 @@ import tracemalloc
 
 import pytest
 
+from roughvisc.mechanics.fields import passes, reuse
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.simulation import simulate as simulate_module
@@ -43,7 +44,9 @@ times = 2
 """
 ELASTIC = {"material": {"model": "elastic", "shear_modulus": 3e6}, "surface.shape": [400, 360]}
 THREE = {"model": "prony", "glassy": 3e-7, "compliances": [1e-7, 2e-7, 1e-7], "times": [0.01, 0.05, 0.3]}
-FREE = {"solve.boundary": "free", "solve.edge": "accept"}
+DIRECT = {"solve.memory": "direct", "surface.shape": [400, 360]}
+FULL = {"program": [{"pressure": "3 MPa", "over": "10 ms"}, {"hold": "0.5 s"}]}
+FREE = {"surface.shape": [400, 360], "solve.boundary": "free", "solve.edge": "accept"}
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +60,14 @@ def study(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "changes", [ELASTIC, {}, *(pytest.param(one, marks=pytest.mark.long) for one in (FREE, {"material": THREE}))]
+    "changes",
+    [ELASTIC, {}, *(pytest.param(one, marks=pytest.mark.long) for one in (FREE, {"material": THREE}, DIRECT, FULL))],
 )
 def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     monkeypatch.setattr(simulate_module, "expect_arrays", lambda size: None)  # is never touched
+    # as on a wide grid: by parts that are a small part of it, in memory that is used again
+    monkeypatch.setattr(passes, "_PART", 1 << 12)
+    monkeypatch.setattr(reuse, "_FROM", 1 << 17)
     case, folder = vary(study[0], changes), study[1]
     gc.collect()
     tracemalloc.start()
@@ -71,9 +78,10 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
         tracemalloc.stop()
     with open_result(path) as ds:
         contact, rows, cells = float(ds.contact_fraction.max()), ds.sizes["time"], ds.sizes["x"] * ds.sizes["y"]
+        steps = ds.sizes.get("step", 0)
     settings = case.solving()
     memory = choose_memory(case.material(), **memory_wanted(case.program().on_area(1e-6), settings)).memory
-    stated = march_bytes(settings, cells, memory, contact=contact, rows=rows)
+    stated = march_bytes(settings, cells, memory, contact=contact, rows=rows, steps=steps)
     assert stated == pytest.approx(taken, rel=0.1), (
         f"{taken / 8 / cells:.1f} fields taken, {stated / 8 / cells:.1f} stated"
     )
