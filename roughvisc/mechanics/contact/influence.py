@@ -42,6 +42,7 @@ class Influence:
         self.scale = scale
         self.convolutions = 0
         self.work = empty(halfspace.shape)
+        self._halves: NDArray[np.float32] = self.work.reshape(-1).view(np.float32).reshape(2, *halfspace.shape)
 
     def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
         """Values of a field at some cells, as flat indices."""
@@ -70,7 +71,7 @@ class Influence:
         """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
         self.convolutions += 1
         field, size = self._spread(displacement, cells)
-        found = self.halfspace.approximate_inverse(field, out=self._single(1))
+        found = self.halfspace.approximate_inverse(field, out=self._halves[1])
         return passes.taken(found, cells, self.threads, size)
 
     def approximate_pressure_field(self, displacement: Single) -> Array:
@@ -95,10 +96,6 @@ class Influence:
     def _spread(self, values: Array, cells: Cells) -> tuple[Single, float]:
         """Values of some cells over the whole grid, zero elsewhere, over the largest; and that: single underflows."""
         size = passes.largest(values, self.threads) or 1.0
-        field = self._single(0)
+        field = self._halves[0]
         passes.spread(field, cells, values, self.threads, size)
         return field, size
-
-    def _single(self, half: int) -> Single:
-        """One half of the work array, as a field of single precision."""
-        return self.work.reshape(-1).view(np.float32).reshape(2, *self.work.shape)[half]

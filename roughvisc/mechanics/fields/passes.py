@@ -40,12 +40,9 @@ def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int
 def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, threads: int) -> list[Found]:
     """What some work gives of each part of a field of some size, and of those of some cells that lie in it."""
 
-    def of_part(part: slice) -> Found:
-        if part.stop - part.start == size:
-            return work(part, slice(0, cells.size))
-        return work(part, slice(*cells.searchsorted((part.start, part.stop))))
-
-    return of_parts(of_part, size, threads)
+    if size <= _PART:
+        return [work(slice(0, size), slice(0, cells.size))]
+    return of_parts(lambda part: work(part, slice(*cells.searchsorted((part.start, part.stop)))), size, threads)
 
 
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
