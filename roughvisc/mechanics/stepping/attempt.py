@@ -16,7 +16,7 @@ from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Instant, Scene, State, Step, Trial, total_displacement
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trial
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def attempt(
     length: float,
     rule: Rule,
     share: float = 1.0,
-    guess: tuple[Array, Array | None] | None = None,
+    guess: Guess | None = None,
     stated: bool = False,
 ) -> Trial:
     """Contact state a step ahead, where the load or the approach has a given value.
@@ -143,13 +143,14 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
     spent = energy_after(scene, state, trial)
     if spent is None:
         assert trial.displacement is not None
-        work = state.work + work_between(scene, state, now.pressure, trial.displacement, jumped=state.unresolved)
+        displacement = trial.displacement
+        work = state.work + work_between(scene, state, now.pressure, displacement, jumped=state.unresolved)
     else:
-        work = spent.stored + spent.dissipated
+        displacement, work = NO_FIELD, spent.stored + spent.dissipated
     return replace(
         state,
         now=now,
-        displacement=NO_FIELD if spent is not None or trial.displacement is None else trial.displacement,
+        displacement=displacement,
         before=state.now if trial.length > 0 else None,
         memory=memory,
         largest_force=max(state.largest_force, now.force),
@@ -231,10 +232,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
         shown = attempt(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
         state = with_cost(state, shown)
         converged = converged and shown.converged
-        if shown.displacement is None:
-            moved = total_displacement(scene, alone, shown.instant, shown.length, shown.rule)
-        else:
-            moved = Sum.whole(shown.displacement)
+        moved = displacement_after(scene, alone, shown, shown.length, shown.rule)
         contact, level = shown.instant.contact, shown.instant.approach
     return Step(
         shown=replace(state.now, contact=contact),
@@ -252,11 +250,14 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     )
 
 
-def displacement_after(scene: Scene, state: State, trial: Trial) -> Sum:
-    """Total displacement after a trial that has led to a state. [m]"""
-    if trial.displacement is None:
-        return total_displacement(scene, state, state.now)
-    return Sum.whole(trial.displacement)
+def displacement_after(scene: Scene, state: State, trial: Trial, length: float = 0.0, rule: Rule = "right") -> Sum:
+    """Total displacement after a trial that has led to a state, or leads so much farther. [m], [s]"""
+    if trial.displacement is not None:
+        return Sum.whole(trial.displacement)
+    assert isinstance(scene.memory, Modes)
+    assert trial.instant.unit_displacement is not None
+    alpha, terms = scene.memory.terms(state.memory, length, rule)
+    return Sum((*terms, (alpha, trial.instant.unit_displacement)))
 
 
 def segment_number(state: State) -> int:

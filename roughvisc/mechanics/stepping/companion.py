@@ -27,7 +27,7 @@ from roughvisc.mechanics.stepping.attempt import (
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.domain import is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_CONTACT, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_CONTACT, Guess, Instant, Scene, State, Step, Trial
 from roughvisc.mechanics.stepping.tangential import tangential_force
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -55,9 +55,7 @@ def bare(state: State) -> State:
     return replace(state, before=before)
 
 
-def beside(
-    now: Instant, companion: Instant | None = None, together: Instant | None = None
-) -> tuple[Array, Array | None]:
+def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
     """Where the companion of a state may be: as far from it as when both were last at the same instant.
 
     Parameters
@@ -195,7 +193,7 @@ def caught_up(
     scene: Scene,
     state: State,
     segment: Segment,
-    guess: tuple[Array, Array | None],
+    guess: Guess,
     rule: Rule | None = None,
 ) -> tuple[State, Trial] | None:
     """State whose companion has come to the same instant by one step, and that step; None if it outgrew the grid.

@@ -15,9 +15,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roughvisc.mechanics.stepping.apart import closing_time
 from roughvisc.mechanics.stepping.attempt import (
     attempt,
@@ -42,10 +39,8 @@ from roughvisc.mechanics.stepping.control import (
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.events import entering, jump, next_event
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
-
-Array = NDArray[np.float64]
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
 
@@ -139,6 +134,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Through:
             state = _shortened(scene, start, state, segment, trial, error, length)
             if unjudged:
                 waiting.clear()
+            del trial
             continue
         alone = state.behind == 0 and trial.instant.time < end
         fresh = state.before is None and scene.time_step is None
@@ -238,7 +234,7 @@ def _judged(
     accepted: State,
     segment: Segment,
     trial: Trial,
-    guess: tuple[Array, Array | None] | None,
+    guess: Guess | None,
 ) -> Step | None:
     """The accepted step, with what the companion says of it unless it waits for another; None if that outgrew.
 

@@ -17,7 +17,7 @@ from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.hereditary.exponentials import Memory, Modes, Rule, mean_compliance, old_weight
+from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
@@ -31,6 +31,8 @@ Mask = NDArray[np.bool_]
 # A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
 # shows its pressure through one discarded short solve.
 _SOFT = 0.1
+#: A pressure near the one sought, and its displacement at unit compliance where that is known. [Pa], [Pa m]
+Guess = tuple[Array, Array | None]
 #: In place of a field that is not held.
 NO_FIELD = np.zeros((0, 0))
 NO_CONTACT = Sparse.whole(NO_FIELD)
@@ -253,7 +255,7 @@ class State:
         before.contact.add_to(pressure, -ratio)
         return pressure, passes.cut(pressure, now.threads)
 
-    def first_guess(self, length: float) -> tuple[Array, Array | None]:
+    def first_guess(self, length: float) -> Guess:
         """The extrapolated pressure and its unit displacement, in memory of their own.
 
         The latter is None where it would cost a convolution: where pressure is cut at zero.
@@ -275,17 +277,6 @@ class State:
         """Of a step's length to that of the last one."""
         assert self.before is not None
         return length / (self.now.time - self.before.time)
-
-
-def total_displacement(scene: Scene, state: State, now: Instant, length: float = 0.0, rule: Rule = "right") -> Sum:
-    """Displacement of the half-space at an instant that is a step ahead of a state, or is its own. [m]
-
-    The memory must be one of displacements.
-    """
-    assert isinstance(scene.memory, Modes)
-    assert now.unit_displacement is not None
-    alpha, terms = scene.memory.terms(state.memory, length, rule)
-    return Sum((*terms, (alpha, now.unit_displacement)))
 
 
 @dataclass(frozen=True)
@@ -366,7 +357,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step that was computed and is not yet accepted; the total displacement is None where the state will tell."""
+    """A step that is not yet accepted; its total displacement is None where the memory will tell it."""
 
     instant: Instant
     displacement: Array | None

@@ -19,7 +19,7 @@ from roughvisc.mechanics.stepping.companion import bare, beside, compared, of_a_
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.events import entering
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import Guess, Instant, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -98,7 +98,7 @@ def _tried(
     length: float,
     cells: int,
     share: float,
-    guess: tuple[np.ndarray, np.ndarray | None],
+    guess: Guess,
 ) -> Trial:
     """A step over so many cells, each of which takes a length. [s]"""
     assert segment.slide is not None

@@ -5,7 +5,9 @@ import tracemalloc
 
 import pytest
 
+import roughvisc as rv
 from roughvisc.mechanics.fields import passes, reuse
+from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.simulation import simulate as simulate_module
@@ -85,3 +87,35 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     assert stated == pytest.approx(taken, rel=0.1), (
         f"{taken / 8 / cells:.1f} fields taken, {stated / 8 / cells:.1f} stated"
     )
+
+
+@pytest.mark.parametrize(("over", "fields"), [(0.0, 10), (0.01, 12)])
+def test_march_with_one_exponential__holds_few_fields_beside_gap_and_heights(over, fields, monkeypatch):
+    """Counted by hand: the contact solver's gap, pressure, displacement, response and work array; displacements of two
+    instants of the march and of one of its companion; what both remember. Pressures are held by their cells. While a
+    step after a corner waits for its companion, what it remembers and the displacement before it are held too."""
+    shape, held, most = (161, 144), [0], [0]
+    monkeypatch.setattr(reuse, "_FROM", 1)
+    monkeypatch.setattr(passes, "_PART", 1 << 10)
+    monkeypatch.setattr(operator, "_BLOCKED", 1)
+    lend, take_back = reuse._Kept.lend, reuse._Kept.take_back
+
+    def lent(self, size):
+        held[0] += size == 8 * shape[0] * shape[1]
+        most[0] = max(most[0], held[0])
+        return lend(self, size)
+
+    def taken_back(self, memory):
+        held[0] -= memory.size == 8 * shape[0] * shape[1]
+        take_back(self, memory)
+
+    monkeypatch.setattr(reuse._Kept, "lend", lent)
+    monkeypatch.setattr(reuse._Kept, "take_back", taken_back)
+    surface = rv.self_affine(1e-3, shape, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=5e-5, seed=1)
+    material = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
+    program = rv.Program().pressure(6e3, over=over).hold(0.5)
+    settings = {"boundary": "periodic", "tolerance": 1e-2, "times": [0.5 + over], "fields": (), "progress": False}
+    rv.simulate(surface, material, program, **settings)
+    assert most[0] == fields
+    gc.collect()
+    assert held[0] == 0
