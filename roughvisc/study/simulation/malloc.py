@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -11,6 +13,12 @@ import numpy as np
 
 # Of the GNU C library: its own threshold does not rise beyond.
 _HIGHEST = 31 << 20
+# Its settings: from how many bytes arrays are mapped by themselves, and how much freed memory it keeps; of that, what
+# it keeps at most by itself, and the most that it can be told. [byte]
+_MMAP, _TRIM = -3, -1
+_BY_ITSELF, _MOST = 64 << 20, 2047 << 20
+# Fields from which a march keeps as much as it frees. [byte]
+_WIDE = 8 << 20
 
 
 @cache
@@ -21,14 +29,42 @@ def keep_memory() -> bool:
     squared takes 10 to 15 % longer, and on Dask's workers, whose nannies set ``MALLOC_TRIM_THRESHOLD_``, a convolution
     up to 1.8 times as long.
     """
-    if not sys.platform.startswith("linux"):
-        return False
+    library = _library()
+    return library is not None and bool(library.mallopt(_MMAP, 32 << 20) and library.mallopt(_TRIM, _MOST))
+
+
+@contextmanager
+def keeping(size: int) -> Iterator[None]:
+    """Meanwhile have the C library keep freed memory while arrays of so many bytes are computed with.
+
+    What an iteration needs for the cells in contact, some fields of a wide grid near full contact, is freed and had
+    again: given back to the system and cleared anew it takes half of the time (measured at 4096 squared, 95 % in
+    contact: 1.7 times as long). In the end it is given back, and freed memory is kept as the library does by itself.
+    """
+    library = _library()
+    if size < _WIDE or library is None:
+        yield
+        return
+    library.mallopt(_MMAP, 32 << 20)
+    library.mallopt(_TRIM, _MOST)
     try:
-        mallopt: Any = ctypes.CDLL("libc.so.6").mallopt
-    except (OSError, AttributeError):  # not the GNU C library
-        return False
-    m_trim_threshold, m_mmap_threshold = -1, -3
-    return bool(mallopt(m_mmap_threshold, 32 << 20) and mallopt(m_trim_threshold, 256 << 20))
+        yield
+    finally:
+        if not keep_memory.cache_info().currsize:  # that is for all of the process
+            library.mallopt(_TRIM, _BY_ITSELF)
+        library.malloc_trim(0)
+
+
+@cache
+def _library() -> Any:
+    """The GNU C library; None where it is another one."""
+    if not sys.platform.startswith("linux"):
+        return None
+    try:
+        library = ctypes.CDLL("libc.so.6")
+        return library if library.mallopt and library.malloc_trim else None
+    except (OSError, AttributeError):
+        return None
 
 
 def expect_arrays(size: int) -> None:

@@ -25,7 +25,7 @@ from roughvisc.mechanics.stepping.scene import Scene, State
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.grid_error import with_grid_error
-from roughvisc.study.simulation.malloc import expect_arrays
+from roughvisc.study.simulation.malloc import expect_arrays, keeping
 from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, left_out, slope_note
 from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
@@ -213,7 +213,7 @@ def _press(
     rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
     from roughvisc.study.progress import reporting  # slow to import
 
-    with reused(), reporting(progress, "pressing") as report:
+    with keeping(ground.gap.nbytes), reused(), reporting(progress, "pressing") as report:
         _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")

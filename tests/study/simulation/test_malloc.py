@@ -1,0 +1,96 @@
+"""What the C library is told of freed memory, and what comes of that."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from roughvisc.study.simulation import malloc
+from roughvisc.study.simulation.malloc import keep_memory, keeping
+
+MB = 1 << 20
+MMAP, TRIM = -3, -1
+
+
+class Library:
+    """Notes what it is told."""
+
+    def __init__(self):
+        self.told = []
+
+    def mallopt(self, parameter, value):
+        self.told.append((parameter, value))
+        return 1
+
+    def malloc_trim(self, pad):
+        self.told.append("trim")
+        return 1
+
+
+@pytest.fixture
+def library(monkeypatch):
+    found = Library()
+    monkeypatch.setattr(malloc, "_library", lambda: found)
+    keep_memory.cache_clear()
+    yield found
+    keep_memory.cache_clear()
+
+
+def test_wide_grid__keeps_what_is_freed_till_its_end(library):
+    def failing():
+        with keeping(8 * MB):
+            assert library.told == [(MMAP, 32 * MB), (TRIM, 2047 * MB)]
+            library.told.clear()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        failing()
+    assert library.told == [(TRIM, 64 * MB), "trim"]
+
+
+def test_narrow_grid__changes_nothing(library):
+    with keeping(8 * MB - 1):
+        pass
+    assert library.told == []
+
+
+def test_process_that_keeps_memory__goes_on_to(library):
+    assert keep_memory()
+    library.told.clear()
+    with keeping(8 * MB):
+        library.told.clear()
+    assert library.told == ["trim"]
+
+
+def test_other_libraries__are_left_alone(monkeypatch):
+    monkeypatch.setattr(malloc, "_library", lambda: None)
+    with keeping(8 * MB):
+        pass
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts the page faults of Linux")
+def test_memory_freed_in_a_wide_march__is_used_again(tmp_path):
+    """In a process of its own, whose C library is as it comes: 128 arrays of a megabyte, freed and had again."""
+    script = tmp_path / "faults.py"
+    script.write_text(
+        "import resource, sys\n"
+        "import numpy as np\n"
+        "from roughvisc.study.simulation.malloc import keeping\n"
+        "with keeping(int(sys.argv[1])):\n"
+        "    for _ in range(6):\n"
+        "        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "        arrays = [np.ones(1 << 17) for _ in range(128)]\n"
+        "        del arrays\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_") and k != "GLIBC_TUNABLES"}
+    faults = {
+        size: int(
+            subprocess.run([sys.executable, script, size], check=True, capture_output=True, env=environment).stdout
+        )
+        for size in ("0", str(8 * MB))
+    }
+    if faults["0"] < 8000:
+        pytest.skip("this C library keeps freed memory by itself")
+    assert faults[str(8 * MB)] < 0.2 * faults["0"]
