@@ -64,11 +64,7 @@ class Sparse:
 
     def field(self) -> Array:
         """All of it, not to be changed: where it is held whole, that is no copy."""
-        if self.cells is None:
-            return self.values
-        found = empty(self.shape)
-        passes.spread(found, self.cells, self.values, self.threads)
-        return found
+        return self.values if self.cells is None else self.times(1.0)
 
     def part(self, part: slice) -> Array:
         """Some of it by flat indices, not to be changed."""

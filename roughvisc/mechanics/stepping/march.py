@@ -140,8 +140,9 @@ def _through(scene: Scene, state: State, segment: Segment) -> Through:
         fresh = state.before is None and scene.time_step is None
         judged = None
         if not outgrown:
-            accepted, guess = _accepted(scene, state, trial, error), None
-            if state.companion is not None and not (scene.remembers and alone):
+            waits = scene.remembers and alone
+            accepted, guess = _accepted(scene, state, trial, error, waits), None
+            if state.companion is not None and not waits:
                 guess = beside(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
                     state = base = _without_fields(state)
@@ -218,12 +219,14 @@ def _without_fields(state: State) -> State:
     return replace(state, now=now, before=None, displacement=NO_FIELD, memory=None)
 
 
-def _accepted(scene: Scene, state: State, trial: Trial, error: float) -> State:
-    """State after a trial, whose companion is still behind."""
+def _accepted(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
+    """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
     time = trial.instant.time
     accepted = committed(scene, state, trial)
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
     accepted = replace(accepted, pace=state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
+    if waits:
+        accepted = replace(accepted, companion=bare(state) if state.companion is None else state.companion, behind=1)
     # the first short step stands for a jump
     return restarted(scene, accepted, trial.length) if state.unresolved else accepted
 
@@ -246,9 +249,6 @@ def _judged(
         if found is None:
             return None
         accepted, companion_trial = found
-    elif scene.remembers and state.behind == 0 and time < scene.program.corners[state.segment + 1]:
-        companion = bare(state) if state.companion is None else state.companion
-        accepted = replace(accepted, companion=companion, behind=1)
     if time == scene.program.corners[state.segment + 1]:
         accepted = entering(scene, accepted)
     step = step_of(scene, accepted, trial)

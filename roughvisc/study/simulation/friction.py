@@ -15,7 +15,7 @@ from roughvisc.mechanics.halfspace.sheet import Base
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.slide import Direction
-from roughvisc.study.simulation.malloc import expect_arrays
+from roughvisc.study.simulation.malloc import keeping
 from roughvisc.study.simulation.notes import border_note, slope_note
 from roughvisc.study.simulation.refusal import require_memory_of_curve
 from roughvisc.study.simulation.scene import Ground
@@ -140,7 +140,6 @@ def rub(
     require_memory_of_curve((ground.gap.shape[0], ground.gap.shape[1]), settings)
     if not ground.present.all():  # of a punch, which says so itself
         raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
-    expect_arrays(ground.gap.nbytes)
     reached = Reached() if keeper is None else keeper.latest
     spent = reached.wall_time - began
     store = RowsInMemory() if keeper is None else keeper.rows
@@ -148,7 +147,7 @@ def rub(
     rows = Speeds(ground, material, curve, settings, store, reached.state)
     from roughvisc.study.progress import reporting  # slow to import
 
-    with reporting(progress, "sliding", at=curve.at) as report:
+    with keeping(ground.gap.nbytes), reporting(progress, "sliding", at=curve.at) as report:
         for number in np.argsort(curve.asked)[reached.rows :]:
             state = rows.add(int(number), lambda: spent + time.perf_counter())
             reached = reached.at_speed(state, spent + time.perf_counter())

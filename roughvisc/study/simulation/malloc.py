@@ -30,29 +30,35 @@ def keep_memory() -> bool:
     up to 1.8 times as long.
     """
     library = _library()
-    return library is not None and bool(library.mallopt(_MMAP, 32 << 20) and library.mallopt(_TRIM, _MOST))
+    return library is not None and _told_to_keep(library)
 
 
 @contextmanager
 def keeping(size: int) -> Iterator[None]:
-    """Meanwhile have the C library keep freed memory while arrays of so many bytes are computed with.
+    """Have the C library keep freed memory while arrays of so many bytes are computed with.
 
-    What an iteration needs for the cells in contact, some fields of a wide grid near full contact, is freed and had
-    again: given back to the system and cleared anew it takes half of the time (measured at 4096 squared, 95 % in
-    contact: 1.7 times as long). In the end it is given back, and freed memory is kept as the library does by itself.
+    Of narrow grids it is only told what to expect. What an iteration on a wide one needs for the cells in contact, some
+    fields near full contact, is freed and had again: given back to the system and cleared anew it takes half of the
+    time (measured at 4096 squared, 95 % in contact: 1.7 times as long). In the end it is given back, and freed memory
+    is kept as the library does by itself.
     """
     library = _library()
     if size < _WIDE or library is None:
+        expect_arrays(size)
         yield
         return
-    library.mallopt(_MMAP, 32 << 20)
-    library.mallopt(_TRIM, _MOST)
+    _told_to_keep(library)
     try:
         yield
     finally:
         if not keep_memory.cache_info().currsize:  # that is for all of the process
             library.mallopt(_TRIM, _BY_ITSELF)
         library.malloc_trim(0)
+
+
+def _told_to_keep(library: Any) -> bool:
+    """Whether it takes the settings."""
+    return bool(library.mallopt(_MMAP, 32 << 20) and library.mallopt(_TRIM, _MOST))
 
 
 @cache

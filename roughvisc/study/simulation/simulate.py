@@ -25,7 +25,7 @@ from roughvisc.mechanics.stepping.scene import Scene, State
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.grid_error import with_grid_error
-from roughvisc.study.simulation.malloc import expect_arrays, keeping
+from roughvisc.study.simulation.malloc import keeping
 from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, left_out, slope_note
 from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
@@ -204,7 +204,6 @@ def _press(
     require_memory(shape, settings, material, program, in_memory=held, heights=height.values, area=area)
     mirror = settings.method == "fast" and not program.slides
     ground = Ground(height, settings.missing, follow=follows(settings), mirror=mirror, kernel=settings.kernel)
-    expect_arrays(ground.gap.nbytes)
     scene, choice = prepare(ground, material, program, settings)
     followed = not ground.window.whole
     log.info("memory: %s", choice.note)

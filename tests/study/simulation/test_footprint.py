@@ -10,7 +10,7 @@ from roughvisc.mechanics.fields import passes, reuse
 from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.simulation import simulate as simulate_module
+from roughvisc.study.simulation import malloc
 from roughvisc.study.simulation.footprint import march_bytes
 from roughvisc.study.simulation.scene import memory_wanted
 from roughvisc.study.statement.case import read_study, vary
@@ -66,7 +66,7 @@ def study(tmp_path_factory):
     [ELASTIC, {}, *(pytest.param(one, marks=pytest.mark.long) for one in (FREE, {"material": THREE}, DIRECT, FULL))],
 )
 def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
-    monkeypatch.setattr(simulate_module, "expect_arrays", lambda size: None)  # is never touched
+    monkeypatch.setattr(malloc, "expect_arrays", lambda size: None)  # is never touched
     # as on a wide grid: by parts that are a small part of it, in memory that is used again
     monkeypatch.setattr(passes, "_PART", 1 << 12)
     monkeypatch.setattr(reuse, "_FROM", 1 << 17)

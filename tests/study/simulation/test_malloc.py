@@ -69,12 +69,22 @@ def test_other_libraries__are_left_alone(monkeypatch):
         pass
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts the page faults of Linux")
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts the page faults of Linux")
+
+
+def faults(tmp_path, script, *ways):
+    """Page faults that a script prints for each way, in a process of its own whose C library is as it comes."""
+    (tmp_path / "faults.py").write_text("import resource, sys\n" + script)
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_") and k != "GLIBC_TUNABLES"}
+    for way in ways:
+        command = [sys.executable, tmp_path / "faults.py", way]
+        yield int(subprocess.run(command, check=True, capture_output=True, env=environment).stdout)
+
+
+@LINUX
 def test_memory_freed_in_a_wide_march__is_used_again(tmp_path):
-    """In a process of its own, whose C library is as it comes: 128 arrays of a megabyte, freed and had again."""
-    script = tmp_path / "faults.py"
-    script.write_text(
-        "import resource, sys\n"
+    """128 arrays of a megabyte, freed and had again."""
+    script = (
         "import numpy as np\n"
         "from roughvisc.study.simulation.malloc import keeping\n"
         "with keeping(int(sys.argv[1])):\n"
@@ -84,13 +94,30 @@ def test_memory_freed_in_a_wide_march__is_used_again(tmp_path):
         "        del arrays\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)\n"
     )
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_") and k != "GLIBC_TUNABLES"}
-    faults = {
-        size: int(
-            subprocess.run([sys.executable, script, size], check=True, capture_output=True, env=environment).stdout
-        )
-        for size in ("0", str(8 * MB))
-    }
-    if faults["0"] < 8000:
+    narrow, wide = faults(tmp_path, script, "0", str(8 * MB))
+    if narrow < 8000:
         pytest.skip("this C library keeps freed memory by itself")
-    assert faults[str(8 * MB)] < 0.2 * faults["0"]
+    assert wide < 0.2 * narrow
+
+
+@pytest.mark.long
+@LINUX
+def test_freed_memory__is_used_again(tmp_path):
+    script = (
+        "import roughvisc as rv\n"
+        "from roughvisc.study.simulation import malloc\n"
+        "if sys.argv[1] == 'without':\n"
+        "    malloc.expect_arrays = lambda size: None\n"
+        "rough = rv.self_affine(1.0, (511, 513), hurst=0.8, rms_slope=0.1, rolloff=0.2, shortcut=0.05, seed=1)\n"
+        "def run():\n"
+        "    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "    rv.simulate(rough, rv.zener(1.0, 1.0, 1.0), rv.Program().load(0.2, over=0).hold(1.0),\n"
+        "                boundary='periodic', time_step=0.25, times=[1.0], fields=(), progress=False)\n"
+        "    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
+        "run()\n"
+        "print(run())\n"
+    )
+    kept, without = faults(tmp_path, script, "with", "without")
+    if without < 8000:
+        pytest.skip("this C library keeps freed memory by itself")
+    assert kept < 0.2 * without

@@ -1,9 +1,5 @@
 """The labelled result: what is in it, what is refused, the two validations of the seed paper."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -331,33 +327,3 @@ def test_kept_rows__hold_nothing_but_what_they_keep(size, monkeypatch):
     simulate(ball, ZENER, rv.Program().load(1e-4, over=0).hold(1.0), times=3, fields=FIELDS)
     assert kept
     assert all(array.base is None for array in kept)
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts the page faults of Linux")
-def test_freed_memory__is_used_again(tmp_path):
-    """In a process of its own, whose C library is as it comes."""
-    script = tmp_path / "faults.py"
-    script.write_text(
-        "import resource, sys\n"
-        "import roughvisc as rv\n"
-        "from roughvisc.study.simulation import simulate\n"
-        "if sys.argv[1] == 'without':\n"
-        "    simulate.expect_arrays = lambda size: None\n"
-        "rough = rv.self_affine(1.0, (511, 513), hurst=0.8, rms_slope=0.1, rolloff=0.2, shortcut=0.05, seed=1)\n"
-        "def run():\n"
-        "    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
-        "    rv.simulate(rough, rv.zener(1.0, 1.0, 1.0), rv.Program().load(0.2, over=0).hold(1.0),\n"
-        "                boundary='periodic', time_step=0.25, times=[1.0], fields=(), progress=False)\n"
-        "    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
-        "run()\n"
-        "print(run())\n"
-    )
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_") and k != "GLIBC_TUNABLES"}
-    faults = {
-        how: int(subprocess.run([sys.executable, script, how], check=True, capture_output=True, env=environment).stdout)
-        for how in ("with", "without")
-    }
-    if faults["without"] < 8000:
-        pytest.skip("this C library keeps freed memory by itself")
-    assert faults["with"] < 0.2 * faults["without"]
