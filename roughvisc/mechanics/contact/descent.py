@@ -134,7 +134,6 @@ def conjugate_gradient(
 def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells, previous: Step) -> Array:
     """Search direction conjugate to the previous step, if it descends still."""
     influence, threads = problem.influence, problem.influence.threads
-    passes.spread(influence.work, previous.free_set, previous.change, threads)
     response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
 
     def along(part: slice) -> float:
@@ -142,7 +141,7 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
 
     beta = sum(passes.of_parts(along, search.size, threads))
     if beta > 0:
-        former = influence.at(influence.work, free_set)
+        former = passes.carried_over(previous.change, previous.free_set, free_set, influence.size, threads)
         mean = 0.0 if problem.load is None else passes.total(former, threads) / former.size
 
         def conjugated(part: slice) -> float:

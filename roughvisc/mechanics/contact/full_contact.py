@@ -77,21 +77,23 @@ def _opened(problem: Problem, contact: Cells, separation: Array, level: float) -
     return opening, pressure
 
 
-def approach_under_load(problem: Problem, pressure: Array, contact: Cells, separation: Array, level: float) -> float:
+def approach_under_load(problem: Problem, pressure: Array, contact: Cells, displacement: Array, level: float) -> float:
     """Approach under given load: the level of the contact, weighted by pressure.
 
     Near full contact with periodic boundaries the weight ``q`` is about the pressure of a flat punch of the contact's
     outline, which is what more load would add: an error ``e`` of the pressure moves that level by ``q.Ke``, nothing
     where ``Kq`` is uniform.
     """
-    excess = separation.take(contact) - level
+    excess = problem.influence.at(problem.gap, contact)
+    excess += problem.influence.at(displacement, contact)
+    excess -= level
     weight = pressure.take(contact)
     full = math.inf
     if not problem.definite and problem.present is None:
         mean = float(np.mean(problem.gap))  # no gap is left at this approach: the displacement has no mean
         if mean - level < _NEARLY_FULL * mean:
             full = mean
-            opening, opens = _opened(problem, contact, separation, level)
+            opening, opens = _opened(problem, contact, problem.separation(displacement), level)
             if not np.any(opening):
                 return full
             outside = np.ones(opening.size, bool)

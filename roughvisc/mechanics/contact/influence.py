@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.reuse import empty
+from roughvisc.mechanics.fields.sparse import Scattered
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ Cells = passes.Cells
 
 
 class Influence:
-    """The half-space with lengths and pressures scaled; counts convolutions, and owns memory that is used again.
+    """The half-space with lengths and pressures scaled; counts convolutions.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class Influence:
         How many work on one field.
     convolutions : int
         Displacements and applications of the preconditioner so far.
-    work : ndarray, shape (nx, ny)
-        For what is needed in a part of an iteration: spent whenever the influence of some cells is asked for.
+    size : int
+        Number of cells.
     """
 
     def __init__(self, halfspace: HalfSpace, scale: float) -> None:
@@ -41,10 +41,9 @@ class Influence:
         self.threads = halfspace.threads
         self.scale = scale
         self.convolutions = 0
-        self.work = empty(halfspace.shape)
-        self._halves: NDArray[np.float32] = self.work.reshape(-1).view(np.float32).reshape(2, *halfspace.shape)
+        self.size = halfspace.shape[0] * halfspace.shape[1]
 
-    def at(self, field: NDArray[Any], cells: Cells) -> NDArray[Any]:
+    def at(self, field: Array, cells: Cells) -> Array:
         """Values of a field at some cells, as flat indices."""
         return passes.taken(field, cells, self.threads)
 
@@ -63,16 +62,16 @@ class Influence:
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:
         """Displacement by a pressure on some cells in single precision, and its unit."""
         self.convolutions += 1
-        field, size = self._spread(pressure, cells)
-        unit = size * self.halfspace.largest_influence * self.scale
+        field = Scattered.over_largest(self.halfspace.shape, cells, pressure)
+        unit = field.size * self.halfspace.largest_influence * self.scale
         return self.halfspace.displacement_single(field), unit
 
     def approximate_pressure(self, displacement: Array, cells: Cells) -> Array:
         """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
         self.convolutions += 1
-        field, size = self._spread(displacement, cells)
-        found = self.halfspace.approximate_inverse(field, out=self._halves[1])
-        return passes.taken(found, cells, self.threads, size)
+        return self.halfspace.approximate_inverse_within(
+            Scattered.over_largest(self.halfspace.shape, cells, displacement)
+        )
 
     def approximate_pressure_field(self, displacement: Single) -> Array:
         """The same for a displacement everywhere, of ordinary size."""
@@ -92,10 +91,3 @@ class Influence:
         """Displacement of a block by a unit load on it alone."""
         blocks = self.halfspace.coarse
         return blocks.self_influence * self.scale * self.halfspace.cell_area / blocks.cell_area
-
-    def _spread(self, values: Array, cells: Cells) -> tuple[Single, float]:
-        """Values of some cells over the whole grid, zero elsewhere, over the largest; and that: single underflows."""
-        size = passes.largest(values, self.threads) or 1.0
-        field = self._halves[0]
-        passes.spread(field, cells, values, self.threads, size)
-        return field, size

@@ -242,8 +242,7 @@ def _result(
     pressure, displacement = iterate.pressure, iterate.displacement
     load, approach = passes.total(pressure.reshape(-1), problem.influence.threads), certificate.level
     if problem.load is not None:
-        separation = problem.separation(displacement)
-        approach = approach_under_load(problem, pressure, iterate.contact, separation, certificate.level)
+        approach = approach_under_load(problem, pressure, iterate.contact, displacement, certificate.level)
     duality_gap, energy = max(certificate.duality_gap, 0.0), certificate.energy
     bound = math.sqrt(2 * duality_gap / energy) if energy > 0 else 0.0
     threads = problem.influence.threads

@@ -76,12 +76,12 @@ class LongWaves:
     def of(cls, influence: Influence, free_set: Cells, pressure: Array, energy: float) -> LongWaves | None:
         """The blocks of a free set, by a pressure on it and ``p.Kp``; None where they do not pay."""
         shape = influence.halfspace.shape
-        if min(shape) < _FROM or free_set.size > _SPARSE * influence.work.size:
+        if min(shape) < _FROM or free_set.size > _SPARSE * influence.size:
             return None
         coarse = influence.halfspace.coarse.shape
         blocks = _blocks(shape, coarse, free_set, influence.threads)
         cells = _sums(influence, blocks, None)
-        all_free = cells > 0.98 * influence.work.size / cells.size
+        all_free = cells > 0.98 * influence.size / cells.size
         partly = 1 - float(cells.sum(where=all_free)) / max(free_set.size, 1)
         if partly * min(coarse) < _SPOTS:
             return None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
@@ -111,8 +112,8 @@ class Problem:
         return 1 / least if least > 0 else 0.0, float(inside.sum())
 
     def separation(self, displacement: Array) -> Array:
-        """Gap under pressure at zero approach, in the work array: there until that is used for something else."""
-        return passes.add(self.gap, displacement, self.influence.work, self.influence.threads)
+        """Gap under pressure at zero approach."""
+        return passes.add(self.gap, displacement, empty(self.gap.shape), self.influence.threads)
 
     def separation_of(self, displaced: Array, part: slice) -> Array:
         """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""

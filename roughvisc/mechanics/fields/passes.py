@@ -174,22 +174,20 @@ def joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def taken(field: NDArray[Any], cells: Cells, threads: int, factor: float | None = None) -> NDArray[Any]:
-    """Values of a field at some cells; where there is a factor, times that in double precision."""
-    if factor is None and (threads == 1 or cells.size <= _PART):
+def taken(field: Array, cells: Cells, threads: int) -> Array:
+    """Values of a field at some cells."""
+    if threads == 1 or cells.size <= _PART:
         return field.take(cells)
-    found, values = np.empty(cells.size, field.dtype if factor is None else np.float64), field.reshape(-1)
+    found, values = np.empty(cells.size), field.reshape(-1)
 
     def work(part: slice) -> None:
         found[part] = values.take(cells[part])
-        if factor is not None:
-            found[part] *= factor
 
     of_parts(work, cells.size, threads)
     return found
 
 
-def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
+def put(out: Array, cells: Cells, values: Array, threads: int) -> None:
     """Set a field at some cells."""
     field = _flat(out)
 
@@ -199,16 +197,31 @@ def put(out: NDArray[Any], cells: Cells, values: Array, threads: int) -> None:
     of_parts(work, cells.size, threads)
 
 
-def spread(out: NDArray[Any], cells: Cells, values: Array, threads: int, size: float = 1.0) -> None:
-    """Set a field to values over their size at some cells, and to zero elsewhere."""
+def spread(out: Array, cells: Cells, values: Array, threads: int) -> None:
+    """Set a field to values at some cells, and to zero elsewhere."""
     field = _flat(out)
 
     def work(part: slice, few: slice) -> None:
         field[part].fill(0)
-        here = values[few] if size == 1 else values[few] / size
-        field[cells[few]] = here.astype(field.dtype, copy=False)
+        field[cells[few]] = values[few]
 
     with_cells(work, field.size, cells, threads)
+
+
+def carried_over(values: Array, cells: Cells, onto: Cells, size: int, threads: int) -> Array:
+    """What some cells of a field of some size have, at others: zero where these are not among them."""
+    found = np.empty(onto.size)
+
+    def work(part: slice, few: slice) -> None:
+        asked = slice(*onto.searchsorted((part.start, part.stop)))
+        here, given, wanted = np.zeros(part.stop - part.start), cells[few], onto[asked]
+        if part.start:
+            given, wanted = given - part.start, wanted - part.start
+        here[given] = values[few]
+        found[asked] = here.take(wanted)
+
+    with_cells(work, size, cells, threads)
+    return found
 
 
 def total(vector: Array, threads: int) -> float:

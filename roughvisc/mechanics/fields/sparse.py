@@ -1,10 +1,14 @@
-"""Fields that take less memory than their cells: zero but at some cells, or a sum of others that are held anyway."""
+"""Fields that take less memory than their cells: zero but at some cells, or a sum of others that are held anyway.
+
+What is made of them by parts never lies in memory as a whole.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.passes import Array, Cells
@@ -90,6 +94,14 @@ class Sparse:
         else:
             out.reshape(-1)[self.cells] += factor * self.values
 
+    def apart_from(self, other: Sparse) -> float:
+        """Sum of the magnitudes of the difference to another field."""
+
+        def work(part: slice) -> float:
+            return float(np.abs(self.part(part) - other.part(part)).sum())
+
+        return sum(passes.of_parts(work, self.size, self.threads))
+
     def not_zero(self) -> tuple[Cells, Array]:
         """The cells that are not zero, and what is there."""
         if self.cells is not None:
@@ -101,6 +113,54 @@ class Sparse:
     def count(self) -> int:
         """How many cells are not zero."""
         return int(np.count_nonzero(self.values)) if self.cells is None else self.cells.size
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """A field in single precision, over a size of its own: single precision underflows.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Of the grid.
+    cells : ndarray of int
+        Cells that may be other than zero, as flat indices, ascending.
+    values : ndarray
+        At these cells, in double precision.
+    size : float
+        What they are divided by.
+    """
+
+    shape: tuple[int, int]
+    cells: Cells
+    values: Array
+    size: float
+
+    @classmethod
+    def over_largest(cls, shape: tuple[int, int], cells: Cells, values: Array) -> Scattered:
+        """Values over their largest magnitude."""
+        return cls(shape, cells, values, passes.largest(values, threads_of(shape[0] * shape[1])) or 1.0)
+
+    def rows(self, rows: slice) -> NDArray[np.float32]:
+        """Some rows of it."""
+        found = np.zeros((rows.stop - rows.start, self.shape[1]), np.float32)
+        few, cells = self._of(rows)
+        found.reshape(-1)[cells] = (self.values[few] / self.size).astype(np.float32)
+        return found
+
+    def taken(self, out: Array, rows: slice, found: NDArray[np.float32]) -> None:
+        """Into a vector over its cells goes what was found on some rows, times the size."""
+        few, cells = self._of(rows)
+        here = out[few]
+        here[...] = found.reshape(-1).take(cells)
+        here *= self.size
+
+    def _of(self, rows: slice) -> tuple[slice, Cells]:
+        """Which of its cells lie in some rows, and where in them."""
+        if rows.stop - rows.start == self.shape[0]:
+            return slice(0, self.cells.size), self.cells
+        few = slice(*self.cells.searchsorted((rows.start * self.shape[1], rows.stop * self.shape[1])))
+        return few, self.cells[few] - rows.start * self.shape[1]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from queue import SimpleQueue
@@ -18,12 +18,14 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.fields.reuse import empty
+from roughvisc.mechanics.fields.sparse import Scattered
 from roughvisc.mechanics.fields.threads import blocks, side_by_side, threads_of
 from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.transforms import transforms
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 Boundary = Literal["free", "periodic"]
 
 # Bytes of the columns transformed together, but at least so many columns; and at most so many rows and points of them:
@@ -141,22 +143,22 @@ class HalfSpace:
         ndarray, shape (nx, ny)
             Displacement; with periodic boundaries the mean of a half-space's is zero. [m]
         """
-        return self._convolved(pressure, self._symbol_by_columns, out)
+        return self._convolved(pressure, self._symbol_by_columns, self._points, out)
 
-    def displacement_single(self, pressure: NDArray[np.float32]) -> NDArray[np.float32]:
+    def displacement_single(self, pressure: Single | Scattered) -> Single:
         """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
 
         Parameters
         ----------
-        pressure : ndarray of float32, shape (nx, ny)
+        pressure : ndarray of float32, shape (nx, ny), or Scattered
             Of ordinary size: single precision underflows. [-]
 
         Returns
         -------
         ndarray of float32, shape (nx, ny)
-            Displacement over :attr:`largest_influence`. [-]
+            Displacement over :attr:`largest_influence`, by the pressure over its size if that is scattered. [-]
         """
-        return self._convolved(pressure, self._single_symbol)
+        return self._convolved(pressure, self._single_symbol, self._points)
 
     @cached_property
     def _symbol_by_columns(self) -> list[NDArray[Any]]:
@@ -184,29 +186,44 @@ class HalfSpace:
         return self.shape[0] * self.shape[1] >= _BLOCKED
 
     def _convolved(
-        self, pressure: NDArray[Any], symbol: list[NDArray[Any]], out: NDArray[Any] | None = None
+        self,
+        field: NDArray[Any] | Scattered,
+        symbol: list[NDArray[Any]],
+        points: tuple[int, int],
+        out: NDArray[Any] | None = None,
     ) -> NDArray[Any]:
-        """Convolution in the precision of both."""
-        if self.boundary == "periodic":
-            return self._filtered(pressure, symbol, out)
-        return self._by_blocks(pressure, symbol, self._points, out)
+        """Convolution on so many points, in the precision of the symbol."""
+        if points == self.shape and not self._goes_by_blocks:
+            return self._whole(field, symbol)
+        found = empty(self.shape, symbol[0].dtype) if out is None else out
+
+        def keep(rows: slice, come_back: Callable[[NDArray[Any]], None]) -> None:
+            come_back(found[rows])
+
+        self._by_blocks(field, symbol, points, keep)
+        return found
 
     def _by_blocks(
-        self, field: NDArray[Any], symbol: list[NDArray[Any]], points: tuple[int, int], out: NDArray[Any] | None = None
-    ) -> NDArray[Any]:
-        """Convolution on so many points, in the precision of field and symbol.
+        self,
+        field: NDArray[Any] | Scattered,
+        symbol: list[NDArray[Any]],
+        points: tuple[int, int],
+        keep: Callable[[slice, Callable[[NDArray[Any]], None]], None],
+    ) -> None:
+        """Convolution on so many points, in the precision of the symbol.
 
         Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of columns
-        go forward, are multiplied and come back while they stay in the cache.
+        go forward, are multiplied and come back while they stay in the cache. Rows go to ``keep`` as they come back: it
+        has them written where it wants them.
         """
-        along, nx, (mx, my) = self._transforms, self.shape[0], points
-        spectrum, rooms = self._working_memory(points, field.dtype)
-        found = empty(self.shape, field.dtype) if out is None else out
+        along, nx, (mx, my), kind = self._transforms, self.shape[0], points, symbol[0].dtype
+        spectrum, rooms = self._working_memory(points, kind)
         number, own = spectrum.dtype, mx == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:
             with _lent(rooms) as room:
-                along.rows_into(spectrum[rows], field[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
+                here = field.rows(rows) if isinstance(field, Scattered) else field[rows]
+                along.rows_into(spectrum[rows], here, _as(room, kind, (rows.stop - rows.start, my)))
 
         def across(number_of_block: int) -> None:
             block = columns_of[number_of_block]
@@ -224,14 +241,14 @@ class HalfSpace:
 
         def back(rows: slice) -> None:
             with _lent(rooms) as room:
-                along.rows_back_into(found[rows], spectrum[rows], _as(room, field.dtype, (rows.stop - rows.start, my)))
+                here = _as(room, kind, (rows.stop - rows.start, my))
+                keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
 
         rows = list(blocks(nx, _rows_together(my)))
         columns_of = list(blocks(spectrum.shape[1], _columns_together(mx, number)))
         side_by_side(forward, rows, self.threads)
         side_by_side(across, range(len(columns_of)), self.threads)
         side_by_side(back, rows, self.threads)
-        return found
 
     def _working_memory(
         self, points: tuple[int, int], kind: np.dtype[Any]
@@ -256,17 +273,13 @@ class HalfSpace:
         spectrum = np.empty(_bytes(number, (self.shape[0], count)), np.uint8)
         return spectrum, [np.empty(room, np.uint8) for _ in range(self.threads)]
 
-    def approximate_inverse(
-        self, displacement: NDArray[np.float32], out: NDArray[np.float32] | None = None
-    ) -> NDArray[np.float32]:
+    def approximate_inverse(self, displacement: Single) -> Single:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
 
         Parameters
         ----------
         displacement : ndarray of float32, shape (nx, ny)
             Of ordinary size: single precision underflows. [m]
-        out : ndarray of float32, shape (nx, ny), optional
-            Memory for what is returned, which large grids use: other memory has to be had first.
 
         Returns
         -------
@@ -278,7 +291,33 @@ class HalfSpace:
         The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
         positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
         """
-        return self._filtered(displacement, self._inverse_symbol, out)
+        return self._convolved(displacement, self._inverse_symbol, self.shape)
+
+    def approximate_inverse_within(self, displacement: Scattered) -> Array:
+        """The same on the cells of a displacement that is scattered, in double precision and in its size.
+
+        Parameters
+        ----------
+        displacement : Scattered
+            [m]
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Pressure over the contact modulus on these cells. [-]
+        """
+        found = np.empty(displacement.cells.size)
+
+        def keep(rows: slice, come_back: Callable[[NDArray[Any]], None]) -> None:
+            here = np.empty((rows.stop - rows.start, self.shape[1]), np.float32)
+            come_back(here)
+            displacement.taken(found, rows, here)
+
+        if self._goes_by_blocks:
+            self._by_blocks(displacement, self._inverse_symbol, self.shape, keep)
+        else:
+            displacement.taken(found, slice(0, self.shape[0]), self._whole(displacement, self._inverse_symbol))
+        return found
 
     @cached_property
     def _inverse_symbol(self) -> list[NDArray[Any]]:
@@ -286,14 +325,11 @@ class HalfSpace:
         symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
         return self._by_columns(self._transforms.cropped(1 / symbol, self.shape).astype(np.float32), self.shape)
 
-    def _filtered(
-        self, field: NDArray[Any], symbol: list[NDArray[Any]], out: NDArray[Any] | None = None
-    ) -> NDArray[Any]:
-        """Convolution on the cells themselves."""
-        if self._goes_by_blocks:
-            return self._by_blocks(field, symbol, self.shape, out)
+    def _whole(self, field: NDArray[Any] | Scattered, symbol: list[NDArray[Any]]) -> NDArray[Any]:
+        """Convolution on the cells themselves at once."""
         [whole] = symbol
-        field_q = self._transforms.of_field(field, workers=1)
+        given = field.rows(slice(0, self.shape[0])) if isinstance(field, Scattered) else field
+        field_q = self._transforms.of_field(given, workers=1)
         self._transforms.multiply(field_q, whole)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
 

@@ -119,7 +119,7 @@ def difference(
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
     unresolved = 0.0 if step.state.energy is None else step.state.energy.unresolved
     return Uncertainty(
-        pressure=stated * area * passes.apart(fine.pressure, coarse.pressure, scene.halfspace.threads) + entered,
+        pressure=stated * area * fine.contact.apart_from(coarse.contact) + entered,
         approach=stated * abs(fine.approach - coarse.approach),
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
         work=energy * abs(step.state.work - companion.work) + unresolved,

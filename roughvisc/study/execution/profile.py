@@ -26,7 +26,8 @@ from roughvisc.study.storage.records import RowFile
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
 _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "transforms": (
-        *((HalfSpace, name) for name in ("displacement", "displacement_single", "approximate_inverse")),
+        *((HalfSpace, name) for name in ("displacement", "displacement_single")),
+        *((HalfSpace, name) for name in ("approximate_inverse", "approximate_inverse_within")),
         (Reach, "spread"),
         *((Sliding, name) for name in ("skew", "lagging", "slope")),
     ),

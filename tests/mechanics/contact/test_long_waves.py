@@ -115,7 +115,7 @@ def test_long_waves__are_left_to_large_grids_sparse_contact_and_kernels_that_giv
         patch.setattr(long_waves, "_SPOTS", 0.0)
         assert LongWaves.of(influence, cells, ones, 1e9) is not None
         assert LongWaves.of(influence, cells, ones, 0.0) is None  # no more energy than the blocks alone
-        dense = np.arange(int(0.7 * influence.work.size))
+        dense = np.arange(int(0.7 * influence.size))
         assert LongWaves.of(influence, dense, np.ones(dense.size), 1e9) is None
 
 

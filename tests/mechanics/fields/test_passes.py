@@ -33,16 +33,32 @@ def test_passes__do_what_numpy_does_at_once(threads):
     found = passes.cells_where(lambda part: flat[part] > 0.5, a.size, threads)
     assert np.array_equal(found, np.flatnonzero(a > 0.5))
     assert np.array_equal(passes.taken(a, found, threads), flat[found])
-    assert passes.taken(single, found[:0], threads).dtype == np.float32
-    assert np.array_equal(passes.taken(single, found, threads, 0.3), single.reshape(-1)[found].astype(float) * 0.3)
     values = rng.standard_normal(found.size)
     expected = np.zeros(a.size)
-    expected[found] = values / 7.0
-    passes.spread(out, found, values, threads, 7.0)
+    expected[found] = values
+    passes.spread(out, found, values, threads)
     assert np.array_equal(out.reshape(-1), expected)
+    expected += 1
+    out += 1
     expected[found] = values
     passes.put(out, found, values, threads)
     assert np.array_equal(out.reshape(-1), expected)
+
+
+@THREADS
+@pytest.mark.parametrize("size", [10**6, 13, 4])
+def test_values_of_some_cells__are_carried_over_to_others(threads, size, monkeypatch):
+    """Cells that both have, that one has, that none has in a part: as through a field."""
+    monkeypatch.setattr(passes, "_PART", size)
+    rng = np.random.default_rng(3)
+    cells, onto = (np.flatnonzero((rng.random(99) < 0.4) & (np.arange(99) // 20 != gap)) for gap in (1, 3))
+    values = rng.standard_normal(cells.size)
+    field = np.zeros(99)
+    field[cells] = values
+    found = passes.carried_over(values, cells, onto, field.size, threads)
+    assert np.array_equal(found, field[onto])
+    assert 0 < np.count_nonzero(found) < onto.size
+    assert passes.carried_over(values[:0], cells[:0], onto, field.size, threads).sum() == 0
 
 
 @THREADS

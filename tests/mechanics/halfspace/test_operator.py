@@ -9,6 +9,7 @@ from support import direct
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.mechanics.fields.sparse import Scattered
 from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
@@ -73,7 +74,32 @@ KINDS = pytest.mark.parametrize("mirrored", [False, True])
 def fields_by(halfspace, pressure):
     single = pressure.astype(np.float32)
     displaced = [halfspace.displacement(pressure), halfspace.displacement_single(single)]
-    return [*displaced, halfspace.approximate_inverse(single)]
+    few = scattered(pressure)
+    of_few = [halfspace.displacement_single(few), halfspace.approximate_inverse_within(few)]
+    return [*displaced, halfspace.approximate_inverse(single), *of_few]
+
+
+def scattered(pressure):
+    """What is on a third of the cells, none of them in the middle rows."""
+    chosen = np.random.default_rng(5).random(pressure.shape) < 0.3
+    chosen[10:20] = False
+    cells = np.flatnonzero(chosen)
+    return Scattered.over_largest(pressure.shape, cells, pressure.reshape(-1)[cells])
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("blocked", [False, True])
+def test_scattered_field__is_taken_and_given_back_as_the_whole_one(request, boundary, mirrored, blocked):
+    if blocked:
+        request.getfixturevalue("in_small_blocks")
+    halfspace = HalfSpace((33, 46), (1.0, 0.7), boundary, mirrored=mirrored)
+    few = scattered(np.random.default_rng(4).random((33, 46)) * 1e-50)
+    field = few.rows(slice(0, 33))
+    assert 0 < np.count_nonzero(field) == few.cells.size < 0.4 * field.size
+    assert np.array_equal(halfspace.displacement_single(few), halfspace.displacement_single(field))
+    expected = halfspace.approximate_inverse(field).reshape(-1)[few.cells].astype(float) * few.size
+    np.testing.assert_allclose(halfspace.approximate_inverse_within(few), expected, rtol=1e-6)
 
 
 @FIELDS
@@ -98,7 +124,7 @@ def test_fields__are_the_same_by_blocks(monkeypatch, boundary, mirrored):
     for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
         monkeypatch.setattr(operator, name, value)
     blocked = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
-    for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6), strict=True):
+    for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6, 3e-6, 3e-6), strict=True):
         assert other.dtype == one.dtype
         assert np.abs(one - other).max() < precision * np.abs(one).max()
 

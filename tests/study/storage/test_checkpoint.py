@@ -352,17 +352,22 @@ from roughvisc.study.execution.run import run_case
 study, out, kills, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
 case, draw, done = read_study(study), random.Random(seed), 0
 for warm in ("imports", "timed"):
-    began = time.perf_counter()
-    run_case(case, out.parent / warm, checkpoint_steps=2)
-    length = time.perf_counter() - began
+    began, told = time.perf_counter(), []
+    run_case(case, out.parent / warm, checkpoint_steps=2, progress=lambda now, end: told.append(now))
+    step = (time.perf_counter() - began) / len(told)
 
 def work(pipe):
-    first = []
     def report(now, end):
-        if not first:
-            first.append(now)
-            os.write(pipe, f"{now!r}\\n".encode())
+        os.write(pipe, f"{now!r}\\n".encode())
     run_case(case, out, progress=report, checkpoint_steps=2)
+
+def after(reports, pipe):
+    "What a run has told by then, or before it ended; at a random instant of the next step."
+    told = b""
+    while told.count(b"\\n") < reports and (more := os.read(pipe, 1000)):
+        told += more
+    time.sleep(draw.uniform(0.0, step))
+    return told.decode().split()
 
 def begun(pipe):
     pid = os.fork()
@@ -379,10 +384,10 @@ while done < kills:
     near, far = os.pipe()
     pid = begun(far)
     os.close(far)
-    time.sleep(draw.uniform(0.0, 0.6 * length))
+    came = after(draw.randrange(int(0.6 * len(told))), near)
     os.kill(pid, signal.SIGKILL)
     _, status = os.waitpid(pid, 0)
-    print(os.read(near, 100).decode().strip() or "-", os.WIFSIGNALED(status), flush=True)
+    print(*came[:1] or "-", os.WIFSIGNALED(status), flush=True)
     os.close(near)
     if os.WIFSIGNALED(status):
         done += 1
