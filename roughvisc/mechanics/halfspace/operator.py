@@ -270,8 +270,7 @@ class HalfSpace:
             _bytes(number, (mx, min(_columns_together(mx, np.dtype(np.complex64)), count))),
             _bytes(np.dtype(float), (min(_rows_together(my), self.shape[0]), my)),
         )
-        spectrum = np.empty(_bytes(number, (self.shape[0], count)), np.uint8)
-        return spectrum, [np.empty(room, np.uint8) for _ in range(self.threads)]
+        return _lines(_bytes(number, (self.shape[0], count))), [_lines(room) for _ in range(self.threads)]
 
     def approximate_inverse(self, displacement: Single) -> Single:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
@@ -361,6 +360,13 @@ def _as(memory: NDArray[np.uint8], number: np.dtype[Any], shape: tuple[int, int]
     """
     row = _row_bytes(number, shape[1])
     return memory[: shape[0] * row].view(number).reshape(shape[0], -1)[:, : shape[1]]
+
+
+def _lines(size: int) -> NDArray[np.uint8]:
+    """So many bytes, from the beginning of a line: no line belongs to the columns of two threads."""
+    memory = np.empty(size + _LINE, np.uint8)
+    first = -memory.ctypes.data % _LINE
+    return memory[first : first + size]
 
 
 def _bytes(number: np.dtype[Any], shape: tuple[int, int]) -> int:

@@ -137,6 +137,18 @@ def test_threads__are_those_of_scipy_on_a_large_grid():
         assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic", workers=3).threads == 3
 
 
+@pytest.mark.parametrize("shape", [(64, 128), (45, 150)])
+def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines(shape):
+    """Blocks of 32 columns share no line, and columns do not all fall on the same places of the cache."""
+    halfspace = HalfSpace(shape, (1.0, 1.0), "periodic", workers=2)
+    for kind in (np.float32, np.float64):
+        spectrum, rooms = halfspace._working_memory(shape, np.dtype(kind))
+        rows = operator._as(rooms.get(), np.dtype(kind), (2, shape[1]))
+        for memory in (spectrum, rows):
+            assert memory.ctypes.data % 64 == 0
+            assert memory.strides[0] % 128 == 64
+
+
 def test_boundary__is_named_when_unknown():
     with pytest.raises(InputError, match=r"boundary is 'open': expected 'free' or 'periodic'"):
         HalfSpace((4, 4), (1.0, 1.0), "open")
