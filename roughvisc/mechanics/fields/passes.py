@@ -208,17 +208,25 @@ def spread(out: Array, cells: Cells, values: Array, threads: int) -> None:
     with_cells(work, field.size, cells, threads)
 
 
+def within(part: slice, cells: Cells) -> Cells:
+    """Where some cells of a part of a field lie in it."""
+    return cells - part.start if part.start else cells
+
+
+def part_of(values: Array, cells: Cells, part: slice) -> Array:
+    """Part of a field that has values at some cells of it, and is zero elsewhere."""
+    found = np.zeros(part.stop - part.start)
+    found[within(part, cells)] = values
+    return found
+
+
 def carried_over(values: Array, cells: Cells, onto: Cells, size: int, threads: int) -> Array:
     """What some cells of a field of some size have, at others: zero where these are not among them."""
     found = np.empty(onto.size)
 
     def work(part: slice, few: slice) -> None:
         asked = slice(*onto.searchsorted((part.start, part.stop)))
-        here, given, wanted = np.zeros(part.stop - part.start), cells[few], onto[asked]
-        if part.start:
-            given, wanted = given - part.start, wanted - part.start
-        here[given] = values[few]
-        found[asked] = here.take(wanted)
+        found[asked] = part_of(values[few], cells[few], part).take(within(part, onto[asked]))
 
     with_cells(work, size, cells, threads)
     return found

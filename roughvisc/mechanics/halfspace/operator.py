@@ -222,8 +222,7 @@ class HalfSpace:
 
         def forward(rows: slice) -> None:
             with _lent(rooms) as room:
-                here = field.rows(rows) if isinstance(field, Scattered) else field[rows]
-                along.rows_into(spectrum[rows], here, _as(room, kind, (rows.stop - rows.start, my)))
+                along.rows_into(spectrum[rows], _rows_of(field, rows), _as(room, kind, (rows.stop - rows.start, my)))
 
         def across(number_of_block: int) -> None:
             block = columns_of[number_of_block]
@@ -327,10 +326,14 @@ class HalfSpace:
     def _whole(self, field: NDArray[Any] | Scattered, symbol: list[NDArray[Any]]) -> NDArray[Any]:
         """Convolution on the cells themselves at once."""
         [whole] = symbol
-        given = field.rows(slice(0, self.shape[0])) if isinstance(field, Scattered) else field
-        field_q = self._transforms.of_field(given, workers=1)
+        field_q = self._transforms.of_field(_rows_of(field, slice(0, self.shape[0])), workers=1)
         self._transforms.multiply(field_q, whole)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
+
+
+def _rows_of(field: NDArray[Any] | Scattered, rows: slice) -> NDArray[Any]:
+    """Some rows of a field."""
+    return field.rows(rows) if isinstance(field, Scattered) else field[rows]
 
 
 def _rows_together(points: int) -> int:
