@@ -72,9 +72,9 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         here = apart.take(cells)
         del apart
         p, u = carried[part].take(cells), displaced[part].take(cells)
-        excess = 0.0 if problem.load is not None else float((p * (here - problem.target)).sum())
-        sums = p.sum(), excess, (p * u).sum(), here.sum(), (p * (here - lowest)).sum()
-        return lowest, float(here.max(initial=1.0)), -float(here.min(initial=-1.0)), *map(float, sums)
+        excess = 0.0 if problem.load is not None else passes.summed(p * (here - problem.target))
+        sums = passes.summed(p), excess, *map(passes.summed, (p * u, here, p * (here - lowest)))
+        return lowest, float(np.maximum.reduce(here, initial=1.0)), -float(np.minimum.reduce(here, initial=-1.0)), *sums
 
     found = passes.with_cells(judged, pressure.size, contact, problem.influence.threads)
     lows, highest, deepest, loads, *sums = zip(*found, strict=True)

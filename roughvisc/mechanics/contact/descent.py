@@ -116,7 +116,7 @@ def conjugate_gradient(
         here *= -step_length
         here += held[part]
         np.maximum(here, 0, out=here)  # in the manner of Polonsky and Keer: cut at zero, then scaled to the load
-        return float(here.sum())
+        return passes.summed(here)
 
     carried = sum(passes.of_parts(moved, search.size, threads))
     scale = 1.0 if problem.load is None else problem.load / carried
@@ -125,7 +125,7 @@ def conjugate_gradient(
     def scaled(part: slice) -> float:
         search[part] *= scale
         np.subtract(search[part], held[part], out=change[part])
-        return float((change[part] * residual[part]).sum())
+        return passes.summed(change[part] * residual[part])
 
     slope = sum(passes.of_parts(scaled, search.size, threads))
     return Trial(free_set, held, search, change, slope, asked)
@@ -137,7 +137,7 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
     response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
 
     def along(part: slice) -> float:
-        return float((search[part] * (response.take(free_set[part]) * unit)).sum())
+        return passes.summed(search[part] * (response.take(free_set[part]) * unit))
 
     beta = sum(passes.of_parts(along, search.size, threads))
     if beta > 0:
@@ -149,7 +149,7 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
             here -= mean
             here *= beta
             np.subtract(search[part], here, out=here)
-            return float((residual[part] * here).sum())
+            return passes.summed(residual[part] * here)
 
         if sum(passes.of_parts(conjugated, search.size, threads)) > 0:
             return former

@@ -196,12 +196,13 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
     """The iterate after a trial, as far along it as ``f`` falls and the pressure is admissible: one convolution."""
     influence, free_set, threads = problem.influence, trial.free_set, problem.influence.threads
     pressure, displacement = iterate.pressure.reshape(-1), iterate.displacement
-    passes.put(pressure, free_set, trial.pressure, threads)
+    if not search.single:  # else its displacement is that of the change alone
+        passes.put(pressure, free_set, trial.pressure, threads)
     response, unit = _response(influence, iterate, trial, search.single)
     answer = response.reshape(-1)
 
     def curved(part: slice) -> float:
-        return float((trial.change[part] * answer.take(free_set[part])).sum())
+        return passes.summed(trial.change[part] * answer.take(free_set[part]))
 
     curvature = unit * sum(passes.of_parts(curved, free_set.size, threads))
     minimum = minimum_along(trial, curvature)
@@ -213,6 +214,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
             here = fraction * trial.change[part]
             here += trial.held[part]
             np.maximum(here, 0, out=here)
+        if fraction != 1 or search.single:
             pressure[free_set[part]] = here
         return free_set[part][here > 0]
 

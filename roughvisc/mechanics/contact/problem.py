@@ -136,7 +136,7 @@ class Problem:
             if present is not None:
                 mask &= present[part]
             mask |= here > 0
-            cells = np.flatnonzero(mask)
+            [cells] = mask.nonzero()
             values = apart.take(cells), here.take(cells)
             if part.start:
                 cells += part.start

@@ -99,7 +99,7 @@ def with_ducc0() -> bool:
 
 
 _SCIPY = (
-    Transforms(1, fft.rfft, fft.fft, fft.irfft, fft.ifft, fft.rfft2, fft.irfft2, True),
+    Transforms(1, fft.rfft, fft.fft, fft.irfft, fft.ifft, fft.rfftn, fft.irfftn, True),
     Transforms(2, fft.dct, fft.dct, fft.idct, fft.idct, fft.dctn, fft.idctn, False),
 )
 _DUCC0 = (
