@@ -218,7 +218,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
             pressure[free_set[part]] = here
         return free_set[part][here > 0]
 
-    contact = passes.joined(passes.of_parts(taken, free_set.size, threads))
+    contact = passes.joined(passes.of_parts(taken, free_set.size, threads), threads)
     passes.add_scaled(displacement, response, fraction * unit, threads)
     stepped = Iterate(iterate.pressure, displacement, contact, approximate=search.single)
     if search.spacer:

@@ -128,7 +128,7 @@ class Problem:
     def free_set(self, pressure: Array, displacement: Array, level: float) -> tuple[Cells, Array, Array]:
         """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there."""
         carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
-        present = None if self.present is None else self.present.reshape(-1)
+        present, threads = None if self.present is None else self.present.reshape(-1), self.influence.threads
 
         def free(part: slice) -> tuple[Cells, Array, Array]:
             apart, here = self.separation_of(displaced, part), carried[part]
@@ -142,10 +142,11 @@ class Problem:
                 cells += part.start
             return cells, *values
 
-        found = passes.of_parts(free, pressure.size, self.influence.threads)
+        found = passes.of_parts(free, pressure.size, threads)
         parts = [list(each) for each in zip(*found, strict=True)]
         del found
-        cells, apart, held = (passes.joined(parts.pop(0)) for _ in range(3))  # the parts go as they are joined
+        # the parts go as they are joined
+        cells, apart, held = (passes.joined(parts.pop(0), threads) for _ in range(3))
         return cells, apart, held
 
     def tangent(self, vector: Array) -> Array:

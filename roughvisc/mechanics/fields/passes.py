@@ -8,6 +8,7 @@ used while it is in the cache. Cells are flat indices, ascending.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,7 +22,7 @@ Mask = NDArray[np.bool_]
 Cells = NDArray[np.int32] | NDArray[np.int64]
 Found = TypeVar("Found")
 
-# Cells of a part.
+# Cells of a part at most.
 _PART = 1 << 17
 
 
@@ -29,7 +30,8 @@ def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Fo
     """What some work gives of each part of a vector of some size, in their order."""
     if size <= _PART:
         return [work(slice(0, size))]
-    return side_by_side(work, list(blocks(size, _PART)), threads)
+    pairs = -(-size // (2 * _PART))  # of equal parts: of three, one thread of two would wait for the last
+    return side_by_side(work, list(blocks(size, -(-size // (2 * pairs)))), threads)
 
 
 def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int) -> list[Found]:
@@ -42,7 +44,7 @@ def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, t
 
     if size <= _PART:
         return [work(slice(0, size), slice(0, cells.size))]
-    return of_parts(lambda part: work(part, slice(*cells.searchsorted((part.start, part.stop)))), size, threads)
+    return of_parts(lambda part: work(part, lying_in(part, cells)), size, threads)
 
 
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
@@ -166,12 +168,21 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
             found += part.start
         return found
 
-    return joined(of_parts(work, size, threads))
+    return joined(of_parts(work, size, threads), threads)
 
 
-def joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """What was found of all parts; of a part that is alone, itself."""
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+def joined(parts: Sequence[NDArray[Any]], threads: int) -> NDArray[Any]:
+    """What was found of all parts, in their order; of a part that is alone, itself."""
+    if len(parts) == 1:
+        return parts[0]
+    *begins, size = accumulate((part.size for part in parts), initial=0)
+    found = np.empty(size, parts[0].dtype)
+
+    def work(number: int) -> None:
+        found[begins[number] : begins[number] + parts[number].size] = parts[number]
+
+    side_by_side(work, range(len(parts)), threads)
+    return found
 
 
 def taken(field: Array, cells: Cells, threads: int) -> Array:
@@ -208,6 +219,12 @@ def spread(out: Array, cells: Cells, values: Array, threads: int) -> None:
     with_cells(work, field.size, cells, threads)
 
 
+def lying_in(part: slice, cells: Cells) -> slice:
+    """Which of some cells lie in a part of a field."""
+    # bounds of the same kind: for others, numpy makes a copy of all cells, for each part anew
+    return slice(*cells.searchsorted(np.array((part.start, part.stop), cells.dtype)))
+
+
 def within(part: slice, cells: Cells) -> Cells:
     """Where some cells of a part of a field lie in it."""
     return cells - part.start if part.start else cells
@@ -225,8 +242,11 @@ def carried_over(values: Array, cells: Cells, onto: Cells, size: int, threads: i
     found = np.empty(onto.size)
 
     def work(part: slice, few: slice) -> None:
-        asked = slice(*onto.searchsorted((part.start, part.stop)))
-        found[asked] = part_of(values[few], cells[few], part).take(within(part, onto[asked]))
+        asked = lying_in(part, onto)
+        if np.array_equal(cells[few], onto[asked]):
+            found[asked] = values[few]
+        else:
+            found[asked] = part_of(values[few], cells[few], part).take(within(part, onto[asked]))
 
     with_cells(work, size, cells, threads)
     return found

@@ -74,7 +74,7 @@ class Sparse:
         """Some of it by flat indices, not to be changed."""
         if self.cells is None:
             return self.values.reshape(-1)[part]
-        few = slice(*self.cells.searchsorted((part.start, part.stop)))
+        few = passes.lying_in(part, self.cells)
         return passes.part_of(self.values[few], self.cells[few], part)
 
     def times(self, factor: float) -> Array:
@@ -157,8 +157,9 @@ class Scattered:
         """Which of its cells lie in some rows, and where in them."""
         if rows.stop - rows.start == self.shape[0]:
             return slice(0, self.cells.size), self.cells
-        few = slice(*self.cells.searchsorted((rows.start * self.shape[1], rows.stop * self.shape[1])))
-        return few, self.cells[few] - rows.start * self.shape[1]
+        part = slice(rows.start * self.shape[1], rows.stop * self.shape[1])
+        few = passes.lying_in(part, self.cells)
+        return few, passes.within(part, self.cells[few])
 
 
 @dataclass(frozen=True)

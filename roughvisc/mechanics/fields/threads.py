@@ -62,6 +62,14 @@ def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
     return found
 
 
+def beside(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
+    """Begin some work beside the caller's where there is another thread; what is returned waits for what it gives."""
+    if threads == 1:
+        return work
+    begun = _pool(threads, os.getpid()).submit(work)
+    return lambda: work() if begun.cancel() else begun.result()
+
+
 def blocks(length: int, size: int) -> Iterator[slice]:
     """Slices of a size, the last one shorter."""
     return (slice(first, min(first + size, length)) for first in range(0, length, size))

@@ -1,5 +1,8 @@
 """The second level of the preconditioner: symmetric, positive, right for long waves, and no part of the answer."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 
@@ -156,6 +159,25 @@ def test_contact__is_the_same_with_both_levels(monkeypatch, boundary, given):
     assert both.iterations != alone.iterations  # the second level was there
     assert np.abs(both.pressure - alone.pressure).sum() < 3e-6 * alone.pressure.sum()
     assert both.approach == pytest.approx(alone.approach, rel=1e-6)
+
+
+def test_both_levels__leave_no_work_behind_where_one_fails(on_small_grids, monkeypatch):
+    influence, _, waves = waves_of()
+    influence.threads = 2
+    ended = threading.Event()
+
+    def answered(self, sums):
+        time.sleep(0.05)  # longer than the failure takes
+        ended.set()
+        return np.zeros_like(sums)
+
+    def fails(residual):
+        raise MemoryError("of the cells")
+
+    monkeypatch.setattr(LongWaves, "_answered", answered)
+    with pytest.raises(MemoryError, match="of the cells"):
+        waves.preconditioned(np.ones(spots().size), fails)
+    assert ended.is_set()
 
 
 @BODIES

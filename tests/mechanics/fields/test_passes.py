@@ -1,5 +1,8 @@
 """Passes over a grid: what NumPy does at once, whatever the parts and the threads."""
 
+import threading
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -59,6 +62,10 @@ def test_values_of_some_cells__are_carried_over_to_others(threads, size, monkeyp
     assert np.array_equal(found, field[onto])
     assert 0 < np.count_nonzero(found) < onto.size
     assert passes.carried_over(values[:0], cells[:0], onto, field.size, threads).sum() == 0
+    moved = np.append(cells[:-1], 98)  # the same but in the last part
+    assert cells[-1] < 98
+    field[cells[-1]] = 0
+    assert np.array_equal(passes.carried_over(values[:-1], cells[:-1], moved, field.size, threads), field[moved])
 
 
 @THREADS
@@ -116,6 +123,71 @@ def test_side_by_side__within_itself_ends():
         return sum(threads_module.side_by_side(lambda number: number * part, range(4), 2))
 
     assert threads_module.side_by_side(inner, range(20), 2) == [6 * part for part in range(20)]
+
+
+@pytest.mark.parametrize("size", [14, 26, 27, 39, 40, 131])
+def test_parts__are_pairs_of_equal_ones(size):
+    parts = passes.of_parts(lambda part: part, size, 1)
+    assert len(parts) % 2 == 0
+    assert np.array_equal(np.concatenate([np.arange(size)[part] for part in parts]), np.arange(size))
+    lengths = [part.stop - part.start for part in parts]
+    assert max(lengths) <= 13
+    assert min(lengths) > max(lengths) - len(parts)  # the last one is what is left
+
+
+@pytest.mark.parametrize("kind", [np.int32, np.int64])
+def test_cells_of_a_part__are_found_without_a_copy_of_all(kind):
+    cells = np.arange(0, 300_000, 3, dtype=kind)
+    tracemalloc.start()
+    few = passes.lying_in(slice(100, 200), cells)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert cells[few].tolist() == list(range(102, 200, 3))
+    assert peak < cells.nbytes / 10
+
+
+@THREADS
+def test_what_was_found_of_parts__is_joined_in_their_order(threads):
+    parts = [np.arange(3, dtype=np.int32), np.empty(0, np.int32), np.array([9], np.int32)]
+    found = passes.joined(parts, threads)
+    assert found.dtype == np.int32
+    assert found.tolist() == [0, 1, 2, 9]
+    assert passes.joined(parts[:1], threads) is parts[0]
+
+
+def test_work_beside__begins_at_once_on_another_thread():
+    begun = threading.Event()
+
+    def work():
+        begun.set()
+        return threading.get_ident()
+
+    found = threads_module.beside(work, 2)
+    assert begun.wait(30)
+    assert found() != threading.get_ident()
+    begun.clear()
+    found = threads_module.beside(work, 1)
+    assert not begun.is_set()  # the only thread is the caller's
+    assert found() == threading.get_ident()
+
+
+def test_work_beside__is_the_callers_where_no_other_thread_is_free():
+    ended, busy = threading.Event(), threading.Event()
+    waiting = threads_module.beside(lambda: (busy.set(), ended.wait(30)), 2)
+    assert busy.wait(30)
+    assert threads_module.beside(threading.get_ident, 2)() == threading.get_ident()
+    ended.set()
+    waiting()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_error_beside__comes_where_it_is_waited_for(threads):
+    def work():
+        raise KeyError("of the work")
+
+    found = threads_module.beside(work, threads)
+    with pytest.raises(KeyError, match="of the work"):
+        found()
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
