@@ -105,7 +105,8 @@ def conjugate_gradient(
     """
     threads = problem.influence.threads
     free_set, residual, held = problem.free_set(pressure, displacement, level)
-    residual -= level if problem.load is None else passes.total(residual, threads) / residual.size
+    here = level if problem.load is None else passes.total(residual, threads) / residual.size
+    passes.lower(residual, here, threads)
     search, caution = problem.answered(residual, free_set, held, energy)
     asked = caution * passes.magnitude(search, threads) if measured else math.nan
     if previous is not None:
@@ -184,15 +185,24 @@ def minimum_along(trial: Trial, curvature: float) -> float:
     return min(-trial.slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
 
 
-def admissible_fraction(trial: Trial, minimum: float) -> tuple[float, bool]:
+def admissible_fraction(trial: Trial, minimum: float, threads: int) -> tuple[float, bool]:
     """Fraction of a trial to take, and whether the border of the feasible set cut it."""
-    if ((trial.held > 0) & (trial.pressure == 0)).any():
+    held, tried, change = trial.held, trial.pressure, trial.change
+
+    def emptied(part: slice) -> bool:
+        return bool(((held[part] > 0) & (tried[part] == 0)).any())
+
+    if any(passes.of_parts(emptied, held.size, threads)):
         # whole if f falls by it, so that these cells leave the contact
         return (1.0, minimum > 1) if minimum > _HALF_WAY else (minimum, False)
     if minimum <= 1:
         return minimum, False
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # of its own pressure, in the cell that reaches zero first
-        steepest = float(np.fmin.reduce(trial.change / trial.held, initial=math.inf))
+
+    def reached(part: slice) -> float:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.fmin.reduce(change[part] / held[part], initial=math.inf))
+
+    # of its own pressure, in the cell that reaches zero first
+    steepest = min(passes.of_parts(reached, held.size, threads))
     limit = -1 / steepest if steepest < 0 else math.inf
     return min(minimum, limit), minimum > limit

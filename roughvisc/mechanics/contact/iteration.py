@@ -206,7 +206,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
 
     curvature = unit * sum(passes.of_parts(curved, free_set.size, threads))
     minimum = minimum_along(trial, curvature)
-    fraction, cut = admissible_fraction(trial, minimum)
+    fraction, cut = admissible_fraction(trial, minimum, threads)
 
     def taken(part: slice) -> Cells:
         here = trial.pressure[part]

@@ -89,7 +89,7 @@ class LongWaves:
             return None
         loads = _sums(influence, blocks, pressure)
         spread = float((loads * loads / np.maximum(cells, 1)).sum())
-        smooth = float((loads * influence.of_blocks(loads)).sum())
+        smooth = float((loads * influence.of_blocks(loads.astype(_KIND))).sum())
         if not energy > smooth:  # a kernel that bulges
             return None
         return cls(influence, blocks, cells, _SHARE * (energy - smooth) / spread)

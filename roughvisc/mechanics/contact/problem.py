@@ -150,9 +150,10 @@ class Problem:
         return cells, apart, held
 
     def tangent(self, vector: Array) -> Array:
-        """Part of a vector on the free set that keeps a given load."""
+        """Part of a vector on the free set that keeps a given load, in its place."""
         if self.load is not None:
-            vector = vector - passes.total(vector, self.influence.threads) / vector.size
+            threads = self.influence.threads
+            passes.lower(vector, passes.total(vector, threads) / vector.size, threads)
         return vector
 
     def preconditioned(self, residual: Array, free_set: Cells) -> Array:
@@ -173,7 +174,7 @@ class Problem:
     def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
         threads = self.influence.threads
-        if start is None or not np.any(start > 0):
+        if start is None or not passes.any_positive(start):
             pressure, displacement = np.ones(self.gap.shape), None
             if self.load is None:
                 pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)

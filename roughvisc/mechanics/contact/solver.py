@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.contact.iteration import solved
 from roughvisc.mechanics.contact.problem import Array, Problem
 from roughvisc.mechanics.contact.state import ContactState
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty, reused
 from roughvisc.mechanics.fields.threads import blocks, side_by_side
 from roughvisc.mechanics.halfspace.operator import HalfSpace
@@ -84,7 +85,7 @@ def solve_contact(
             None if start_displacement is None else np.array(start_displacement, dtype=float, order="C")
         )
     with reused():
-        if load is not None and present is None and (start is None or not np.any(start > 0)):
+        if load is not None and present is None and (start is None or not passes.any_positive(start)):
             start, start_displacement = coarse_guess(halfspace, gap, load), None
         problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
         return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)

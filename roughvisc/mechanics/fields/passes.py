@@ -91,6 +91,12 @@ def subtract(out: Array, field: Array, threads: int) -> None:
     of_parts(lambda part: np.subtract(found[part], taken_off[part], out=found[part]), out.size, threads)
 
 
+def lower(out: Array, by: float, threads: int) -> None:
+    """``out -= by``."""
+    found = _flat(out)
+    of_parts(lambda part: np.subtract(found[part], by, out=found[part]), out.size, threads)
+
+
 def multiply(out: Array, factor: float, threads: int) -> None:
     """``out *= factor``."""
     found = _flat(out)
@@ -145,6 +151,12 @@ def apart(a: Array, b: Array, threads: int) -> float:
     """Sum of the magnitudes of ``a - b``."""
     first, second = a.reshape(-1), b.reshape(-1)
     return sum(of_parts(lambda part: float(np.abs(first[part] - second[part]).sum()), a.size, threads))
+
+
+def any_positive(field: Array) -> bool:
+    """Whether any cell is: asked part by part, since one of the first mostly says so."""
+    values = field.reshape(-1)
+    return any(bool((values[part] > 0).any()) for part in blocks(field.size, _PART))
 
 
 def lowest(field: Array, present: Mask | None, threads: int) -> float:

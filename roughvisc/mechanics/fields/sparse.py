@@ -89,8 +89,13 @@ class Sparse:
         """``out += factor`` times it."""
         if self.cells is None:
             passes.add_scaled(out, self.values, factor, self.threads)
-        else:
-            out.reshape(-1)[self.cells] += factor * self.values
+            return
+        found, cells = out.reshape(-1), self.cells
+
+        def work(part: slice) -> None:
+            found[cells[part]] += factor * self.values[part]
+
+        passes.of_parts(work, cells.size, self.threads)
 
     def apart_from(self, other: Sparse) -> float:
         """Sum of the magnitudes of the difference to another field."""

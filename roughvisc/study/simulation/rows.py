@@ -231,7 +231,7 @@ class Rows:
             meaning = "not_converged"
         elif step.shown.force == 0:
             meaning = "open"
-        elif self._ground.window.whole and contact[self._ground.present].all():
+        elif self._ground.window.whole and np.count_nonzero(contact) == np.count_nonzero(self._ground.present):
             meaning = "full_contact"
         else:
             meaning = "converged"

@@ -10,6 +10,7 @@ from roughvisc.mechanics.contact import descent, iteration
 from roughvisc.mechanics.contact.descent import Step, Trial, admissible_fraction, minimum_along
 from roughvisc.mechanics.contact.iteration import Iterate, Search
 from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
@@ -168,10 +169,14 @@ def test_minimum__is_that_of_the_parabola_and_not_too_far(slope, curvature, expe
         ((1.0, 2.0), (0.0, 3.0), 1.7, (1.0, True)),
     ],
 )
-def test_step__goes_as_far_as_the_energy_falls_and_no_pressure_turns_to_tension(held, tried, minimum, expected):
+@pytest.mark.parametrize("part", [1, 100])
+def test_step__goes_as_far_as_the_energy_falls_and_no_pressure_turns_to_tension(
+    held, tried, minimum, expected, part, monkeypatch
+):
+    monkeypatch.setattr(passes, "_PART", part)
     held, tried = np.array(held), np.array(tried)
     trial = Trial(np.arange(held.size), held, tried, tried - held, -1.0)
-    fraction, cut = admissible_fraction(trial, minimum)
+    fraction, cut = admissible_fraction(trial, minimum, 1)
     assert (fraction, cut) == (pytest.approx(expected[0]), expected[1])
     assert (held + fraction * (tried - held)).min() >= -1e-15
 
@@ -200,7 +205,7 @@ def test_step__ends_where_the_energy_is_least_along_it(known, single, step_lengt
     assert stepped.approximate == single
     assert np.array_equal(stepped.contact, np.flatnonzero(stepped.pressure))
     assert energy(problem, matrix, stepped.pressure) < before
-    fraction, cut = admissible_fraction(trial, minimum)
+    fraction, cut = admissible_fraction(trial, minimum, 1)
     assert stepped.pressure == pytest.approx(np.maximum(pressure + fraction * whole, 0), rel=1e-4, abs=1e-7)
     growth = min(max(minimum, 0.3), 1.3 if cut else 3.0)
     assert after == Search(pytest.approx(step_length * growth, rel=1e-4), False, single, 5.0, 3)

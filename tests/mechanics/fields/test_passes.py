@@ -79,6 +79,7 @@ def test_passes__of_arithmetic(threads):
 
     assert np.array_equal(after(passes.subtract, b), a - b)
     assert np.array_equal(after(passes.multiply, 0.3), a * 0.3)
+    assert np.array_equal(after(passes.lower, 0.3), a - 0.3)
     assert np.array_equal(after(passes.divide, 0.3), a / 0.3)
     assert np.array_equal(after(passes.scale, 0.2, 0.3), (a - 0.2) / 0.3)
     assert np.array_equal(after(passes.cut_and_divide, 0.3), np.maximum(a, 0) / 0.3)
@@ -133,6 +134,15 @@ def test_parts__are_pairs_of_equal_ones(size):
     lengths = [part.stop - part.start for part in parts]
     assert max(lengths) <= 13
     assert min(lengths) > max(lengths) - len(parts)  # the last one is what is left
+
+
+@pytest.mark.parametrize("cell", [None, 0, 13, 98])
+def test_any_positive__finds_one_cell_wherever_it_is(cell):
+    field = np.zeros((9, 11))
+    field[4] = -1.0
+    if cell is not None:
+        field.reshape(-1)[cell] = 1e-300
+    assert passes.any_positive(field) == (cell is not None)
 
 
 @pytest.mark.parametrize("kind", [np.int32, np.int64])
