@@ -124,9 +124,15 @@ class HalfSpace:
     @cached_property
     def self_influence(self) -> float:
         """Displacement of a cell under unit pressure on it alone, and on its mirror images. [m]"""
-        unit = np.zeros(self.shape)
-        unit[0, 0] = 1
-        return float(self.displacement(unit)[0, 0])
+        along_x, along_y = (self._waves(points) for points in self._points)
+        return float(((self._symbol * along_y).sum(axis=1) * along_x).sum())
+
+    def _waves(self, points: int) -> Array:
+        """How much of each wave number's response one cell of so many meets, under pressure on it and its images."""
+        count = self._transforms.images * points
+        number = np.arange(self._transforms.width(points))
+        each = np.where((number == 0) | (2 * number == count), 1.0, 2.0) / count  # negative wave numbers too
+        return each * (1 + np.cos(2 * np.pi * number / count)) if self.mirrored else each
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Surface displacement under a pressure: one convolution.
@@ -319,9 +325,13 @@ class HalfSpace:
 
     @cached_property
     def _inverse_symbol(self) -> list[NDArray[Any]]:
-        symbol = periodic_symbol(self.kernel, self.surface_shape, self.spacing)
+        if self.boundary == "periodic" and not self.mirrored:  # of images some waves are not there
+            symbol = self._symbol.copy()
+        else:
+            symbol = periodic_symbol(self.kernel, self.surface_shape, self.spacing)
         symbol[0, 0] = symbol[0, 0] or np.max(symbol) or self.spacing[0]
-        return self._by_columns(self._transforms.cropped(1 / symbol, self.shape).astype(np.float32), self.shape)
+        np.divide(1, symbol, out=symbol)
+        return self._by_columns(self._transforms.cropped(symbol, self.shape).astype(np.float32), self.shape)
 
     def _whole(self, field: NDArray[Any] | Scattered, symbol: list[NDArray[Any]]) -> NDArray[Any]:
         """Convolution on the cells themselves at once."""

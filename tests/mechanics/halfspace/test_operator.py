@@ -202,6 +202,16 @@ def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
     assert HalfSpace(shape, (a, b), mirrored=True).self_influence == pytest.approx(four, rel=1e-12)
 
 
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("shape", [(7, 6), (8, 5), (1, 4), (1, 1)])
+def test_self_influence__is_the_displacement_of_a_cell_that_is_loaded_alone(boundary, mirrored, shape):
+    halfspace = HalfSpace(shape, (1.3, 0.7), boundary, mirrored=mirrored)
+    alone = np.zeros(shape)
+    alone[0, 0] = 1
+    assert halfspace.self_influence == pytest.approx(halfspace.displacement(alone)[0, 0], rel=1e-13)
+
+
 def test_self_influence__with_periodic_boundaries_is_the_mean_of_the_symbol():
     found = HalfSpace((7, 6), (1.3, 0.7), "periodic").self_influence
     qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((7, 6), (1.3, 0.7), strict=True))
