@@ -1,6 +1,8 @@
 """Steady sliding: against closed forms, against a dense solution of the same equations, and what must hold for any."""
 
+import itertools
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +15,7 @@ from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding, mixed, steady_state
 
 PERIOD, TIME = 1e-3, 1e-3
@@ -52,6 +55,21 @@ def test_full_contact_of_a_wave__is_exact(loss, speed, body):
     exact = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
     assert found.power_force / (pressure * area) == pytest.approx(exact, rel=1e-5)
     assert found.slope_force / (pressure * area) == pytest.approx(exact, rel=1e-5)
+
+
+@pytest.mark.parametrize("ulps", [1, 4])
+def test_change_that_is_nothing_but_rounding__ends_the_iteration(monkeypatch, ulps):
+    """In full contact the solver's first guess is the answer, and its pressure may differ by rounding at each step."""
+    signs = itertools.cycle([1, -1])
+
+    def rounding(*given, **wanted):
+        state = solve_contact(*given, **wanted)
+        return replace(state, pressure=state.pressure * (1 + next(signs) * ulps * np.finfo(float).eps))
+
+    monkeypatch.setattr(steady, "solve_contact", rounding)
+    found = slid(wave(21, 1e-6, 3), rubber(), 2.0, 1e4, tolerance=1e-7)
+    assert found.converged
+    assert found.outer < 30
 
 
 def dense(height, material, speed, load):

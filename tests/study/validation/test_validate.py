@@ -87,7 +87,7 @@ def test_broken_solver__fails(fault, cases, monkeypatch):
 
 
 def test_refusal__is_a_comparison_that_fails(monkeypatch):
-    def refuse(self, pressure):
+    def refuse(self, pressure, out=None):
         raise rv.ConvergenceError("it does not converge")
 
     monkeypatch.setattr(HalfSpace, "displacement", refuse)
