@@ -2,6 +2,7 @@
 
 import threading
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -117,6 +118,14 @@ def test_error_in_a_part__ends_all(threads, error):
     with pytest.raises(error, match="of the part"):
         threads_module.side_by_side(work, range(1000), threads)
     assert len(done) < 1000 - 1
+
+
+@pytest.mark.parametrize("threads", [2, 3, 4])
+@pytest.mark.parametrize("count", [7, 12, 65])
+def test_parts_worked_on_at_a_time__do_not_lie_side_by_side(threads, count):
+    order = threads_module._far_apart(count, threads)
+    assert sorted(order) == list(range(count))
+    assert min(abs(a - b) for a, b in pairwise(order)) >= -(-count // threads) - 1
 
 
 def test_side_by_side__within_itself_ends():
