@@ -105,8 +105,8 @@ def conjugate_gradient(
     """
     threads = problem.influence.threads
     free_set, residual, held = problem.free_set(pressure, displacement, level)
-    here = level if problem.load is None else passes.total(residual, threads) / residual.size
-    passes.lower(residual, here, threads)
+    reference = level if problem.load is None else passes.total(residual, threads) / residual.size
+    passes.lower(residual, reference, threads)
     search, caution = problem.answered(residual, free_set, held, energy)
     asked = caution * passes.magnitude(search, threads) if measured else math.nan
     if previous is not None:

@@ -150,7 +150,7 @@ def cut_and_divide(out: Array, divisor: float, threads: int) -> None:
 def apart(a: Array, b: Array, threads: int) -> float:
     """Sum of the magnitudes of ``a - b``."""
     first, second = a.reshape(-1), b.reshape(-1)
-    return sum(of_parts(lambda part: float(np.abs(first[part] - second[part]).sum()), a.size, threads))
+    return sum(of_parts(lambda part: summed(np.abs(first[part] - second[part])), a.size, threads))
 
 
 def any_positive(field: Array) -> bool:

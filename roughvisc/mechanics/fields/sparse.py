@@ -101,7 +101,7 @@ class Sparse:
         """Sum of the magnitudes of the difference to another field."""
 
         def work(part: slice) -> float:
-            return float(np.abs(self.part(part) - other.part(part)).sum())
+            return passes.summed(np.abs(self.part(part) - other.part(part)))
 
         return sum(passes.of_parts(work, self.size, self.threads))
 

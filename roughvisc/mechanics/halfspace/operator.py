@@ -325,7 +325,7 @@ class HalfSpace:
 
     @cached_property
     def _inverse_symbol(self) -> list[NDArray[Any]]:
-        if self.boundary == "periodic" and not self.mirrored:  # of images some waves are not there
+        if self.boundary == "periodic" and not self.mirrored:  # that of a mirrored surface lacks its shortest waves
             symbol = self._symbol.copy()
         else:
             symbol = periodic_symbol(self.kernel, self.surface_shape, self.spacing)
