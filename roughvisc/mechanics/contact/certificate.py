@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,8 @@ class Certificate:
         Whether the duality gap is small enough, and the load certain.
     hopeless : bool
         Whether the approach does not determine the load.
+    separation : ndarray, shape (nx * ny,), or None
+        Of a field that is one part; that of others is as soon had again as fetched.
     """
 
     duality_gap: float
@@ -39,6 +42,7 @@ class Certificate:
     level: float
     converged: bool
     hopeless: bool
+    separation: Array | None = None
 
     @property
     def settled(self) -> bool:
@@ -63,27 +67,16 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     Certificate
     """
     carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
+    lowest, apart, separation = problem.separated(displacement, contact)
 
-    def judged(part: slice, few: slice) -> tuple[float, ...]:
-        apart, cells = problem.separation_of(displaced, part), contact[few]
-        lowest = problem.lowest_of(apart, part)
-        if part.start:
-            cells = cells - part.start
-        here = apart.take(cells)
-        del apart
-        p, u = carried[part].take(cells), displaced[part].take(cells)
+    def judged(here: Array, cells: Cells) -> tuple[float, ...]:
+        p = carried.take(cells)
         excess = 0.0 if problem.load is not None else passes.summed(p * (here - problem.target))
-        sums = passes.summed(p), excess, *map(passes.summed, (p * u, here, p * (here - lowest)))
-        return lowest, float(np.maximum.reduce(here, initial=1.0)), -float(np.minimum.reduce(here, initial=-1.0)), *sums
+        sums = passes.summed(p), excess, *map(passes.summed, (p * displaced.take(cells), here, p * (here - lowest)))
+        return max(float(np.maximum.reduce(here, initial=1.0)), -float(np.minimum.reduce(here, initial=0.0))), *sums
 
-    found = passes.with_cells(judged, pressure.size, contact, problem.influence.threads)
-    lows, highest, deepest, loads, *sums = zip(*found, strict=True)
-    lowest, load = min(lows), float(sum(loads))
-    excess, energy, height, above = (float(sum(each)) for each in sums)
-    # above the lowest of each part, and that above the lowest of all: nothing cancels
-    own_duality_gap = above + sum(
-        (low - lowest) * carrying for low, carrying in zip(lows, loads, strict=True) if carrying
-    )
+    found = _together(passes.of_vectors(judged, problem.influence.threads, apart, contact))
+    largest, load, excess, energy, height, own_duality_gap = found
     if problem.load is not None:
         level = height / contact.size
         duality_gap = own_duality_gap
@@ -91,15 +84,22 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         level = problem.target
         duality_gap = _under_approach(problem, displacement, load, excess, own_duality_gap, lowest)
     # with rounding of the sums above; a pressure of nothing has no error to speak of
-    largest = max(*highest, *deepest)
     converged = duality_gap <= problem.tolerance * energy + _ROUNDING * load * largest and load > 0
     hopeless = contact.size == pressure.size and problem.remaining < -ROUNDED  # no load is enough
     if converged and not problem.sees_load:
         rounding = _ROUNDING * max(largest, float(problem.influence.at(displacement, contact).max()))
-        separation = problem.separation(displacement)
-        here = problem.influence.at(separation, contact)
-        converged, hopeless = load_certainty(problem, contact, separation, here, load, rounding)
-    return Certificate(duality_gap, energy, level, converged, hopeless)
+        field = problem.separation(displacement)
+        here = problem.influence.at(field, contact)
+        converged, hopeless = load_certainty(problem, contact, field, here, load, rounding)
+    return Certificate(duality_gap, energy, level, converged, hopeless, separation)
+
+
+def _together(parts: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
+    """What was found of parts, of all of them: the largest of the first, and the sums of the others."""
+    if len(parts) == 1:
+        return parts[0]
+    first, *others = zip(*parts, strict=True)
+    return max(first), *map(sum, others)
 
 
 def _under_approach(

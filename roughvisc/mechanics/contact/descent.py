@@ -83,6 +83,7 @@ def conjugate_gradient(
     step_length: float,
     previous: Step | None,
     measured: bool,
+    separation: Array | None = None,
 ) -> Trial:
     """Preconditioned trial, conjugate to the previous step.
 
@@ -102,9 +103,11 @@ def conjugate_gradient(
         What to conjugate to.
     measured : bool
         Whether to measure the change that the preconditioner asks for.
+    separation : ndarray, shape (nx * ny,), or None
+        Gap under pressure at zero approach, where that is known.
     """
     threads = problem.influence.threads
-    free_set, residual, held = problem.free_set(pressure, displacement, level)
+    free_set, residual, held = problem.free_set(pressure, displacement, level, separation)
     reference = level if problem.load is None else passes.total(residual, threads) / residual.size
     passes.lower(residual, reference, threads)
     search, caution = problem.answered(residual, free_set, held, energy)
@@ -112,23 +115,22 @@ def conjugate_gradient(
     if previous is not None:
         search = _conjugate(problem, search, residual, free_set, previous)
 
-    def moved(part: slice) -> float:
-        here = search[part]
+    def moved(here: Array, before: Array) -> float:
         here *= -step_length
-        here += held[part]
+        here += before
         np.maximum(here, 0, out=here)  # in the manner of Polonsky and Keer: cut at zero, then scaled to the load
         return passes.summed(here)
 
-    carried = sum(passes.of_parts(moved, search.size, threads))
+    carried = sum(passes.of_vectors(moved, threads, search, held))
     scale = 1.0 if problem.load is None else problem.load / carried
     change = np.empty_like(search)
 
-    def scaled(part: slice) -> float:
-        search[part] *= scale
-        np.subtract(search[part], held[part], out=change[part])
-        return passes.summed(change[part] * residual[part])
+    def scaled(here: Array, before: Array, by: Array, downhill: Array) -> float:
+        here *= scale
+        np.subtract(here, before, out=by)
+        return passes.summed(by * downhill)
 
-    slope = sum(passes.of_parts(scaled, search.size, threads))
+    slope = sum(passes.of_vectors(scaled, threads, search, held, change, residual))
     return Trial(free_set, held, search, change, slope, asked)
 
 
@@ -137,22 +139,21 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
     influence, threads = problem.influence, problem.influence.threads
     response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
 
-    def along(part: slice) -> float:
-        return passes.summed(search[part] * (response.take(free_set[part]) * unit))
+    def along(here: Array, cells: Cells) -> float:
+        return passes.summed(here * (response.take(cells) * unit))
 
-    beta = sum(passes.of_parts(along, search.size, threads))
+    beta = sum(passes.of_vectors(along, threads, search, free_set))
     if beta > 0:
         former = passes.carried_over(previous.change, previous.free_set, free_set, influence.size, threads)
         mean = 0.0 if problem.load is None else passes.total(former, threads) / former.size
 
-        def conjugated(part: slice) -> float:
-            here = former[part]
+        def conjugated(here: Array, there: Array, downhill: Array) -> float:
             here -= mean
             here *= beta
-            np.subtract(search[part], here, out=here)
-            return passes.summed(residual[part] * here)
+            np.subtract(there, here, out=here)
+            return passes.summed(downhill * here)
 
-        if sum(passes.of_parts(conjugated, search.size, threads)) > 0:
+        if sum(passes.of_vectors(conjugated, threads, former, search, residual)) > 0:
             return former
     return search
 
@@ -189,20 +190,20 @@ def admissible_fraction(trial: Trial, minimum: float, threads: int) -> tuple[flo
     """Fraction of a trial to take, and whether the border of the feasible set cut it."""
     held, tried, change = trial.held, trial.pressure, trial.change
 
-    def emptied(part: slice) -> bool:
-        return bool(((held[part] > 0) & (tried[part] == 0)).any())
+    def emptied(before: Array, after: Array) -> bool:
+        return bool(np.count_nonzero((before > 0) & (after == 0)))
 
-    if any(passes.of_parts(emptied, held.size, threads)):
+    if any(passes.of_vectors(emptied, threads, held, tried)):
         # whole if f falls by it, so that these cells leave the contact
         return (1.0, minimum > 1) if minimum > _HALF_WAY else (minimum, False)
     if minimum <= 1:
         return minimum, False
 
-    def reached(part: slice) -> float:
+    def reached(by: Array, before: Array) -> float:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.fmin.reduce(change[part] / held[part], initial=math.inf))
+            return float(np.fmin.reduce(by / before, initial=math.inf))
 
     # of its own pressure, in the cell that reaches zero first
-    steepest = min(passes.of_parts(reached, held.size, threads))
+    steepest = min(passes.of_vectors(reached, threads, change, held))
     limit = -1 / steepest if steepest < 0 else math.inf
     return min(minimum, limit), minimum > limit

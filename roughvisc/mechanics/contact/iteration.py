@@ -131,6 +131,7 @@ def solved(
                 step_length=search.step_length,
                 previous=previous,
                 measured=estimate_error,
+                separation=certificate.separation,
             )
             asked = (trial.asked, certificate.duality_gap) if estimate_error else None
         if not trial.slope < 0:  # no descent
@@ -199,26 +200,21 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
     if not search.single:  # else its displacement is that of the change alone
         passes.put(pressure, free_set, trial.pressure, threads)
     response, unit = _response(influence, iterate, trial, search.single)
-    answer = response.reshape(-1)
-
-    def curved(part: slice) -> float:
-        return passes.summed(trial.change[part] * answer.take(free_set[part]))
-
-    curvature = unit * sum(passes.of_parts(curved, free_set.size, threads))
+    curvature = unit * passes.inner(response, free_set, trial.change, threads)
     minimum = minimum_along(trial, curvature)
     fraction, cut = admissible_fraction(trial, minimum, threads)
 
-    def taken(part: slice) -> Cells:
-        here = trial.pressure[part]
+    def taken(cells: Cells, here: Array, change: Array, held: Array) -> Cells:
         if fraction != 1:
-            here = fraction * trial.change[part]
-            here += trial.held[part]
+            here = fraction * change
+            here += held
             np.maximum(here, 0, out=here)
         if fraction != 1 or search.single:
-            pressure[free_set[part]] = here
-        return free_set[part][here > 0]
+            pressure[cells] = here
+        return cells[here > 0]
 
-    contact = passes.joined(passes.of_parts(taken, free_set.size, threads), threads)
+    found = passes.of_vectors(taken, threads, free_set, trial.pressure, trial.change, trial.held)
+    contact = passes.joined(found, threads)
     passes.add_scaled(displacement, response, fraction * unit, threads)
     stepped = Iterate(iterate.pressure, displacement, contact, approximate=search.single)
     if search.spacer:

@@ -115,6 +115,22 @@ class Problem:
         """Gap under pressure at zero approach."""
         return passes.add(self.gap, displacement, empty(self.gap.shape), self.influence.threads)
 
+    def separated(self, displacement: Array, contact: Cells) -> tuple[float, Array, Array | None]:
+        """Least separation of present cells, and that of some cells; with that of all, flat, of a field of one part."""
+        displaced = displacement.reshape(-1)
+        whole = slice(0, displaced.size)
+        if passes.is_one_part(displaced.size):
+            field = self.separation_of(displaced, whole)
+            return self.lowest_of(field, whole), field.take(contact), field
+        apart = np.empty(contact.size)
+
+        def work(part: slice, few: slice) -> float:
+            here = self.separation_of(displaced, part)
+            here.take(passes.within(part, contact[few]), out=apart[few], mode="clip")  # by others by way of a copy
+            return self.lowest_of(here, part)
+
+        return min(passes.with_cells(work, displaced.size, contact, self.influence.threads)), apart, None
+
     def separation_of(self, displaced: Array, part: slice) -> Array:
         """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
         return self.gap.reshape(-1)[part] + displaced[part]
@@ -122,16 +138,21 @@ class Problem:
     def lowest_of(self, apart: Array, part: slice) -> float:
         """Least separation of some present cells; infinite if none of them is."""
         if self.present is None:
-            return float(apart.min())
+            return float(np.minimum.reduce(apart))
         return float(apart.min(where=self.present.reshape(-1)[part], initial=math.inf))
 
-    def free_set(self, pressure: Array, displacement: Array, level: float) -> tuple[Cells, Array, Array]:
-        """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there."""
+    def free_set(
+        self, pressure: Array, displacement: Array, level: float, separation: Array | None = None
+    ) -> tuple[Cells, Array, Array]:
+        """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there.
+
+        ``separation`` is that of all cells, flat, where it is known of a field that is one part.
+        """
         carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
         present, threads = None if self.present is None else self.present.reshape(-1), self.influence.threads
 
         def free(part: slice) -> tuple[Cells, Array, Array]:
-            apart, here = self.separation_of(displaced, part), carried[part]
+            apart, here = self.separation_of(displaced, part) if separation is None else separation, carried[part]
             mask = apart < level
             if present is not None:
                 mask &= present[part]
@@ -143,6 +164,8 @@ class Problem:
             return cells, *values
 
         found = passes.of_parts(free, pressure.size, threads)
+        if len(found) == 1:
+            return found[0]
         parts = [list(each) for each in zip(*found, strict=True)]
         del found
         # the parts go as they are joined

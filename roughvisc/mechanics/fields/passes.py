@@ -26,12 +26,25 @@ Found = TypeVar("Found")
 _PART = 1 << 17
 
 
+def is_one_part(size: int) -> bool:
+    """Whether a vector of some size is worked on as a whole."""
+    return size <= _PART
+
+
 def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Found]:
     """What some work gives of each part of a vector of some size, in their order."""
-    if size <= _PART:
+    if is_one_part(size):
         return [work(slice(0, size))]
     pairs = -(-size // (2 * _PART))  # of equal parts: of three, one thread of two would wait for the last
     return side_by_side(work, list(blocks(size, -(-size // (2 * pairs)))), threads)
+
+
+def of_vectors(work: Callable[..., Found], threads: int, *vectors: NDArray[Any]) -> list[Found]:
+    """What some work gives of each part of vectors of one size, which it is given, in their order."""
+    size = vectors[0].size
+    if is_one_part(size):  # on narrow grids slices would take as long as the work
+        return [work(*vectors)]
+    return of_parts(lambda part: work(*[vector[part] for vector in vectors]), size, threads)
 
 
 def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int) -> list[Found]:
@@ -42,7 +55,7 @@ def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int
 def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, threads: int) -> list[Found]:
     """What some work gives of each part of a field of some size, and of those of some cells that lie in it."""
 
-    if size <= _PART:
+    if is_one_part(size):
         return [work(slice(0, size), slice(0, cells.size))]
     return of_parts(lambda part: work(part, lying_in(part, cells)), size, threads)
 
@@ -68,89 +81,77 @@ def times(field: Array, factor: float, threads: int) -> Array:
 
 def add(a: Array, b: Array, out: Array, threads: int) -> Array:
     """``out = a + b``."""
-    first, second, found = a.reshape(-1), b.reshape(-1), _flat(out)
-    of_parts(lambda part: np.add(first[part], second[part], out=found[part]), out.size, threads)
+    vectors = a.reshape(-1), b.reshape(-1), _flat(out)
+    of_vectors(lambda first, second, found: np.add(first, second, out=found), threads, *vectors)
     return out
 
 
 def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> None:
     """``out += factor * field``, multiplied in double precision."""
-    found, added = _flat(out), field.reshape(-1)
 
-    def work(part: slice) -> None:
-        here = added[part].astype(np.float64)
+    def work(found: Array, added: NDArray[Any]) -> None:
+        here = added.astype(np.float64)
         here *= factor
-        found[part] += here
+        found += here
 
-    of_parts(work, out.size, threads)
+    of_vectors(work, threads, _flat(out), field.reshape(-1))
 
 
 def subtract(out: Array, field: Array, threads: int) -> None:
     """``out -= field``."""
-    found, taken_off = _flat(out), field.reshape(-1)
-    of_parts(lambda part: np.subtract(found[part], taken_off[part], out=found[part]), out.size, threads)
+    of_vectors(lambda found, less: np.subtract(found, less, out=found), threads, _flat(out), field.reshape(-1))
 
 
 def lower(out: Array, by: float, threads: int) -> None:
     """``out -= by``."""
-    found = _flat(out)
-    of_parts(lambda part: np.subtract(found[part], by, out=found[part]), out.size, threads)
+    of_vectors(lambda found: np.subtract(found, by, out=found), threads, _flat(out))
 
 
 def multiply(out: Array, factor: float, threads: int) -> None:
     """``out *= factor``."""
-    found = _flat(out)
-    of_parts(lambda part: np.multiply(found[part], factor, out=found[part]), out.size, threads)
+    of_vectors(lambda found: np.multiply(found, factor, out=found), threads, _flat(out))
 
 
 def divide(out: Array, divisor: float, threads: int) -> None:
     """``out /= divisor``."""
-    found = _flat(out)
-    of_parts(lambda part: np.divide(found[part], divisor, out=found[part]), out.size, threads)
+    of_vectors(lambda found: np.divide(found, divisor, out=found), threads, _flat(out))
 
 
 def scale(out: Array, origin: float, unit: float, threads: int) -> None:
     """``out = (out - origin) / unit``."""
-    found = _flat(out)
 
-    def work(part: slice) -> None:
-        here = found[part]
-        here -= origin
-        here /= unit
+    def work(found: Array) -> None:
+        found -= origin
+        found /= unit
 
-    of_parts(work, out.size, threads)
+    of_vectors(work, threads, _flat(out))
 
 
 def cut(out: Array, threads: int) -> bool:
     """``out = max(out, 0)``, and whether that has changed anything."""
-    found = _flat(out)
 
-    def work(part: slice) -> bool:
-        here = found[part]
-        below = bool(here.min(initial=0.0) < 0)
+    def work(found: Array) -> bool:
+        below = bool(found.min(initial=0.0) < 0)
         if below:
-            np.maximum(here, 0, out=here)
+            np.maximum(found, 0, out=found)
         return below
 
-    return any(of_parts(work, out.size, threads))
+    return any(of_vectors(work, threads, _flat(out)))
 
 
 def cut_and_divide(out: Array, divisor: float, threads: int) -> None:
     """``out = max(out, 0) / divisor``."""
-    found = _flat(out)
 
-    def work(part: slice) -> None:
-        here = found[part]
-        np.maximum(here, 0, out=here)
-        here /= divisor
+    def work(found: Array) -> None:
+        np.maximum(found, 0, out=found)
+        found /= divisor
 
-    of_parts(work, out.size, threads)
+    of_vectors(work, threads, _flat(out))
 
 
 def apart(a: Array, b: Array, threads: int) -> float:
     """Sum of the magnitudes of ``a - b``."""
-    first, second = a.reshape(-1), b.reshape(-1)
-    return sum(of_parts(lambda part: summed(np.abs(first[part] - second[part])), a.size, threads))
+    return sum(of_vectors(lambda first, second: summed(np.abs(first - second)), threads, a.reshape(-1), b.reshape(-1)))
 
 
 def any_positive(field: Array) -> bool:
@@ -269,20 +270,25 @@ def summed(values: Array) -> float:
     return float(np.add.reduce(values))
 
 
+def inner(field: NDArray[Any], cells: Cells, values: Array, threads: int) -> float:
+    """Inner product of a field with another, which has values at some cells and is zero elsewhere."""
+    whole = field.reshape(-1)
+    return sum(of_vectors(lambda few, there: summed(there * whole.take(few)), threads, cells, values))
+
+
 def total(vector: Array, threads: int) -> float:
     """Sum of a vector."""
-    return sum(of_parts(lambda part: summed(vector[part]), vector.size, threads))
+    return sum(of_vectors(summed, threads, vector))
 
 
 def magnitude(vector: Array, threads: int) -> float:
     """Sum of its magnitudes."""
-    return sum(of_parts(lambda part: summed(np.abs(vector[part])), vector.size, threads))
+    return sum(of_vectors(lambda values: summed(np.abs(values)), threads, vector))
 
 
 def largest(vector: Array, threads: int) -> float:
     """Largest magnitude in a vector; zero of none."""
-
-    return max(of_parts(lambda part: float(np.maximum.reduce(np.abs(vector[part]), initial=0.0)), vector.size, threads))
+    return max(of_vectors(lambda values: float(np.maximum.reduce(np.abs(values), initial=0.0)), threads, vector))
 
 
 def _flat(out: NDArray[Any]) -> NDArray[Any]:

@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields.passes import weighted
+from roughvisc.mechanics.fields.passes import Cells, inner, weighted
 from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
@@ -188,7 +189,7 @@ class Modes:
         """Contact compliance over shear compliance. [-]"""
         return 0.5 * (1 - self.material.poisson)
 
-    def products(self, modes: Array, displacement: Array, cells: NDArray[np.integer], pressure: Array) -> Array:
+    def products(self, modes: Array, displacement: Array, cells: Cells, pressure: Array) -> Array:
         """Inner product ``p K z_i`` of a pressure with each exponential, summed over the cells. [Pa2 m]
 
         The pressure is that on some cells and zero elsewhere; ``displacement`` is that by it at unit compliance.
@@ -196,10 +197,8 @@ class Modes:
         fields = modes[: len(self.material.times)]
         if self.acts_on == "pressure":  # the kernel is symmetric; where nothing was ever in contact z is zero
             return np.einsum("mxy,xy->m", fields, displacement)
-        displaced = fields[:, 1] if self.acts_on == "both" else fields
-        flat = displaced.reshape(len(displaced), displacement.size)
-        # einsum, not a matrix product: the same bits whatever the number of threads
-        return np.einsum("mc,c->m", flat.take(cells, axis=1), pressure)
+        displaced, threads = fields[:, 1] if self.acts_on == "both" else fields, threads_of(displacement.size)
+        return np.array([inner(field, cells, pressure, threads) for field in displaced])
 
     @property
     def _weights(self) -> Array:
@@ -211,13 +210,21 @@ class Modes:
         """``z_n = own z_(n-1) + earlier z_(n-2) + before field_(n-1) + after field_n``, a fluidity last."""
         if rule == "bdf2" and state.earlier is None:
             raise ValueError("the two-step rule needs two states: start with 'linear' or 'euler'")
-        x = step / np.array(self.material.times) if self.material.times else np.zeros(0)
-        retarded = _step_coefficients(x, step, state.step, rule)
-        if not self.material.fluidity:
-            return retarded
-        flowing = _flow_coefficients(step, state.step, rule)
-        joined = [np.append(mode, flow) for mode, flow in zip(retarded, flowing, strict=True)]
-        return joined[0], joined[1], joined[2], joined[3]
+        return _coefficients(self.material, step, state.step, rule)
+
+
+@lru_cache(maxsize=8)
+def _coefficients(material: Prony, step: float, last: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+    """Of a step after another: a trial, the state after it and its energies ask for the same ones."""
+    x = step / np.array(material.times) if material.times else np.zeros(0)
+    found = _step_coefficients(x, step, last, rule)
+    if material.fluidity:
+        flowing = _flow_coefficients(step, last, rule)
+        own, earlier, before, after = (np.append(mode, flow) for mode, flow in zip(found, flowing, strict=True))
+        found = own, earlier, before, after
+    for each in found:
+        each.flags.writeable = False
+    return found
 
 
 def _step_coefficients(x: Array, step: float, last: float, rule: Rule) -> tuple[Array, Array, Array, Array]:

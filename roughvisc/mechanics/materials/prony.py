@@ -165,6 +165,11 @@ _SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
 def one_less_mean_decay(x: ArrayLike) -> Array:
     """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
     x = np.asarray(x, dtype=float)
+    small = x < 0.3
+    if not small.any():
+        return np.asarray(1 + np.expm1(-x) / x)
     series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
+    if small.all():
+        return np.asarray(series)
     large = np.maximum(x, 0.3)
-    return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)
+    return np.where(small, series, 1 + np.expm1(-large) / large)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
@@ -119,8 +120,8 @@ def after_step(
     load or the approach is held.
     """
     cells, pressure = end[0].not_zero()
-    both = area * float(np.sum(pressure * start.take(cells)))
-    last = area * float(np.sum(pressure * end[1].take(cells)))
+    both = area * passes.inner(start, cells, pressure, end[0].threads)
+    last = area * passes.inner(end[1], cells, pressure, end[0].threads)
     glassy = 0.5 * memory.factor * memory.material.glassy
     if step == 0:
         stored = energy.stored + glassy * (last - energy.pressure)

@@ -272,6 +272,24 @@ def test_certificate__is_the_same_by_parts(monkeypatch, known, absent):
     assert (found.converged, found.hopeless) == (whole.converged, whole.hopeless)
 
 
+@pytest.mark.parametrize("level", [50.0, -50.0])
+@pytest.mark.parametrize("size", [10**6, 21])
+def test_certificate__asks_for_no_more_than_the_largest_separation_of_the_contact_is_rounded(monkeypatch, level, size):
+    """All that carries is at one level, but for rounding; the cells of the second part carry next to nothing."""
+    monkeypatch.setattr(passes, "_PART", size)
+    case = Case(load=3.0, tolerance=0.0)
+    separation = np.full(case.gap.size, level)
+    separation[:21:2] *= 1 + 1e-15
+    separation[21:] = max(level, -0.5)
+    displacement = separation.reshape(SHAPE) - case.problem.gap
+    pressure = np.where(np.arange(separation.size) < 21, case.problem.load / 21, 1e-300).reshape(SHAPE)
+    contact = np.arange(separation.size)
+    assert np.ptp((case.problem.gap + displacement).reshape(-1)[:21]) > 2e-14
+    assert certify(case.problem, pressure, contact, displacement).converged
+    displacement.reshape(-1)[0] += 1e-11
+    assert not certify(case.problem, pressure, contact, displacement).converged
+
+
 @pytest.mark.parametrize("absent", [False, True])
 def test_free_set__is_the_same_by_parts_and_knows_its_values(monkeypatch, absent):
     present = None

@@ -98,6 +98,9 @@ def test_sums__are_those_of_the_parts_in_their_order_on_any_threads():
         assert passes.apart(a, b, threads) == sum(np.abs(a[part] - b[part]).sum() for part in parts)
         assert passes.largest(a - 1, threads) == np.abs(a - 1).max() > (a - 1).max()
         assert passes.largest(a[:0], threads) == passes.total(a[:0], threads) == 0
+        cells = np.flatnonzero(a > 0)
+        there = [cells[part] for part in parts]
+        assert passes.inner(b, cells, a[cells], threads) == sum((a[few] * b[few]).sum() for few in there)
 
 
 def test_passes__write_into_no_copy():

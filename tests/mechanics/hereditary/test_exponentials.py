@@ -49,6 +49,23 @@ def histories(draw):
     return material, times, np.array(pressures)
 
 
+@pytest.mark.parametrize("fluidity", [0.0, 0.2])
+def test_coefficients__are_those_of_their_own_step_and_cannot_be_changed(fluidity):
+    """They are remembered for the next one who asks: for what is asked next they are others."""
+    memory = Modes(rv.Prony(1.0, fluidity, (0.5, 0.25), (0.1, 3.0)))
+    state = memory.start(CELL)
+    twice = [
+        memory.coefficients(state, step, rule) for _ in range(2) for step in (0.1, 0.2) for rule in ("linear", "right")
+    ]
+    for first, again in zip(twice[:4], twice[4:], strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+    assert len({found[3].tobytes() for found in twice}) == 4
+    own = [1.0] if fluidity else []
+    np.testing.assert_allclose(twice[1][0], [np.exp(-0.1 / 0.1), np.exp(-0.1 / 3.0), *own], rtol=1e-15)
+    with pytest.raises(ValueError, match="read-only"):
+        twice[0][3][0] = 1.0
+
+
 @given(histories())
 @examples(60)
 def test_linear_rule__is_exact_for_piecewise_linear_pressure(history):
