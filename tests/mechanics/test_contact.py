@@ -15,7 +15,7 @@ from support import direct, rough_gap
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.contact import descent, iteration, solve_contact, solver
-from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields import passes, threads
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
@@ -491,9 +491,10 @@ def test_unconverged_state__has_its_own_displacement():
 def test_memory__is_that_of_a_few_fields(monkeypatch, mean, fields):
     """What a step needs is freed when it is taken, and the displacement of the last before the next is convolved.
 
-    Of fields of many parts: one more is held of those that are one part.
+    As on wide grids: on narrow ones the separation is held too.
     """
     monkeypatch.setattr(passes, "_PART", 1000)
+    monkeypatch.setattr(threads, "_THREADED", 1000)
     gap = rough_gap((128, 125))
     halfspace = HalfSpace(gap.shape, (1.0, 1.0))
     solve_contact(halfspace, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already

@@ -34,7 +34,7 @@ class Certificate:
     hopeless : bool
         Whether the approach does not determine the load.
     separation : ndarray, shape (nx * ny,), or None
-        Of a field that is one part; that of others is as soon had again as fetched.
+        None of a wide field: it is as soon had again as fetched.
     """
 
     duality_gap: float

@@ -13,6 +13,7 @@ from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
+from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
@@ -116,10 +117,10 @@ class Problem:
         return passes.add(self.gap, displacement, empty(self.gap.shape), self.influence.threads)
 
     def separated(self, displacement: Array, contact: Cells) -> tuple[float, Array, Array | None]:
-        """Least separation of present cells, and that of some cells; with that of all, flat, of a field of one part."""
+        """Least separation of present cells, that of some cells, and that of all, flat, unless the field is wide."""
         displaced = displacement.reshape(-1)
-        whole = slice(0, displaced.size)
-        if passes.is_one_part(displaced.size):
+        if not is_wide(displaced.size):
+            whole = slice(0, displaced.size)
             field = self.separation_of(displaced, whole)
             return self.lowest_of(field, whole), field.take(contact), field
         apart = np.empty(contact.size)
@@ -146,13 +147,14 @@ class Problem:
     ) -> tuple[Cells, Array, Array]:
         """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there.
 
-        ``separation`` is that of all cells, flat, where it is known of a field that is one part.
+        ``separation`` is that of all cells, flat, where it is known.
         """
         carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
         present, threads = None if self.present is None else self.present.reshape(-1), self.influence.threads
 
         def free(part: slice) -> tuple[Cells, Array, Array]:
-            apart, here = self.separation_of(displaced, part) if separation is None else separation, carried[part]
+            apart = self.separation_of(displaced, part) if separation is None else separation[part]
+            here = carried[part]
             mask = apart < level
             if present is not None:
                 mask &= present[part]

@@ -26,14 +26,9 @@ Found = TypeVar("Found")
 _PART = 1 << 17
 
 
-def is_one_part(size: int) -> bool:
-    """Whether a vector of some size is worked on as a whole."""
-    return size <= _PART
-
-
 def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Found]:
     """What some work gives of each part of a vector of some size, in their order."""
-    if is_one_part(size):
+    if size <= _PART:
         return [work(slice(0, size))]
     pairs = -(-size // (2 * _PART))  # of equal parts: of three, one thread of two would wait for the last
     return side_by_side(work, list(blocks(size, -(-size // (2 * pairs)))), threads)
@@ -42,7 +37,7 @@ def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Fo
 def of_vectors(work: Callable[..., Found], threads: int, *vectors: NDArray[Any]) -> list[Found]:
     """What some work gives of each part of vectors of one size, which it is given, in their order."""
     size = vectors[0].size
-    if is_one_part(size):  # on narrow grids slices would take as long as the work
+    if size <= _PART:  # on narrow grids slices would take as long as the work
         return [work(*vectors)]
     return of_parts(lambda part: work(*[vector[part] for vector in vectors]), size, threads)
 
@@ -55,7 +50,7 @@ def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int
 def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, threads: int) -> list[Found]:
     """What some work gives of each part of a field of some size, and of those of some cells that lie in it."""
 
-    if is_one_part(size):
+    if size <= _PART:
         return [work(slice(0, size), slice(0, cells.size))]
     return of_parts(lambda part: work(part, lying_in(part, cells)), size, threads)
 

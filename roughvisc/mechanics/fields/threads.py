@@ -22,9 +22,14 @@ Found = TypeVar("Found")
 _THREADED = 1024**2
 
 
+def is_wide(size: int) -> bool:
+    """Whether several threads may work on a field of so many cells; a narrower one lies in the cache."""
+    return size >= _THREADED
+
+
 def threads_of(size: int, workers: int | None = None) -> int:
     """How many threads work on a field of so many cells; None: as ``scipy.fft.set_workers`` has it."""
-    if size < _THREADED:
+    if not is_wide(size):
         return 1
     return fft.get_workers() if workers is None else workers
 
