@@ -14,8 +14,8 @@ from support import direct, rough_gap
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.contact import descent, iteration, solve_contact, solver
-from roughvisc.mechanics.fields import passes, threads
+from roughvisc.mechanics.contact import descent, iteration, problem, solve_contact, solver
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
@@ -494,7 +494,7 @@ def test_memory__is_that_of_a_few_fields(monkeypatch, mean, fields):
     As on wide grids: on narrow ones the separation is held too.
     """
     monkeypatch.setattr(passes, "_PART", 1000)
-    monkeypatch.setattr(threads, "_THREADED", 1000)
+    monkeypatch.setattr(problem, "is_wide", lambda size: True)
     gap = rough_gap((128, 125))
     halfspace = HalfSpace(gap.shape, (1.0, 1.0))
     solve_contact(halfspace, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already
