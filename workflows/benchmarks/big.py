@@ -109,7 +109,7 @@ def apart(solver, cells, area, tolerance, threads, folder, patience=None):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def elastic(cells, areas=(*AREAS, "sphere"), peers=("Tamaas", "ASPHER"), asked=3e-6, reference=1e-12):
+def elastic(cells, areas=(*AREAS, "sphere"), peers=tuple(LARGEST), asked=3e-6, reference=1e-12):
     """Each solver by the loosest of its tolerances, in decades, that brings its measured error below what is asked."""
     for area in areas:
         with tempfile.TemporaryDirectory() as folder:

@@ -34,7 +34,7 @@ class Certificate:
     hopeless : bool
         Whether the approach does not determine the load.
     separation : ndarray, shape (nx * ny,), or None
-        None of a wide field: it is as soon had again as fetched.
+        Gap under pressure at zero approach; None of a wide field, where it is as soon had again as fetched.
     """
 
     duality_gap: float
@@ -89,8 +89,7 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     if converged and not problem.sees_load:
         rounding = _ROUNDING * max(largest, float(problem.influence.at(displacement, contact).max()))
         field = problem.separation(displacement)
-        here = problem.influence.at(field, contact)
-        converged, hopeless = load_certainty(problem, contact, field, here, load, rounding)
+        converged, hopeless = load_certainty(problem, contact, field, apart, load, rounding)
     return Certificate(duality_gap, energy, level, converged, hopeless, separation)
 
 

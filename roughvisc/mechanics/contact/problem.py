@@ -116,6 +116,16 @@ class Problem:
         """Gap under pressure at zero approach."""
         return passes.add(self.gap, displacement, empty(self.gap.shape), self.influence.threads)
 
+    def separation_of(self, displaced: Array, part: slice) -> Array:
+        """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
+        return self.gap.reshape(-1)[part] + displaced[part]
+
+    def lowest_of(self, apart: Array, part: slice) -> float:
+        """Least separation of some present cells; infinite if none of them is."""
+        if self.present is None:
+            return float(np.minimum.reduce(apart))
+        return float(apart.min(where=self.present.reshape(-1)[part], initial=math.inf))
+
     def separated(self, displacement: Array, contact: Cells) -> tuple[float, Array, Array | None]:
         """Least separation of present cells, that of some cells, and that of all, flat, unless the field is wide."""
         displaced = displacement.reshape(-1)
@@ -131,16 +141,6 @@ class Problem:
             return self.lowest_of(here, part)
 
         return min(passes.with_cells(work, displaced.size, contact, self.influence.threads)), apart, None
-
-    def separation_of(self, displaced: Array, part: slice) -> Array:
-        """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
-        return self.gap.reshape(-1)[part] + displaced[part]
-
-    def lowest_of(self, apart: Array, part: slice) -> float:
-        """Least separation of some present cells; infinite if none of them is."""
-        if self.present is None:
-            return float(np.minimum.reduce(apart))
-        return float(apart.min(where=self.present.reshape(-1)[part], initial=math.inf))
 
     def free_set(
         self, pressure: Array, displacement: Array, level: float, separation: Array | None = None

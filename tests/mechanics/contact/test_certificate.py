@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from support import rough_gap
 
-from roughvisc.mechanics.contact import full_contact
+from roughvisc.mechanics.contact import full_contact, problem
 from roughvisc.mechanics.contact.certificate import Certificate, certify
 from roughvisc.mechanics.contact.error_estimate import estimated_error
 from roughvisc.mechanics.contact.problem import Problem
-from roughvisc.mechanics.fields import passes, threads
+from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
@@ -268,7 +268,7 @@ def test_certificate__is_the_same_by_parts(monkeypatch, known, absent):
     whole = case.certificate()
     np.testing.assert_array_equal(whole.separation, case.separation.ravel())
     monkeypatch.setattr(passes, "_PART", SHAPE[1])
-    monkeypatch.setattr(threads, "_THREADED", 1)
+    monkeypatch.setattr(problem, "is_wide", lambda size: True)
     found = case.certificate()
     assert found.separation is None
     for name in ("duality_gap", "energy", "level"):
