@@ -33,8 +33,6 @@ class Certificate:
         Whether the duality gap is small enough, and the load certain.
     hopeless : bool
         Whether the approach does not determine the load.
-    separation : ndarray, shape (nx * ny,), or None
-        Gap under pressure at zero approach; None of a wide field, where it is as soon had again as fetched.
     """
 
     duality_gap: float
@@ -42,7 +40,6 @@ class Certificate:
     level: float
     converged: bool
     hopeless: bool
-    separation: Array | None = None
 
     @property
     def settled(self) -> bool:
@@ -50,7 +47,7 @@ class Certificate:
         return self.converged or self.hopeless
 
 
-def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array) -> Certificate:
+def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array) -> tuple[Certificate, Array | None]:
     """Judge a pressure.
 
     Parameters
@@ -65,6 +62,8 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
     Returns
     -------
     Certificate
+    ndarray, shape (nx * ny,), or None
+        Gap under pressure at zero approach; None of a wide field, where it is as soon had again as fetched.
     """
     carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
     lowest, apart, separation = problem.separated(displacement, contact)
@@ -90,7 +89,7 @@ def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Arr
         rounding = _ROUNDING * max(largest, float(problem.influence.at(displacement, contact).max()))
         field = problem.separation(displacement)
         converged, hopeless = load_certainty(problem, contact, field, apart, load, rounding)
-    return Certificate(duality_gap, energy, level, converged, hopeless, separation)
+    return Certificate(duality_gap, energy, level, converged, hopeless), separation
 
 
 def _together(parts: Sequence[tuple[float, ...]]) -> tuple[float, ...]:

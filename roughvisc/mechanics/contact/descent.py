@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.contact.influence import Array, Cells
-from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.contact.problem import FreeSet, Problem
 from roughvisc.mechanics.fields import passes
 
 # No step goes farther than this many times its trial: along a uniform pressure the periodic kernel has no curvature.
@@ -75,15 +75,13 @@ class Step:
 
 def conjugate_gradient(
     problem: Problem,
-    pressure: Array,
-    displacement: Array,
+    free: FreeSet,
     level: float,
     energy: float,
     *,
     step_length: float,
     previous: Step | None,
     measured: bool,
-    separation: Array | None = None,
 ) -> Trial:
     """Preconditioned trial, conjugate to the previous step.
 
@@ -91,8 +89,8 @@ def conjugate_gradient(
     ----------
     problem : Problem
         What is asked.
-    pressure, displacement : ndarray, shape (nx, ny)
-        The pressure so far, and its displacement.
+    free : FreeSet
+        Of the pressure so far; its separation is used up.
     level : float
         Approach of the contact.
     energy : float
@@ -103,11 +101,9 @@ def conjugate_gradient(
         What to conjugate to.
     measured : bool
         Whether to measure the change that the preconditioner asks for.
-    separation : ndarray, shape (nx * ny,), or None
-        Gap under pressure at zero approach, where that is known.
     """
     threads = problem.influence.threads
-    free_set, residual, held = problem.free_set(pressure, displacement, level, separation)
+    free_set, residual, held = free
     reference = level if problem.load is None else passes.total(residual, threads) / residual.size
     passes.lower(residual, reference, threads)
     search, caution = problem.answered(residual, free_set, held, energy)

@@ -109,7 +109,7 @@ def solved(
     asked: tuple[float, float] | None = None  # change of the pressure asked for, at which duality gap
     for iteration in range(max_iterations + 1):
         last = iteration == max_iterations
-        iterate, certificate = _certified(problem, iterate, last)
+        iterate, certificate, separation = _certified(problem, iterate, last)
         if certificate.settled or last:
             break
         if carries_excess(problem, iterate.contact):
@@ -122,17 +122,18 @@ def solved(
         if search.spacer:
             trial = projected_gradient(problem, iterate.pressure, iterate.displacement, certificate.level)
         else:
+            free = problem.free_set(iterate.pressure, iterate.displacement, certificate.level, separation)
+            separation = None  # a field less while the preconditioner works
             trial = conjugate_gradient(
                 problem,
-                iterate.pressure,
-                iterate.displacement,
+                free,
                 certificate.level,
                 certificate.energy,
                 step_length=search.step_length,
                 previous=previous,
                 measured=estimate_error,
-                separation=certificate.separation,
             )
+            del free
             asked = (trial.asked, certificate.duality_gap) if estimate_error else None
         if not trial.slope < 0:  # no descent
             if search.spacer and not iterate.approximate:
@@ -165,12 +166,12 @@ def _exact(problem: Problem, iterate: Iterate) -> Iterate:
     return Iterate(iterate.pressure, displacement, iterate.contact, approximate=False)
 
 
-def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate, Certificate]:
-    """The iterate and its certificate, which is never accepted of an approximate displacement."""
+def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate, Certificate, Array | None]:
+    """The iterate, its certificate, which is never accepted of an approximate displacement, and its separation."""
     while True:
-        certificate = certify(problem, iterate.pressure, iterate.contact, iterate.displacement)
+        certificate, separation = certify(problem, iterate.pressure, iterate.contact, iterate.displacement)
         if not (iterate.approximate and (certificate.settled or last)):
-            return iterate, certificate
+            return iterate, certificate, separation
         iterate = _exact(problem, iterate)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,22 @@ from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
+
+
+class FreeSet(NamedTuple):
+    """Cells that may change pressure, as flat indices, ascending.
+
+    Attributes
+    ----------
+    cells : ndarray of int
+        In contact, or penetrating else.
+    apart, held : ndarray
+        Separation and pressure of them.
+    """
+
+    cells: Cells
+    apart: Array
+    held: Array
 
 
 @dataclass(frozen=True)
@@ -142,17 +159,12 @@ class Problem:
 
         return min(passes.with_cells(work, displaced.size, contact, self.influence.threads)), apart, None
 
-    def free_set(
-        self, pressure: Array, displacement: Array, level: float, separation: Array | None = None
-    ) -> tuple[Cells, Array, Array]:
-        """Cells that may change pressure: in contact, or penetrating else. With separation and pressure there.
-
-        ``separation`` is that of all cells, flat, where it is known.
-        """
+    def free_set(self, pressure: Array, displacement: Array, level: float, separation: Array | None = None) -> FreeSet:
+        """The free set at an approach; ``separation`` is that of all cells, flat, where it is known."""
         carried, displaced = pressure.reshape(-1), displacement.reshape(-1)
         present, threads = None if self.present is None else self.present.reshape(-1), self.influence.threads
 
-        def free(part: slice) -> tuple[Cells, Array, Array]:
+        def free(part: slice) -> FreeSet:
             apart = self.separation_of(displaced, part) if separation is None else separation[part]
             here = carried[part]
             mask = apart < level
@@ -163,7 +175,7 @@ class Problem:
             values = apart.take(cells), here.take(cells)
             if part.start:
                 cells += part.start
-            return cells, *values
+            return FreeSet(cells, *values)
 
         found = passes.of_parts(free, pressure.size, threads)
         if len(found) == 1:
@@ -171,8 +183,7 @@ class Problem:
         parts = [list(each) for each in zip(*found, strict=True)]
         del found
         # the parts go as they are joined
-        cells, apart, held = (passes.joined(parts.pop(0), threads) for _ in range(3))
-        return cells, apart, held
+        return FreeSet(*(passes.joined(parts.pop(0), threads) for _ in range(3)))
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load, in its place."""

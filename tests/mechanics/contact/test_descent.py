@@ -44,6 +44,12 @@ def judged(problem, matrix, pressure):
     return separation, problem.target if problem.load is None else float(separation[pressure > 0].mean())
 
 
+def trial_of(problem, pressure, separation, level, **options):
+    """The preconditioned trial of a pressure of known separation."""
+    free = problem.free_set(pressure, separation - problem.gap, level)
+    return descent.conjugate_gradient(problem, free, level, 1.0, **options)
+
+
 def applied(trial, pressure):
     after = pressure.copy()
     after.reshape(-1)[trial.free_set] = trial.pressure
@@ -55,9 +61,7 @@ def test_preconditioned_step__descends_as_it_says(known):
     problem, matrix = scaled(known)
     pressure = some_pressure(problem)
     separation, level = judged(problem, matrix, pressure)
-    trial = descent.conjugate_gradient(
-        problem, pressure, separation - problem.gap, level, 1.0, step_length=0.2, previous=None, measured=True
-    )
+    trial = trial_of(problem, pressure, separation, level, step_length=0.2, previous=None, measured=True)
     after = applied(trial, pressure)
     assert trial.change == pytest.approx(trial.pressure - trial.held)
     assert trial.held == pytest.approx(pressure.ravel()[trial.free_set])
@@ -67,13 +71,9 @@ def test_preconditioned_step__descends_as_it_says(known):
     if problem.load is not None:
         assert after.sum() == pytest.approx(problem.load)
     # without the cut, the change is the one asked for times the step's length
-    short = descent.conjugate_gradient(
-        problem, pressure, separation - problem.gap, level, 1.0, step_length=1e-3, previous=None, measured=True
-    )
+    short = trial_of(problem, pressure, separation, level, step_length=1e-3, previous=None, measured=True)
     assert np.abs(short.change).sum() == pytest.approx(1e-3 * short.asked, rel=1e-6)
-    silent = descent.conjugate_gradient(
-        problem, pressure, separation - problem.gap, level, 1.0, step_length=1e-3, previous=None, measured=False
-    )
+    silent = trial_of(problem, pressure, separation, level, step_length=1e-3, previous=None, measured=False)
     assert math.isnan(silent.asked)
 
 
@@ -92,12 +92,8 @@ def test_next_step__is_conjugate_to_the_step_really_taken(known):
             np.arange(change.size), change, (displaced / unit).reshape(SHAPE), unit, float(change @ displaced)
         )
         options = {"step_length": 1e-4, "measured": False}
-        plain = descent.conjugate_gradient(
-            problem, pressure, separation - problem.gap, level, 1.0, previous=None, **options
-        )
-        trial = descent.conjugate_gradient(
-            problem, pressure, separation - problem.gap, level, 1.0, previous=previous, **options
-        )
+        plain = trial_of(problem, pressure, separation, level, previous=None, **options)
+        trial = trial_of(problem, pressure, separation, level, previous=previous, **options)
         if trial.change == pytest.approx(plain.change, rel=1e-12):
             continue  # the direction itself where it leads away from the previous step
         found += 1
@@ -189,9 +185,7 @@ def test_step__ends_where_the_energy_is_least_along_it(known, single, step_lengt
     pressure = some_pressure(problem)
     separation, level = judged(problem, matrix, pressure)
     displacement = separation - problem.gap
-    trial = descent.conjugate_gradient(
-        problem, pressure, separation - problem.gap, level, 1.0, step_length=step_length, previous=None, measured=False
-    )
+    trial = trial_of(problem, pressure, separation, level, step_length=step_length, previous=None, measured=False)
     whole = applied(trial, pressure) - pressure
     curvature = whole.ravel() @ matrix @ whole.ravel()
     minimum = min(-trial.slope / curvature, 30.0)

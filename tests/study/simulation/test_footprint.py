@@ -6,7 +6,6 @@ import tracemalloc
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.contact import problem
 from roughvisc.mechanics.fields import passes, reuse
 from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
@@ -70,7 +69,6 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     monkeypatch.setattr(malloc, "expect_arrays", lambda size: None)  # is never touched
     # as on a wide grid: by parts that are a small part of it, in memory that is used again
     monkeypatch.setattr(passes, "_PART", 1 << 12)
-    monkeypatch.setattr(problem, "is_wide", lambda size: True)
     monkeypatch.setattr(reuse, "_FROM", 1 << 17)
     case, folder = vary(study[0], changes), study[1]
     gc.collect()
