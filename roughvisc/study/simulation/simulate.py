@@ -177,16 +177,19 @@ def press(
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
     count = threads_for(threads)
-    with fft.set_workers(count):
-        dataset = _press(height, material, program, with_needed, progress, keeper)
+
+    def pressed(of: xr.DataArray, program: Program, settings: Settings, **kept: Any) -> xr.Dataset:
+        with fft.set_workers(count), keeping(8 * of.size):
+            return _press(of, material, program, settings, **kept)
+
+    dataset = pressed(height, program, with_needed, progress=progress, keeper=keeper)
     if not settings.grid_error:
         return dataset
 
     loads = program.on_area(nominal_area(height))  # coarser grids may be of other sizes
 
     def again(few: xr.DataArray, times: list[float]) -> xr.Dataset:
-        with fft.set_workers(count):
-            return _press(few, material, loads, replace(settings, times=times, fields=("pressure",)), False, None)
+        return pressed(few, loads, replace(settings, times=times, fields=("pressure",)))
 
     return annotate(with_grid_error(dataset, height, again)).drop_vars(needed)
 
@@ -196,8 +199,8 @@ def _press(
     material: Material,
     program: Program,
     settings: Settings,
-    progress: bool | Progress,
-    keeper: Keeper | None,
+    progress: bool | Progress = False,
+    keeper: Keeper | None = None,
 ) -> xr.Dataset:
     began = time.perf_counter()
     shape, area, held = (height.sizes["x"], height.sizes["y"]), nominal_area(height), keeper is None
@@ -212,7 +215,7 @@ def _press(
     rows = Rows(ground, settings, RowsInMemory() if keeper is None else keeper.rows, choice.series_error)
     from roughvisc.study.progress import reporting  # slow to import
 
-    with keeping(ground.gap.nbytes), reused(), reporting(progress, "pressing") as report:
+    with reused(), reporting(progress, "pressing") as report:
         _march(scene, ground, rows, settings, began, report, keeper)
     if not len(rows):
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import json
 import logging
+import math
 import os
 import secrets
 import shutil
@@ -210,6 +211,8 @@ def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision:
     with NETCDF:
         declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
         declared.set_auto_maskandscale(False)
+        if "chunksizes" in encoding:  # all of a chunk comes at once: the library would hold 64 MB of each variable
+            declared.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
         declared.setncatts(plain_attributes(variable.attrs))
         if (bits := bits_kept(variable, precision)) is not None:
             declared.relative_precision = precision

@@ -171,3 +171,20 @@ def test_field__is_compressed_where_that_pays(tmp_path):
             assert {name for name in ("pressure", "gap") if raw[name].filters()["zlib"]} == compressed
             assert raw["gap"].chunking() == [6, 64, 64], "12 frames in equal parts of at most 8"
     assert path.stat().st_size < 0.5 * (ds["gap"].nbytes + ds["pressure"].nbytes)
+
+
+def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, monkeypatch):
+    """By itself it holds 64 MB of each till the file is closed: all frames of a scan of 1024 x 1024 points."""
+    held, write = {}, store._write
+
+    def asked(written, variable):
+        if written.chunking() != "contiguous":
+            held[written.name] = (
+                written.get_var_chunk_cache()[0] / np.prod(written.chunking()) / variable.dtype.itemsize
+            )
+        write(written, variable)
+
+    monkeypatch.setattr(store, "_write", asked)
+    write_result(hertz_creep((130, 128), 12), tmp_path / "r.nc")
+    assert {"pressure", "gap", "height"} <= held.keys()
+    assert set(held.values()) == {1.0}
