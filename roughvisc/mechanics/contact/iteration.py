@@ -172,6 +172,7 @@ def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate,
         certificate, separation = certify(problem, iterate.pressure, iterate.contact, iterate.displacement)
         if not (iterate.approximate and (certificate.settled or last)):
             return iterate, certificate, separation
+        del separation  # a field less while the pressure is convolved anew
         iterate = _exact(problem, iterate)
 
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
+from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
 from roughvisc.study.statement.settings import Settings
+from roughvisc.study.storage.encoding import chunks
 
 #: What the interpreter and the libraries take, measured. [byte]
 PROCESS = 210e6
 #: Fields of the surface: heights and gaps, and the marks of present cells.
 _SURFACE = 2.1
-#: Fields of a march without a past, and what a contact on all cells adds to them.
-_ELASTIC, _IN_CONTACT = 8.5, 9.0
+#: Fields of a march without a past, what a contact on all cells adds to them, and what a narrow grid adds: transforms
+#: of whole fields, and the separation.
+_ELASTIC, _IN_CONTACT, _NARROW = 7.0, 11.0, 1.5
 #: Spectrum, symbols and what a transform gives.
 _TRANSFORMS = {"periodic": 2.0, "free": 6.0}
 #: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
@@ -21,8 +26,8 @@ _COMPANION, _EXPONENTIAL = 1.5, 5.2
 _DIRECT = 6.5
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
 _SHOWN = 3.0
-#: Fields of the state while the file is written, and frames that are in memory then.
-_STATE, _FRAMES_TOGETHER = 6.0, 8
+#: Fields of the state while the file is written, a frame as it was kept among them.
+_STATE = 4.5
 #: Rows wait for the disk until they take more. [byte]
 _WAITING = 8e6
 #: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
@@ -74,6 +79,8 @@ def march_bytes(
     field = 8.0 * cells
     state, past = _STATE, 0.0
     solved = _ELASTIC + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
+    if not is_wide(math.ceil(part * cells)):
+        solved += _NARROW
     if isinstance(memory, Modes):
         modes = len(memory.material.times) + bool(memory.material.fluidity)
         if modes:
@@ -88,9 +95,9 @@ def march_bytes(
     surface = _SURFACE * field + past
     if in_memory:
         return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
-    written = min(rows, _FRAMES_TOGETHER) * field
+    layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
     waiting = min(max(rows - 1, 0) * len(settings.fields) * field, _WAITING)
-    return surface + max(part * solved * field + waiting, part * state * field + written)
+    return surface + max(part * solved * field + waiting, part * state * field + layer * field)
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:

@@ -227,6 +227,7 @@ def _write(written: netCDF4.Variable, variable: xr.Variable) -> None:
         values = variable[layer].values  # outside the lock, too
         with NETCDF:
             written[layer] = values
+        del values  # before the next layer is had
 
 
 def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:

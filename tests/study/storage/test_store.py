@@ -1,14 +1,17 @@
 """Files of results: whole or absent, plain to every reader, lazy to ours."""
 
+import tracemalloc
+
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 from sample_results import hertz_creep, rough_creep
+from xarray.core.indexing import LazilyIndexedArray
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.storage import store
+from roughvisc.study.storage import records, store
 from roughvisc.study.storage.encoding import MAY_BE_MISSING
 from roughvisc.study.storage.store import open_result, whole_file, write_result
 
@@ -188,3 +191,26 @@ def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, mo
     write_result(hertz_creep((130, 128), 12), tmp_path / "r.nc")
     assert {"pressure", "gap", "height"} <= held.keys()
     assert set(held.values()) == {1.0}
+
+
+def test_write_result__holds_one_layer_of_chunks(tmp_path):
+    """Of fields that are read when they are asked for: the one before is let go first."""
+    ds = hertz_creep((257, 256), 24)
+    shape = ds["pressure"].shape
+
+    def filled(number, out):
+        out[...] = number
+        return out
+
+    lazy = LazilyIndexedArray(records._frames(shape, filled))
+    ds = ds.assign(pressure=(ds["pressure"].dims, lazy, ds["pressure"].attrs))
+    write_result(ds, tmp_path / "first.nc")  # what is imported late is there
+    tracemalloc.start()
+    try:
+        path = write_result(ds, tmp_path / "r.nc")
+        largest = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert largest < 1.5 * ds["pressure"].nbytes / 3
+    with open_result(path) as read:
+        np.testing.assert_array_equal(read["pressure"][:, 3, 5], np.arange(24.0))
