@@ -8,9 +8,10 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
-from typing import Any, TypeVar
+from functools import cache
+from queue import SimpleQueue
+from threading import Lock, Thread
+from typing import Any, Generic, TypeVar
 
 from scipy import fft
 
@@ -57,13 +58,13 @@ def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
         finally:
             todo.clear()  # where the work failed, for the others too
 
-    helpers = [_pool(threads, os.getpid()).submit(take_on) for _ in range(min(threads, len(parts)) - 1)]
+    tasks = [_begun(take_on, threads) for _ in range(min(threads, len(parts)) - 1)]
     try:
         take_on()
     finally:
-        begun = [helper for helper in helpers if not helper.cancel()]  # what has not begun is not needed any more
-        for helper in begun:
-            helper.result()
+        begun = [task for task in tasks if not task.taken()]  # what nobody has begun is not needed any more
+        for task in begun:
+            task.result()
     return found
 
 
@@ -71,8 +72,8 @@ def beside(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
     """Begin some work beside the caller's where there is another thread; what is returned waits for what it gives."""
     if threads == 1:
         return work
-    begun = _pool(threads, os.getpid()).submit(work)
-    return lambda: work() if begun.cancel() else begun.result()
+    task = _begun(work, threads)
+    return lambda: work() if task.taken() else task.result()
 
 
 def blocks(length: int, size: int) -> Iterator[slice]:
@@ -98,7 +99,54 @@ def _next(todo: deque[int]) -> int | None:
         return None
 
 
-@lru_cache(maxsize=4)
-def _pool(threads: int, _process: int) -> ThreadPoolExecutor:
-    """The others of so many threads of this process: a forked one has none of its parent's."""
-    return ThreadPoolExecutor(threads - 1, thread_name_prefix="roughvisc")
+class _Task(Generic[Found]):
+    """Some work, which the first thread that takes it does."""
+
+    def __init__(self, work: Callable[[], Found]) -> None:
+        self._work, self._free = work, Lock()
+        self._done: SimpleQueue[tuple[Any, BaseException | None]] = SimpleQueue()
+
+    def taken(self) -> bool:
+        """Whether it is the caller's from here on: nobody else has taken it."""
+        return self._free.acquire(blocking=False)
+
+    def do(self) -> None:
+        """Do it, unless another thread has taken it."""
+        if not self.taken():
+            return
+        try:
+            self._done.put((self._work(), None))
+        except BaseException as error:  # noqa: BLE001 (raised where it is waited for)
+            self._done.put((None, error))
+
+    def result(self) -> Found:
+        """What it gives, once it is done by another thread."""
+        found, error = self._done.get()
+        if error is not None:
+            raise error
+        return found
+
+
+def _begun(work: Callable[[], Found], threads: int) -> _Task[Found]:
+    """Work that the first of the other threads does that has nothing to do."""
+    task = _Task(work)
+    _tasks_of(threads, os.getpid()).put(task)
+    return task
+
+
+@cache
+def _tasks_of(threads: int, _process: int) -> SimpleQueue[_Task[Any]]:
+    """What the others of so many threads of this process take on; a forked one has none of its parent's threads.
+
+    The executors of the standard library take as long to begin a task and to wait for it as a short pass takes.
+    """
+    tasks: SimpleQueue[_Task[Any]] = SimpleQueue()
+    for number in range(1, threads):
+        Thread(target=_serve, args=(tasks,), name=f"roughvisc-{number}", daemon=True).start()
+    return tasks
+
+
+def _serve(tasks: SimpleQueue[_Task[Any]]) -> None:
+    """Do one task after the other, without end."""
+    while True:
+        tasks.get().do()
