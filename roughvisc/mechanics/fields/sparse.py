@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.passes import Array, Cells
+from roughvisc.mechanics.fields.passes import Array, Cells, Mask
 from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import threads_of
 
@@ -76,6 +76,18 @@ class Sparse:
             return self.values.reshape(-1)[part]
         few = passes.lying_in(part, self.cells)
         return passes.part_of(self.values[few], self.cells[few], part)
+
+    def positive(self) -> Mask:
+        """Where it is more than zero."""
+        if self.cells is None:
+            return self.values > 0
+        found = np.zeros(self.size, bool)
+        found[self.cells] = self.values > 0
+        return found.reshape(self.shape)
+
+    def total(self) -> float:
+        """Sum over all cells."""
+        return sum(passes.of_parts(lambda part: passes.summed(self.part(part)), self.size, self.threads))
 
     def times(self, factor: float) -> Array:
         """``factor`` times all of it, in memory of its own."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from roughvisc.labels import annotate
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.scene import Scene, Step
@@ -68,9 +69,10 @@ class Rows:
 
     def add(self, step: Step, converged: bool, wall_time: float, kept: bool = True) -> None:
         """Take up an accepted step; ``converged``: all of those since the last one that is kept."""
-        step = step.with_fields()
+        if not is_wide(step.scene.gap.size):
+            step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
         shown, window = step.shown, self._ground.window
-        contact = shown.pressure > 0
+        contact = shown.contact.positive()
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
         arrays: dict[str, Array] = {}
         if window.whole:
@@ -160,12 +162,21 @@ class Rows:
 
     def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
         """A field of a step on the whole domain, in memory that nobody changes."""
-        fields = {"pressure": step.shown.pressure, "displacement": step.displacement}
-        return self._gap(step, contact) if name == "gap" else fields[name]
+        if name == "pressure":
+            return step.shown.pressure
+        if name == "displacement":
+            return step.displacement
+        found = np.empty(contact.shape)
 
-    def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice = slice(None)) -> Array:
+        def fill(rows: slice) -> None:
+            found[rows] = self._gap(step, contact, rows)
+
+        passes.of_rows(fill, contact.shape, step.scene.halfspace.threads)
+        return found
+
+    def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
         """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
-        gap = self._ground.gap[rows] + step.displacement[rows]
+        gap = self._ground.gap[rows] + step.displacement_on(rows)
         self._settle(gap, step.level, rows)
         gap[contact[rows]] = 0.0
         return gap

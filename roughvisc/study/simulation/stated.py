@@ -30,14 +30,14 @@ def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
         return 0.0, 0.0
     since = step.state.began if step.state.before is None else step.state.before.time
     threads, area = scene.halfspace.threads, scene.halfspace.cell_area
-    mean = passes.total(shown.pressure.reshape(-1), threads) / np.count_nonzero(contact)
+    mean = shown.contact.total() / np.count_nonzero(contact)
     pressure = _SOLVER_AT_EDGE * step.residual * mean
     closed = pressure * scene.halfspace.self_influence * scene.compliance(step.state.now.time - since)
 
     def counted(rows: slice) -> tuple[int, int]:
         here = contact[rows]
-        inside = here & (shown.pressure[rows] <= pressure)
-        outside = ~here & (scene.gap[rows] + step.displacement[rows] - step.level <= closed)
+        inside = here & (step.pressure_on(rows) <= pressure)
+        outside = ~here & (scene.gap[rows] + step.displacement_on(rows) - step.level <= closed)
         if scene.present is not None:
             outside &= scene.present[rows]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))

@@ -32,6 +32,8 @@ def test_sparse__is_the_field(field):
     assert (found.shape, found.size, found.count) == (SHAPE, 99, np.count_nonzero(field))
     for part in (slice(0, 99), slice(20, 57), slice(98, 99)):
         np.testing.assert_array_equal(found.part(part), field.reshape(-1)[part])
+    np.testing.assert_array_equal(found.positive(), field > 0)
+    assert found.total() == sum(np.sum(field.reshape(-1)[first : first + 13]) for first in range(0, 99, 13))
     cells, values = found.not_zero()
     np.testing.assert_array_equal(cells, np.flatnonzero(field))
     np.testing.assert_array_equal(values, field[field != 0])

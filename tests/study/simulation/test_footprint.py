@@ -10,7 +10,7 @@ from roughvisc.mechanics.fields import passes, reuse
 from roughvisc.mechanics.halfspace import operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.simulation import malloc
+from roughvisc.study.simulation import malloc, rows
 from roughvisc.study.simulation.footprint import march_bytes
 from roughvisc.study.simulation.scene import memory_wanted
 from roughvisc.study.statement.case import read_study, vary
@@ -89,33 +89,52 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     )
 
 
-@pytest.mark.parametrize(("over", "fields"), [(0.0, 9), (0.01, 11)])
-def test_march_with_one_exponential__holds_few_fields_beside_gap_and_heights(over, fields, monkeypatch):
-    """Counted by hand: the contact solver's gap, pressure, displacement and response; displacements of two
-    instants of the march and of one of its companion; what both remember. Pressures are held by their cells. While a
-    step after a corner waits for its companion, what it remembers and the displacement before it are held too."""
-    shape, held, most = (161, 144), [0], [0]
+COUNTED = (161, 144)
+
+
+@pytest.fixture
+def held(monkeypatch):
+    """Fields that a march of that shape holds, as on a wide grid: how many now, and how many at most."""
+    gc.collect()  # what others have left would be counted as given back
+    size, counts = 8 * COUNTED[0] * COUNTED[1], {"now": 0, "most": 0}
     monkeypatch.setattr(reuse, "_FROM", 1)
     monkeypatch.setattr(passes, "_PART", 1 << 10)
     monkeypatch.setattr(operator, "_BLOCKED", 1)
+    monkeypatch.setattr(rows, "is_wide", lambda size: True)
     lend, take_back = reuse._Kept.lend, reuse._Kept.take_back
 
-    def lent(self, size):
-        held[0] += size == 8 * shape[0] * shape[1]
-        most[0] = max(most[0], held[0])
-        return lend(self, size)
+    def lent(self, bytes_):
+        counts["now"] += bytes_ == size
+        counts["most"] = max(counts["most"], counts["now"])
+        return lend(self, bytes_)
 
     def taken_back(self, memory):
-        held[0] -= memory.size == 8 * shape[0] * shape[1]
+        counts["now"] -= memory.size == size
         take_back(self, memory)
 
     monkeypatch.setattr(reuse._Kept, "lend", lent)
     monkeypatch.setattr(reuse._Kept, "take_back", taken_back)
-    surface = rv.self_affine(1e-3, shape, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=5e-5, seed=1)
+    return counts
+
+
+@pytest.mark.parametrize(("over", "fields"), [(0.0, 9), (0.01, 10)])
+def test_march_with_one_exponential__holds_few_fields_beside_gap_and_heights(over, fields, held):
+    """Counted by hand: the contact solver's gap, pressure, displacement and response; displacements of two
+    instants of the march and of one of its companion; what both remember. Pressures are held by their cells. While a
+    step after a corner waits for its companion, what it remembers and the displacement before it are held too."""
+    surface = rv.self_affine(1e-3, COUNTED, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=5e-5, seed=1)
     material = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
     program = rv.Program().pressure(6e3, over=over).hold(0.5)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": [0.5 + over], "fields": (), "progress": False}
     rv.simulate(surface, material, program, **settings)
-    assert most[0] == fields
+    assert held["most"] == fields
     gc.collect()
-    assert held[0] == 0
+    assert held["now"] == 0
+
+
+@pytest.mark.parametrize("every", [None, 1])
+def test_run_that_can_be_interrupted__holds_one_field_more(study, held, tmp_path, every):
+    """Of the state that a checkpoint is made of; and the pressure of a kept row, till that is written."""
+    case = vary(study[0], {"surface.shape": list(COUNTED)})
+    run_case(case, tmp_path, progress=False, checkpoint_steps=every)
+    assert held["most"] == 11 + (every is None)

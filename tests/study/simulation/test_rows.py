@@ -2,14 +2,18 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import roughvisc as rv
+from roughvisc.mechanics.fields import passes, sparse
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.study.simulation import rows
 from roughvisc.study.simulation.rows import keeps_its_word
 from roughvisc.study.simulation.stated import stated
+from roughvisc.variables import FIELDS
 
 BALL = rv.sphere(1.0, 1.6, 17)
 MATERIALS = {
@@ -30,6 +34,27 @@ PROGRAMS = {
 def result(material, program, **settings):
     settings = {"tolerance": 3e-2, "fields": (), "progress": False} | settings
     return rv.simulate(BALL, MATERIALS[material], PROGRAMS[program], **settings)
+
+
+@pytest.mark.parametrize("absent", [False, True])
+def test_rows__of_a_wide_grid_hold_the_same_numbers(monkeypatch, absent):
+    """Of fields by parts, none of which lies in memory as a whole unless it is kept."""
+    height = rv.self_affine(1.0, (33, 30), hurst=0.8, rms_slope=0.1, seed=1)
+    if absent:
+        height.values[3:9, 4:7] = np.nan
+    program = rv.Program().load(0.02, over=0.3).hold(0.3)
+    settings = {"boundary": "periodic", "tolerance": 3e-2, "fields": FIELDS, "missing": "absent", "times": 4}
+    monkeypatch.setattr(sparse, "_ABOVE", 10)
+    monkeypatch.setattr(passes, "_PART", 100)
+
+    def pressed():
+        return rv.simulate(height, MATERIALS["zener"], program, progress=False, **settings).drop_vars("wall_time")
+
+    narrow = pressed()
+    monkeypatch.setattr(rows, "is_wide", lambda size: True)
+    wide = pressed()
+    assert 0 < float(wide.contact_fraction[-1]) < 0.6
+    xr.testing.assert_identical(wide.drop_attrs(), narrow.drop_attrs())
 
 
 @pytest.mark.parametrize("times", [None, 7])
