@@ -86,6 +86,7 @@ TUNING = {
     "_COLUMNS": "halfspace: what is transformed together",
     "_ROWS": "halfspace: what is transformed together",
     "_ROW_POINTS": "halfspace: what is transformed together",
+    "_SHORT": "halfspace: what is transformed together",
     "_LINE": "halfspace: where rows begin",
     "_THREADED": "fields: cells from which threads pay",
     "_SMALLEST": "halfspace: smallest window",

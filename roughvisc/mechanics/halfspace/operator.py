@@ -31,6 +31,8 @@ Boundary = Literal["free", "periodic"]
 # Bytes of the columns transformed together, but at least so many columns; and at most so many rows and points of them:
 # they stay in the cache (measured at 64 to 8192 squared).
 _COLUMN_BYTES, _COLUMNS, _ROWS, _ROW_POINTS = 1 << 20, 32, 128, 1 << 18
+# A rest of columns is no block of its own below this part of those that are transformed together: one over it.
+_SHORT = 8
 # Bytes that the processor fetches at once.
 _LINE = 64
 # Cells from which periodic transforms go by blocks too: at 1024 squared and above they take 0.7 to 0.9 of SciPy's time
@@ -183,7 +185,7 @@ class HalfSpace:
         if points == self.shape and not self._goes_by_blocks:
             return [symbol]
         number = np.result_type(symbol.dtype, np.complex64) if self._transforms.is_complex else symbol.dtype
-        parts = [symbol[:, block] for block in blocks(symbol.shape[1], _columns_together(points[0], number))]
+        parts = [symbol[:, block] for block in _column_blocks(symbol.shape[1], points[0], number)]
         return [np.ascontiguousarray(part) for part in parts] if symbol.dtype == np.float32 else parts
 
     @property
@@ -250,7 +252,7 @@ class HalfSpace:
                 keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
 
         rows = list(blocks(nx, _rows_together(my)))
-        columns_of = list(blocks(spectrum.shape[1], _columns_together(mx, number)))
+        columns_of = _column_blocks(spectrum.shape[1], mx, number)
         side_by_side(forward, rows, self.threads)
         side_by_side(across, range(len(columns_of)), self.threads)
         side_by_side(back, rows, self.threads)
@@ -269,12 +271,12 @@ class HalfSpace:
     @cached_property
     def _memory(self) -> tuple[NDArray[np.uint8], list[NDArray[np.uint8]]]:
         """Bytes to work in: taken anew each time, half of it is page faults."""
-        (mx, my), number = self._points, np.dtype(complex if self._transforms.is_complex else float)
-        count = self._transforms.width(my)
-        room = max(
-            _bytes(number, (mx, min(_columns_together(mx, np.dtype(np.complex64)), count))),
-            _bytes(np.dtype(float), (min(_rows_together(my), self.shape[0]), my)),
-        )
+        (mx, my), kinds = self._points, (complex, np.complex64) if self._transforms.is_complex else (float, np.float32)
+        count, room = self._transforms.width(my), _bytes(np.dtype(float), (min(_rows_together(my), self.shape[0]), my))
+        number, single = (np.dtype(kind) for kind in kinds)
+        for kind in (number, single):
+            for block in _column_blocks(count, mx, kind):
+                room = max(room, _bytes(kind, (mx, block.stop - block.start)))
         return _lines(_bytes(number, (self.shape[0], count))), [_lines(room) for _ in range(self.threads)]
 
     def approximate_inverse(self, displacement: Single) -> Single:
@@ -351,9 +353,14 @@ def _rows_together(points: int) -> int:
     return min(_ROWS, max(_ROW_POINTS // points, 1))
 
 
-def _columns_together(points: int, number: np.dtype[Any]) -> int:
-    """Columns of so many numbers that are transformed together."""
-    return max(_COLUMN_BYTES // (points * number.itemsize), _COLUMNS)
+def _column_blocks(count: int, points: int, number: np.dtype[Any]) -> list[slice]:
+    """Columns of so many numbers that are transformed together; a short rest goes with the last ones.
+
+    Of 2^n points there are 2^(n-1) + 1 columns: with one column as a block of its own, a thread would wait for another.
+    """
+    together = max(_COLUMN_BYTES // (points * number.itemsize), _COLUMNS)
+    begins = range(0, max(count - together // _SHORT, 1), together)
+    return [slice(first, count if first == begins[-1] else first + together) for first in begins]
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from scipy import fft
 from strategies import boundaries, examples, seeds, shapes
 from support import direct
@@ -100,6 +101,18 @@ def test_scattered_field__is_taken_and_given_back_as_the_whole_one(request, boun
     assert np.array_equal(halfspace.displacement_single(few), halfspace.displacement_single(field))
     expected = halfspace.approximate_inverse(field).reshape(-1)[few.cells].astype(float) * few.size
     np.testing.assert_allclose(halfspace.approximate_inverse_within(few), expected, rtol=1e-6)
+
+
+@given(st.integers(1, 5000), st.integers(1, 20_000), st.sampled_from([np.float32, np.complex64, np.complex128]))
+def test_columns_of_a_block__are_never_few(count, points, kind):
+    """A block of one column, as 2^n points would have, takes as long as it takes to wait for it."""
+    blocks = operator._column_blocks(count, points, np.dtype(kind))
+    together = max((1 << 20) // (points * np.dtype(kind).itemsize), 32)
+    assert np.concatenate([np.arange(count)[block] for block in blocks]).tolist() == list(range(count))
+    *others, last = (block.stop - block.start for block in blocks)
+    assert set(others) <= {together}
+    assert last <= 1.125 * together
+    assert not others or last > together // 8
 
 
 @FIELDS
