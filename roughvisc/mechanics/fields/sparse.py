@@ -5,6 +5,7 @@ What is made of them by parts never lies in memory as a whole.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,7 @@ class Sparse:
     @property
     def size(self) -> int:
         """Cells of the grid."""
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
 
     @property
     def threads(self) -> int:

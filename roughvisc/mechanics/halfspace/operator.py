@@ -6,9 +6,8 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, lru_cache
 from queue import SimpleQueue
 from typing import Any, Literal
 
@@ -225,46 +224,50 @@ class HalfSpace:
         has them written where it wants them.
         """
         along, nx, (mx, my), kind = self._transforms, self.shape[0], points, symbol[0].dtype
-        spectrum, rooms = self._working_memory(points, kind)
+        threads = self.threads
+        spectrum, rooms = self._working_memory(points, kind, threads)
         number, own = spectrum.dtype, mx == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:
-            with _lent(rooms) as room:
-                along.rows_into(spectrum[rows], _rows_of(field, rows), _as(room, kind, (rows.stop - rows.start, my)))
+            room = rooms.get()
+            along.rows_into(spectrum[rows], _rows_of(field, rows), _as(room, kind, (rows.stop - rows.start, my)))
+            rooms.put(room)
 
         def across(number_of_block: int) -> None:
             block = columns_of[number_of_block]
-            with _lent(rooms) as room:
-                columns = there = spectrum[:, block]
-                if not own:
-                    columns = _as(room, number, (mx, block.stop - block.start))
-                    columns[:nx] = there
-                    columns[nx:] = 0
-                changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
-                along.multiply(changed, symbol[number_of_block])
-                changed = along.columns_back(changed, axis=0, overwrite_x=True, workers=1)
-                if changed is not there:
-                    there[...] = changed[:nx]
+            room = rooms.get()
+            columns = there = spectrum[:, block]
+            if not own:
+                columns = _as(room, number, (mx, block.stop - block.start))
+                columns[:nx] = there
+                columns[nx:] = 0
+            changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
+            along.multiply(changed, symbol[number_of_block])
+            changed = along.columns_back(changed, axis=0, overwrite_x=True, workers=1)
+            if changed is not there:
+                there[...] = changed[:nx]
+            rooms.put(room)
 
         def back(rows: slice) -> None:
-            with _lent(rooms) as room:
-                here = _as(room, kind, (rows.stop - rows.start, my))
-                keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
+            room = rooms.get()
+            here = _as(room, kind, (rows.stop - rows.start, my))
+            keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
+            rooms.put(room)
 
         rows = list(blocks(nx, _rows_together(my)))
         columns_of = _column_blocks(spectrum.shape[1], mx, number)
-        side_by_side(forward, rows, self.threads)
-        side_by_side(across, range(len(columns_of)), self.threads)
-        side_by_side(back, rows, self.threads)
+        side_by_side(forward, rows, threads)
+        side_by_side(across, range(len(columns_of)), threads)
+        side_by_side(back, rows, threads)
 
     def _working_memory(
-        self, points: tuple[int, int], kind: np.dtype[Any]
+        self, points: tuple[int, int], kind: np.dtype[Any], threads: int
     ) -> tuple[NDArray[Any], SimpleQueue[NDArray[np.uint8]]]:
-        """For transforms along y, and for some rows or columns of each thread."""
+        """For transforms along y, and rooms for some rows or columns of each thread, which puts its own back."""
         number = np.result_type(kind, np.complex64) if self._transforms.is_complex else kind
         spectrum, own = self._memory
         rooms: SimpleQueue[NDArray[np.uint8]] = SimpleQueue()
-        for room in own[: self.threads]:
+        for room in own[:threads]:
             rooms.put(room)
         return _as(spectrum, number, (self.shape[0], self._transforms.width(points[1]))), rooms
 
@@ -353,24 +356,15 @@ def _rows_together(points: int) -> int:
     return min(_ROWS, max(_ROW_POINTS // points, 1))
 
 
-def _column_blocks(count: int, points: int, number: np.dtype[Any]) -> list[slice]:
+@lru_cache(maxsize=32)
+def _column_blocks(count: int, points: int, number: np.dtype[Any]) -> tuple[slice, ...]:
     """Columns of so many numbers that are transformed together; a short rest goes with the last ones.
 
     Of 2^n points there are 2^(n-1) + 1 columns: with one column as a block of its own, a thread would wait for another.
     """
     together = max(_COLUMN_BYTES // (points * number.itemsize), _COLUMNS)
     begins = range(0, max(count - together // _SHORT, 1), together)
-    return [slice(first, count if first == begins[-1] else first + together) for first in begins]
-
-
-@contextmanager
-def _lent(rooms: SimpleQueue[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
-    """One of the rooms, till it is put back."""
-    room = rooms.get()
-    try:
-        yield room
-    finally:
-        rooms.put(room)
+    return tuple(slice(first, count if first == begins[-1] else first + together) for first in begins)
 
 
 def _as(memory: NDArray[np.uint8], number: np.dtype[Any], shape: tuple[int, int]) -> NDArray[Any]:

@@ -155,7 +155,7 @@ def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines
     """Blocks of 32 columns share no line, and columns do not all fall on the same places of the cache."""
     halfspace = HalfSpace(shape, (1.0, 1.0), "periodic", workers=2)
     for kind in (np.float32, np.float64):
-        spectrum, rooms = halfspace._working_memory(shape, np.dtype(kind))
+        spectrum, rooms = halfspace._working_memory(shape, np.dtype(kind), 2)
         rows = operator._as(rooms.get(), np.dtype(kind), (2, shape[1]))
         for memory in (spectrum, rows):
             assert memory.ctypes.data % 64 == 0
