@@ -97,7 +97,7 @@ def march_bytes(
         return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
     layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
     waiting = min(max(rows - 1, 0) * len(settings.fields) * field, _WAITING)
-    return surface + max(part * solved * field + waiting, part * state * field + layer * field)
+    return surface + max(part * solved * field + waiting, (part * state + layer) * field)
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:

@@ -8,6 +8,7 @@ from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, scene
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.fields import sparse
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
@@ -55,6 +56,18 @@ def test_chosen_steps__keep_the_tolerance(name, tolerance):
         assert found.time == exact.time
         assert abs(found.approach / exact.approach - 1) < tolerance
         assert np.abs(found.pressure - exact.pressure).sum() < tolerance * exact.pressure.sum()
+
+
+def test_rows_of_a_step__are_those_of_its_fields(monkeypatch):
+    """Of a pressure held by its cells, and of a displacement that is added up where it is asked for."""
+    monkeypatch.setattr(sparse, "_ABOVE", 10)
+    kinds = set()
+    for step in march(scene(MATERIALS["zener"], TRIANGLE, tolerance=1e-2)):
+        kinds.add((step.shown.contact.cells is not None, step.moved.is_whole))
+        for rows in (slice(0, 3), slice(4, 9), slice(0, step.scene.gap.shape[0])):
+            np.testing.assert_array_equal(step.pressure_on(rows), step.shown.pressure[rows])
+            np.testing.assert_array_equal(step.displacement_on(rows), step.displacement[rows])
+    assert (True, False) in kinds
 
 
 def test_forms_of_memory__give_the_same_numbers():

@@ -89,6 +89,17 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     )
 
 
+@pytest.mark.parametrize(("cells", "layer"), [(1 << 20, 8), ((1 << 20) + 1, 1)])
+def test_file_of_many_frames__is_written_a_layer_of_chunks_at_a_time(study, cells, layer):
+    """Which no solution of an elastic case takes as much as: the state, the surface and a layer count."""
+    settings = vary(study[0], ELASTIC).solving()
+    elastic = choose_memory(rv.elastic(1e6), **memory_wanted(study[0].program().on_area(1e-6), settings)).memory
+    few, many = (march_bytes(settings, cells, elastic, rows=rows) / 8 / cells for rows in (1, 24))
+    assert (many - few > 1) == (layer > 1)
+    if layer > 1:
+        assert many == pytest.approx(2.1 + 4.5 + layer)
+
+
 COUNTED = (161, 144)
 
 

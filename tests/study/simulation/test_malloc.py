@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from roughvisc.study.simulation import malloc
+import roughvisc as rv
+from roughvisc.study.simulation import malloc, simulate
 from roughvisc.study.simulation.malloc import keep_memory, keeping
 
 MB = 1 << 20
@@ -47,6 +48,16 @@ def test_wide_grid__keeps_what_is_freed_till_its_end(library):
     with pytest.raises(ZeroDivisionError):
         failing()
     assert library.told == [(TRIM, 64 * MB), "trim"]
+
+
+def test_memory_of_a_march__is_given_back_when_the_result_is_described(library, monkeypatch):
+    """Before the file is written: what the notes take is freed by then."""
+    monkeypatch.setattr(malloc, "_WIDE", 1)
+    note = simulate._slope_note
+    monkeypatch.setattr(simulate, "_slope_note", lambda *given: library.told.append("noted") or note(*given))
+    program = rv.Program().load(1e-4, over=0.05)
+    rv.simulate(rv.sphere(1e-3, 2e-4, 20), rv.elastic(1e6), program, times=[0.05], tolerance=1e-2, progress=False)
+    assert library.told == [(MMAP, 32 * MB), (TRIM, 2047 * MB), "noted", (TRIM, 64 * MB), "trim"]
 
 
 def test_narrow_grid__changes_nothing(library):
