@@ -128,21 +128,21 @@ def test_known_displacement_of_a_solution__is_computed_anew():
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_cold_start__is_guessed_on_a_coarser_grid_where_contact_is_sparse(boundary, monkeypatch):
+def test_cold_start__is_guessed_on_a_coarser_grid(boundary, monkeypatch):
     shape = (257, 301)
     halfspace = HalfSpace(shape, (1.0, 1.0), boundary)
     gap = rough_gap(shape)
-    sparse, dense = 0.02 * gap.size, 3.0 * gap.size
+    sparse, dense = 0.02 * gap.size, 0.5 * gap.size
     guessed = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
     monkeypatch.setattr(solver, "_COARSE_FROM", 10**6)
     cold = [solve_contact(halfspace, gap, load=load, tolerance=1e-3) for load in (sparse, dense)]
     assert np.mean(cold[0].pressure > 0) < 0.1 < 0.5 < np.mean(cold[1].pressure > 0)
-    assert guessed[0].iterations < 0.8 * cold[0].iterations
-    bound = np.hypot(guessed[0].bound, cold[0].bound)
-    difference = guessed[0].pressure - cold[0].pressure
-    energy = [np.sum(p * halfspace.displacement(p)) for p in (difference, cold[0].pressure)]
-    assert energy[0] < bound**2 * energy[1]
-    assert guessed[1].pressure.tobytes() == cold[1].pressure.tobytes()
+    for found, alone in zip(guessed, cold, strict=True):
+        assert found.iterations < 0.8 * alone.iterations
+        bound = np.hypot(found.bound, alone.bound)
+        difference = found.pressure - alone.pressure
+        energy = [np.sum(p * halfspace.displacement(p)) for p in (difference, alone.pressure)]
+        assert energy[0] < bound**2 * energy[1]
 
 
 @given(exponent=st.integers(-290, 12), boundary=boundaries)

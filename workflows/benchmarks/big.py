@@ -31,6 +31,8 @@ AREAS = (0.05, 0.3, 0.95)
 # What takes an hour is left out; so long is waited for one solution of a peer. [s]
 LARGEST = {"Tamaas": 2048, "ASPHER": 8192}
 PATIENCE = 1200
+# Solutions of at most so many cells a side take less than a second: more of them are timed.
+FEW = 1024
 
 
 def scene(cells, area):
@@ -155,16 +157,23 @@ def tell(cells, area, solver, told, error):
 
 
 def threads(sizes, area=0.05, tolerance=1e-6, repeats=3):
-    """Wall time of one solve by one thread and by two, in turn."""
+    """Wall time of one solve by one thread and by two, in turn, and what a cell and an iteration take of it."""
     for cells in sizes:
         walls = {1: [], 2: []}
         with tempfile.TemporaryDirectory() as folder:
-            for _ in range(repeats):
+            for _ in range(repeats if cells > FEW else 2 * repeats + 1):
                 for count, found in walls.items():
-                    found.append(apart("roughvisc", cells, area, tolerance, count, folder)["wall"])
+                    told = apart("roughvisc", cells, area, tolerance, count, folder)
+                    found.append(told["wall"])
+        each = {count: np.array(found) / cells**2 / told["iterations"] * 1e9 for count, found in walls.items()}
         one_thread, two = (float(np.median(found)) for found in walls.values())
         print(
-            f"{cells:5d} wall by one thread {one_thread:.2f} s, by two {two:.2f} s: {one_thread / two:.2f}", flush=True
+            f"{cells:5d} wall by one thread {one_thread:.2f} s, by two {two:.2f} s: {one_thread / two:.2f}; "
+            + "; ".join(
+                f"{count}: {np.median(ns):.1f} ns a cell and iteration ({ns.min():.1f} to {ns.max():.1f})"
+                for count, ns in each.items()
+            ),
+            flush=True,
         )
 
 

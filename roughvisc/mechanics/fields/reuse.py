@@ -16,12 +16,13 @@ _FROM = 1 << 22
 
 
 @contextmanager
-def reused() -> Iterator[None]:
+def reused(apart: bool = False) -> Iterator[None]:
     """Within it, the memory of fields of :func:`empty` that nobody holds any more is taken for the next ones.
 
-    What is left at its end is given back to the system. In another one it does nothing.
+    What is left at its end is given back to the system. In another one it does nothing, unless its fields are to be
+    `apart`: of another size than those of the other one, which has no use for their memory.
     """
-    if _kept.get() is not None:
+    if _kept.get() is not None and not apart:
         yield
         return
     kept = _Kept()

@@ -74,6 +74,17 @@ def test_blocks__within_each_other_are_one():
     assert reuse._kept.get() is None
 
 
+def test_block_apart__has_memory_of_its_own_and_gives_it_back():
+    with reused():
+        outer = reuse._kept.get()
+        with reused(apart=True):
+            inner = reuse._kept.get()
+            empty(SHAPE)
+            assert (sum(map(len, inner._by_size.values())), outer._by_size) == (1, {})
+        assert reuse._kept.get() is outer
+        assert inner._by_size == {}
+
+
 def test_blocks__end_on_errors():
     with pytest.raises(ZeroDivisionError), reused():
         1 / 0  # noqa: B018
