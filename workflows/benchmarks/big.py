@@ -1,7 +1,7 @@
 """Large grids: elastic rough contact at 1024 to 8192 squared, by this package, Tamaas and ASPHER; creep at 4096.
 
     python workflows/benchmarks/big.py elastic [CELLS[:AREA,...[:PEER,...]] ...]
-    python workflows/benchmarks/big.py creep|threads|machine [CELLS ...]
+    python workflows/benchmarks/big.py creep|threads|machine|guess [CELLS ...]
 
 Areas are parts of the surface, or "sphere". Every solution runs in a process of its own, which tells its time, wall and
 processor, and its largest memory. The error is the L1 difference of the pressure to a solution to a duality gap of
@@ -9,6 +9,7 @@ processor, and its largest memory. The error is the L1 difference of the pressur
 """
 
 import json
+import math
 import os
 import pathlib
 import resource
@@ -17,13 +18,14 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from unittest import mock
 
 import numpy as np
 from scenes import load_for_area, rough_gap, sphere_gap
 from scipy import fft
 
 import roughvisc as rv
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.study.simulation.malloc import keeping
 
@@ -191,6 +193,26 @@ def machine(sizes, area=0.05, tolerance=1e-6, repeats=3):
         print(f"{cells:5d} two processes of one thread do {found} times as much as one", flush=True)
 
 
+def guess(sizes, tolerance=1e-6, repeats=5):
+    """What first guesses on coarser grids are worth: processor time and iterations with them and without, in turn."""
+    for cells in sizes:
+        for area in (*AREAS, "sphere"):
+            gap, mean, boundary = scene(cells, area)
+            found = {solver._COARSE_FROM: [], math.inf: []}
+            for _ in range(repeats):
+                for least, states in found.items():
+                    with mock.patch.object(solver, "_COARSE_FROM", least):
+                        spent = time.process_time()
+                        iterations = ours(gap, mean, boundary, tolerance, 1)[1]
+                        states.append((time.process_time() - spent, iterations))
+            (with_it, few), (without, many) = (np.median(states, axis=0) for states in found.values())
+            print(
+                f"{cells:5d} {area!s:>7} {with_it:.3f} s, {few:.0f} iterations; without guesses {without:.3f} s, "
+                f"{many:.0f}: {with_it / without:.2f} of the time",
+                flush=True,
+            )
+
+
 def creeping(cells, count, fraction=0.08, tolerance=1e-3):
     """Zener, step and hold, in a process of its own: time, steps, memory by so many threads."""
     surface = rv.self_affine(1.0, (cells, cells), hurst=0.8, rms_slope=0.1, rolloff=0.25, shortcut=8 / cells, seed=0)
@@ -231,4 +253,6 @@ if __name__ == "__main__":
             cells, *which = one_size.split(":")
             elastic(int(cells), *(each.split(",") for each in which))
     else:
-        {"creep": creep, "threads": threads, "machine": machine}[what]([int(n) for n in given] or [1024, 2048, 4096])
+        {"creep": creep, "threads": threads, "machine": machine, "guess": guess}[what](
+            [int(n) for n in given] or [1024, 2048, 4096]
+        )
