@@ -95,9 +95,7 @@ def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
     """First guess of the pressure under a load, constant over two by two cells; None where that does not pay. [-]"""
     if min(gap.shape) < _COARSE_FROM:
         return None
-    (nx, ny), (dx, dy) = gap.shape, halfspace.spacing
-    mx, my = nx // 2, ny // 2
-    coarse = halfspace.on((mx, my), (dx * nx / mx, dy * ny / my))
+    coarse = halfspace.on((gap.shape[0] // 2, gap.shape[1] // 2))
     few = _averaged(gap, coarse.shape, halfspace.threads)
     load *= few.size / gap.size
     with reused(apart=True):  # none of its fields is as large as those to come

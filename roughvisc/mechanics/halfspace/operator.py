@@ -96,8 +96,10 @@ class HalfSpace:
         self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
 
-    def on(self, shape: tuple[int, int], spacing: tuple[float, float]) -> HalfSpace:
-        """The same body, boundary and symmetry on another grid."""
+    def on(self, shape: tuple[int, int]) -> HalfSpace:
+        """The same body, boundary, symmetry and extent on another number of cells."""
+        (nx, ny), (mx, my), (dx, dy) = self.shape, shape, self.spacing
+        spacing = dx * (nx / mx), dy * (ny / my)
         return HalfSpace(shape, spacing, self.boundary, mirrored=self.mirrored, kernel=self.kernel)
 
     @property
@@ -108,9 +110,7 @@ class HalfSpace:
     @cached_property
     def coarse(self) -> HalfSpace:
         """The same body on blocks of some cells a side, of the same period."""
-        coarse = (-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK))
-        (nx, ny), (mx, my), (dx, dy) = self.shape, coarse, self.spacing
-        return self.on(coarse, (dx * nx / mx, dy * ny / my))
+        return self.on((-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK)))
 
     @property
     def cell_area(self) -> float:

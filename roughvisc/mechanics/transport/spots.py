@@ -129,7 +129,7 @@ def _extrapolated(
 ) -> FrozenContact:
     """With the part of the edge that is known for certain extrapolated from cells of half the side."""
     split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
-    finer = body.on((split.shape[0], split.shape[1]), (body.spacing[0] / 2, body.spacing[1] / 2))
+    finer = body.on((split.shape[0], split.shape[1]))
     punch = _punch(finer, split, tolerance)
     stiffness, off = _variational(punch, finer.cell_area)
     difference = share * max(stiffness - coarse.stiffness, 0.0)
