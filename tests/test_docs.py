@@ -110,6 +110,14 @@ def test_commands__exist_with_their_options():
     assert tried > 10
 
 
+def test_readme__has_the_speeds_of_the_page_about_them():
+    _, said = (ROOT / "README.md").read_text(encoding="utf-8").split("## Is it fast?")
+    rows = re.findall(r"^\| .* \|$", said.split("\n## ")[0], re.M)
+    measured = (DOCS / "performance.md").read_text(encoding="utf-8").splitlines()
+    assert len(rows) > 3
+    assert set(rows) <= set(measured)
+
+
 def test_reference__names_everything_public():
     listed = re.findall(r"^   (\w+)$", (DOCS / "reference.md").read_text(), re.M)
     public = {name for name in rv.__all__ if name != "__version__" and not inspect.ismodule(getattr(rv, name))}
