@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Error of the pressure (L1) for each newton on cells at the edge of the contact, at most: where contact ends on the
-#: material (measured 0.2 in the middle, 0.5 in 5 % of the cases), and where the material ends, with pressure infinite.
+#: material (measured 0.2 in the median, 0.5 in 5 % of the cases), and where the material ends, with pressure infinite.
 #: With all of the force at the edge, nothing is known.
 _AT_EDGE, _AT_END = 0.45, 0.9
 #: Error of the counted cells over the square root of the number of faces at the contact's edge, as edges lie at random
