@@ -103,8 +103,8 @@ def one(solver, cells, area, tolerance, threads, folder):
     held = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     wall, spent = time.perf_counter(), time.process_time()
     pressure, iterations, passes = SOLVERS[solver](gap, mean, boundary, tolerance, threads)
-    told = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - spent, "iterations": iterations}
-    told["passes"] = passes
+    told = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - spent}
+    told |= {"iterations": iterations, "passes": passes}
     told["area"] = float(np.mean(pressure > 0))
     told["fields"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * 1024 / (8 * gap.size)
     told["fields_before"] = held * 1024 / (8 * gap.size)
@@ -115,11 +115,9 @@ def one(solver, cells, area, tolerance, threads, folder):
 def apart(solver, cells, area, tolerance, threads, folder, patience=None):
     """What a process of its own tells; None where the solver is not there, nothing where it takes too long."""
     environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
-    command = [sys.executable, __file__, "one", solver, str(cells), str(area), str(tolerance), str(threads)]
+    command = [sys.executable, __file__, "one", *map(str, (solver, cells, area, tolerance, threads, folder))]
     try:
-        done = subprocess.run(
-            [*command, folder], capture_output=True, text=True, check=False, env=environment, timeout=patience
-        )
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, timeout=patience)
     except subprocess.TimeoutExpired:
         return {}
     if "No module named" in done.stderr:
@@ -159,16 +157,16 @@ def scene_folder(folder, cells, area):
 
 def widening(solver, area, sizes, folder, asked):
     """One program and one scene on wider and wider grids: none gets a looser tolerance than a narrower one needs."""
-    tolerances = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9]
+    tolerances, wall = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9], 0.0
     for cells in sorted(sizes):
+        if solver != "roughvisc" and 4 * wall > PATIENCE:
+            print(f"{cells:5d} {area!s:>7} {solver}: not begun, would take more than {4 * wall:.0f} s", flush=True)
+            return
         found = loosest(solver, cells, area, tolerances, scene_folder(folder, cells, area), asked)
         if found is None:
             return
         tolerance, wall = found
         tolerances = [each for each in tolerances if each <= tolerance]
-        if solver != "roughvisc" and 4 * wall > PATIENCE:
-            print(f"{cells:5d} {area!s:>7} {solver}: four times as many cells take more than {PATIENCE} s", flush=True)
-            return
 
 
 def loosest(solver, cells, area, tolerances, folder, asked):
@@ -185,21 +183,24 @@ def loosest(solver, cells, area, tolerances, folder, asked):
             return None
         pressure = folder / f"{solver}-{tolerance:g}.npy"
         found = error_of(pressure, folder / f"roughvisc-{REFERENCE:g}.npy")
+        pressure.unlink()
         if found <= asked:
             if told["wall"] < SHORT:
                 again = [apart(solver, cells, area, tolerance, 1, folder) for _ in range(4)]
                 told = sorted([told, *again], key=lambda each: each["wall"])[2]
-            pressure.unlink()
             tell(cells, area, name, told, found)
             return tolerance, told["wall"]
-        pressure.unlink()
         print(f"{cells:5d} {area!s:>7} {name}: error {found:.1e} after {told['wall']:.1f} s", flush=True)
     print(f"{cells:5d} {area!s:>7} {solver}: no tolerance brings its error below {asked}", flush=True)
     return None
 
 
 def asked_for(cells, areas="0.05,0.3,0.95,sphere", peers="ASPHER,Tamaas"):
-    return int(cells), areas.split(","), [peer for peer in peers.split(",") if peer in LARGEST]
+    """Cells, areas and peers as the command line has them."""
+    named = [] if peers == "none" else peers.split(",")
+    if not set(named) <= set(LARGEST):
+        raise SystemExit(f"peers are {peers}: expected none, or some of {', '.join(LARGEST)}")
+    return int(cells), areas.split(","), named
 
 
 def error_of(found, exact):
@@ -214,9 +215,10 @@ def error(found, exact):
 
 
 def tell(cells, area, solver, told, error):
-    of_it = f" {told['passes']:.1f} with those of nested grids," if told["passes"] else ""
+    of_it = ""
     if told["passes"]:
-        of_it += f" {told['cpu'] / cells**2 / told['passes'] * 1e9:.1f} ns a cell and iteration,"
+        each = told["cpu"] / cells**2 / told["passes"] * 1e9
+        of_it = f" {told['passes']:.1f} with those of nested grids, {each:.1f} ns a cell and iteration,"
     print(
         f"{cells:5d} {area!s:>7} {solver:16s} area {told['area']:.3f}  error {error:.1e}  wall {told['wall']:8.2f} s  "
         f"cpu {told['cpu']:8.2f} s  iterations {told['iterations']},{of_it} "
