@@ -75,8 +75,8 @@ def whole_domain(shape: tuple[int, int], mirrored: bool = False) -> Window:
     return Window(shape, (0, 0), shape, mirrored=mirrored)
 
 
-def window_around(gap: Array, extent: int, mirrored: bool = False) -> Window:
-    """The window around what lies lowest, about so many cells wide.
+def window_around(gap: Array, extent: int, mirrored: bool = False, former: Window | None = None) -> Window:
+    """The window around the lowest parts of a gap, about so many cells wide.
 
     Parameters
     ----------
@@ -86,6 +86,8 @@ def window_around(gap: Array, extent: int, mirrored: bool = False) -> Window:
         Longest side, in cells: as much of what lies low is taken as fits, at least what lies lowest.
     mirrored : bool
         Whether the gap goes on as its mirror image beyond the first row and column: then so does the window.
+    former : Window, optional
+        Window that the new one contains, even where it gets longer than ``extent``.
 
     Returns
     -------
@@ -96,10 +98,14 @@ def window_around(gap: Array, extent: int, mirrored: bool = False) -> Window:
     lowest = [np.min(gap, axis=1), np.min(gap, axis=0)]  # of each row and column
     levels = np.unique(np.concatenate(lowest))
     images = 2 if mirrored else 1
+    held = (slice(None, 0), slice(None, 0)) if former is None else former.cells
 
     def box(level: float) -> list[tuple[int, int]]:
-        inside = [np.flatnonzero(side <= level) for side in lowest]
-        return [(0 if mirrored else int(cells[0]), int(cells[-1]) + 1) for cells in inside]
+        inside = [side <= level for side in lowest]
+        for cells, own in zip(inside, held, strict=True):
+            cells[own] = True
+        ends = [np.flatnonzero(cells) for cells in inside]
+        return [(0 if mirrored else int(cells[0]), int(cells[-1]) + 1) for cells in ends]
 
     fits, too_large = 0, len(levels)
     while too_large - fits > 1:

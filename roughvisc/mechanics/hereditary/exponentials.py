@@ -261,9 +261,11 @@ def _two_step(step: float, last: float) -> tuple[float, float, float]:
 
 
 def padded(fields: Array, shape: tuple[int, int], offset: tuple[int, int]) -> Array:
-    """Fields on a larger grid, zero in what is new; the last two axes are the grid's."""
+    """Fields on a larger grid, zero in the new cells; the last two axes are the grid's."""
     larger = np.zeros((*fields.shape[:-2], *shape))
     nx, ny = fields.shape[-2:]
+    if not (0 <= offset[0] <= shape[0] - nx and 0 <= offset[1] <= shape[1] - ny):
+        raise ValueError(f"a grid of {shape} cells does not contain one of {(nx, ny)} cells that begins at {offset}")
     larger[..., offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = fields
     return larger
 

@@ -132,11 +132,11 @@ class Ground:
         return replace(scene, halfspace=halfspace, **self.shown()), first
 
     def widen(self) -> None:
-        """Go on to the next larger window, which is the whole surface in the end."""
+        """Take the next larger window, which contains the present one and is the whole surface in the end."""
         before = self.window
         while self.window == before:
             self._extent *= GROWTH
-            self.window = window_around(self.gap, int(self._extent), self.mirrored)
+            self.window = window_around(self.gap, int(self._extent), self.mirrored, former=before)
 
     def shown(self) -> dict[str, Any]:
         """What a scene takes from the surface."""

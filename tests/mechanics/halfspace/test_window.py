@@ -43,6 +43,27 @@ def test_window__grows_with_its_extent_up_to_the_domain():
         assert all(a >= b for a, b in zip(small.first, large.first, strict=True))
 
 
+@given(seed=st.integers(0, 10_000), mirrored=st.booleans())
+def test_window__contains_the_former_one(seed, mirrored):
+    rng = np.random.default_rng(seed)
+    gap = rng.random((101, 133))  # whose low cells lie anywhere
+    gap -= gap.min()
+    window, extent = window_around(gap, 30, mirrored), 30
+    while not window.whole:
+        extent = round(1.5 * extent)
+        former, window = window, window_around(gap, extent, mirrored, former=window)
+        former_cells, cells = np.zeros(gap.shape, bool), np.zeros(gap.shape, bool)
+        former_cells[former.cells] = cells[window.cells] = True
+        assert not (former_cells & ~cells).any()
+        assert window.whole or window.outside == gap[~cells].min()
+
+
+@pytest.mark.parametrize(("shape", "offset"), [((5, 6), (-1, 0)), ((5, 6), (0, 4)), ((2, 9), (0, 0))])
+def test_padding__refuses_a_grid_that_does_not_contain_the_present_one(shape, offset):
+    with pytest.raises(ValueError, match="does not contain"):
+        padded(np.ones((2, 3, 3)), shape, offset)
+
+
 def test_window__takes_in_every_summit_of_the_same_height():
     gap = np.minimum(paraboloid((201, 191), (50, 60)), paraboloid((201, 191), (140, 130)))
     window = window_around(gap, 30)
