@@ -101,7 +101,7 @@ class Face:
 
     def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
         """Steady state under a force [N], begun with that of the last speed, which it takes the place of."""
-        found = steady_state(sliding, self.gap, force, tolerance=tolerance, start=self.pressure)
+        found = steady_state(sliding, self.gap, force, tolerance=tolerance)
         self.pressure = found.pressure
         return found
 

@@ -125,8 +125,8 @@ class Speeds:
             "loss_tangent": found.loss_tangent,
             "pressure_residual": found.residual,
             "friction_residual": found.friction_residual,
-            "iterations": found.inner,
-            "outer_iterations": found.outer,
+            "iterations": found.vectors,
+            "outer_iterations": found.iterations,
             "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
         }
         fields = {"pressure": np.ascontiguousarray(pressure), "gap": gap}
