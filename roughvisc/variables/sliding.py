@@ -50,9 +50,13 @@ SLIDING: dict[str, Variable] = {
     ),
     "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
     "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
-    "outer_iterations": Variable(("speed",), "1", "contact problems solved", dtype="int32"),
-    "pressure_residual": Variable(("speed",), "1", "what the iteration leaves of the pressure", "L1, over the load"),
-    "friction_residual": Variable(("speed",), "1", "what the iteration leaves of the friction", "estimated, relative"),
+    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32"),
+    "pressure_residual": Variable(
+        ("speed",), "1", "error of the pressure that the iteration leaves", "estimated, L1, over the load"
+    ),
+    "friction_residual": Variable(
+        ("speed",), "1", "error of the friction that the iteration leaves", "estimated, relative"
+    ),
     "persson_friction_coefficient": Variable(
         ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
     ),

@@ -23,8 +23,8 @@ from roughvisc.mechanics.sliding.interior_point import solve_complementarity
 Array = NDArray[np.float64]
 Compliance = Callable[[Array], NDArray[np.complex128]]
 
-# Stated error over what Newton's step changes. Measured on line contacts against dense solutions, loss tangents up to 27:
-# the true error is 0.8 to 2.4 times what the step changes.
+# Stated error over the change by Newton's step. Measured on line contacts against dense solutions, with loss tangents
+# up to 27: the true error is 0.8 to 2.4 times that change.
 _CAUTION = 2.0
 
 
@@ -132,7 +132,8 @@ class Sliding:
         acts = self.response != 0
         #: Pressure over displacement of each wave; of those without displacement as of the softest. [Pa/m]
         self.stiffness = np.divide(1.0, self.response, where=acts, out=np.full(acts.shape, 1 / softest, complex))
-        self._shape = shape
+        #: Cells of one period.
+        self.shape = shape
         self.cell_area = dx * dy
         one = np.zeros(shape)
         one[0, 0] = 1.0
@@ -156,7 +157,7 @@ class Sliding:
         return self._filtered(field, self._derivative)
 
     def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
-        return np.asarray(fft.irfft2(fft.rfft2(field) * symbol, s=self._shape, overwrite_x=True))
+        return np.asarray(fft.irfft2(fft.rfft2(field) * symbol, s=self.shape, overwrite_x=True))
 
 
 def steady_state(

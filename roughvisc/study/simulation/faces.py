@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +21,9 @@ from roughvisc.study.simulation.scene import Ground
 from roughvisc.topography.spectrum import without_last_octave
 
 Array = NDArray[np.float64]
+
+# A profile that changes across the motion by less than this part of its range does not change there.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Turn:
         return cls(lambda field: field.T[flip], lambda field: np.ascontiguousarray(field[flip].T), True)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Face:
     """One grid of a surface that slides along +x.
 
@@ -52,14 +55,11 @@ class Face:
         Cell sides, turned likewise. [m]
     kernel : Kernel
         Of the body.
-    pressure : ndarray or None
-        That of the last speed, with which the next one begins. [Pa]
     """
 
     gap: Array
     spacing: tuple[float, float]
     kernel: Kernel
-    pressure: Array | None = None
 
     @classmethod
     def of(cls, ground: Ground, turn: Turn) -> Face:
@@ -94,16 +94,29 @@ class Face:
         """Wave numbers along the motion. [1/m]"""
         return np.asarray(2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]))
 
+    @property
+    def rows(self) -> int:
+        """Rows of cells to solve for: one of a profile that does not change across the motion, which stands for all."""
+        across = float(np.ptp(self.gap, axis=1).max())
+        return 1 if across <= _ROUNDING * float(np.ptp(self.gap)) else self.gap.shape[1]
+
     def sliding(self, speed: float, material: Material) -> Sliding:
-        """The operator at a speed [m/s]; of the material a complex compliance in closed form is asked."""
-        shape = (self.gap.shape[0], self.gap.shape[1])
-        return Sliding(self.kernel, partial(complex_compliance, material), shape, self.spacing, speed)
+        """The operator at a speed [m/s]; the material must have a complex compliance in closed form."""
+        (nx, ny), (dx, dy) = self.gap.shape, self.spacing
+        shape, spacing = (nx, self.rows), (dx, dy * ny / self.rows)
+        return Sliding(self.kernel, partial(complex_compliance, material), shape, spacing, speed)
 
     def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
-        """Steady state under a force [N], begun with that of the last speed, which it takes the place of."""
-        found = steady_state(sliding, self.gap, force, tolerance=tolerance)
-        self.pressure = found.pressure
-        return found
+        """Steady state under a force [N], on all cells."""
+        found = steady_state(sliding, self.gap_on(sliding), force, tolerance=tolerance)
+        pressure, displacement = (
+            np.array(np.broadcast_to(field, self.gap.shape)) for field in (found.pressure, found.displacement)
+        )
+        return replace(found, pressure=pressure, displacement=displacement)
+
+    def gap_on(self, sliding: Sliding) -> Array:
+        """The gap on the rows of an operator. [m]"""
+        return np.ascontiguousarray(self.gap[:, : sliding.shape[1]])
 
 
 def _sampled(field: Array, count: int, axis: int) -> Array:

@@ -143,14 +143,13 @@ def rub(
     reached = Reached() if keeper is None else keeper.latest
     spent = reached.wall_time - began
     store = RowsInMemory() if keeper is None else keeper.rows
-    assert reached.state is None or isinstance(reached.state, tuple), "the key tells a curve from a program"
-    rows = Speeds(ground, material, curve, settings, store, reached.state)
+    rows = Speeds(ground, material, curve, settings, store)
     from roughvisc.study.progress import reporting  # slow to import
 
     with keeping(ground.gap.nbytes), reporting(progress, "sliding", at=curve.at) as report:
         for number in np.argsort(curve.asked)[reached.rows :]:
-            state = rows.add(int(number), lambda: spent + time.perf_counter())
-            reached = reached.at_speed(state, spent + time.perf_counter())
+            rows.add(int(number), lambda: spent + time.perf_counter())
+            reached = reached.at_speed(spent + time.perf_counter())
             report(float(reached.rows), float(len(curve.asked)))
             if keeper is not None:
                 keeper.passed(reached)

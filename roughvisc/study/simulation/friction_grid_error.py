@@ -40,7 +40,7 @@ class CoarserFaces:
         if not self.faces:
             log.warning("no grid error: %d x %d cells are the fewest that there can be", *face.gap.shape)
             return
-        self._ratio = math.sqrt(face.gap.size / self.faces[0].gap.size)
+        self._ratio = max(many / few for many, few in zip(face.gap.shape, self.faces[0].gap.shape, strict=True))
         if self.faces[-1].gap.size == self.faces[0].gap.size:
             del self.faces[1:]
 

@@ -23,8 +23,6 @@ from roughvisc.study.storage.records import RowStore
 from roughvisc.variables import STATUS_MEANINGS
 
 Array = NDArray[np.float64]
-#: Pressures that the next speed begins with: of the surface, without its last octave, and of coarser copies.
-State = tuple[Array | None, ...]
 
 
 class Speeds:
@@ -41,9 +39,7 @@ class Speeds:
     settings : Settings
         Tolerance, fields, whether the grid's error is asked for.
     store : RowStore
-        Where the rows are kept; what is in it counts as lower speeds.
-    state : State or None
-        What the next speed begins with; None at the lowest.
+        Where the rows are kept; those in it are of lower speeds.
     """
 
     def __init__(
@@ -53,7 +49,6 @@ class Speeds:
         curve: Curve,
         settings: Settings,
         store: RowStore,
-        state: State | None = None,
     ) -> None:
         self._ground, self._material, self._curve, self._settings, self._store = (
             ground,
@@ -72,25 +67,16 @@ class Speeds:
             self._smooth, shortest = self._face.smooth()
             self.told["last_octave"] = f"waves shorter than {shortest:.4g} m"
         self._coarser = CoarserFaces(self._face) if settings.grid_error else None
-        if state is not None:
-            for face, pressure in zip(self._faces, state, strict=True):
-                face.pressure = pressure
 
-    @property
-    def _faces(self) -> list[Face]:
-        """All that slide."""
-        smooth = [] if self._smooth is None else [self._smooth]
-        return [self._face, *smooth, *(self._coarser.faces if self._coarser is not None else ())]
-
-    def add(self, number: int, clock: Callable[[], float]) -> State:
-        """Slide at the speed of that number, and give what the next one begins with; the clock tells the time spent."""
+    def add(self, number: int, clock: Callable[[], float]) -> None:
+        """Slide at the speed of that number; the clock gives the time spent. [s]"""
         speed, tolerance = self._curve.asked[number], self._settings.tolerance
         # once a speed: a table takes a fit
         law = over_frequencies(self._material, speed * self._face.waves, 0.1 * tolerance)
         sliding = self._face.sliding(speed, law)
         found = self._face.slide(sliding, self._force, tolerance)
         row, fields = self._row(found, speed)
-        theory = persson(sliding, self._face.gap, row["nominal_pressure"])
+        theory = persson(sliding, self._face.gap_on(sliding), row["nominal_pressure"])
         row["persson_friction_coefficient"] = theory.friction_coefficient
         row["persson_contact_fraction"] = theory.contact_fraction
         if self._smooth is not None:
@@ -99,7 +85,6 @@ class Speeds:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
         row["wall_time"] = clock()
         self._store.append({"number": number, "row": row}, fields)
-        return tuple(face.pressure for face in self._faces)
 
     def _row(self, found: SteadyState, speed: float) -> tuple[dict[str, Any], dict[str, Array]]:
         """Numbers and fields of a state, in the frame of the profile."""

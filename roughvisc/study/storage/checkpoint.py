@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.halfspace.transforms import transform_library
@@ -58,7 +57,7 @@ class Reached:
         Libraries that it was computed with, one after the other.
     """
 
-    state: State | tuple[NDArray[np.float64] | None, ...] | None = None
+    state: State | tuple[()] | None = None
     converged: bool = True
     rows: int = 0
     growths: int = 0
@@ -80,9 +79,9 @@ class Reached:
         converged = self.converged and step.converged
         return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
 
-    def at_speed(self, state: tuple[NDArray[np.float64] | None, ...], wall_time: float) -> Reached:
-        """How far it has come with another speed of a curve of friction."""
-        return replace(self, state=state, rows=self.rows + 1, wall_time=wall_time)
+    def at_speed(self, wall_time: float) -> Reached:
+        """How far it has come with another speed of a curve of friction, which depends on no other speed."""
+        return replace(self, state=(), rows=self.rows + 1, wall_time=wall_time)
 
     def going_on_here(self) -> Reached:
         """The same, to be gone on from with the transforms that are here."""

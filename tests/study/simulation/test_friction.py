@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.errors import InputError
 from roughvisc.mechanics.materials import frequency
+from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.variables.sliding import SLIDING
 
@@ -173,3 +175,36 @@ def test_missing_points_and_fluids__are_refused():
         rv.friction(rv.flat_punch(1e-4, 4e-4, 15), RUBBER, **PRESS)
     with pytest.raises(rv.InputError, match="creeps without end"):
         rv.friction(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)
+
+
+@pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.PowerLaw(1e-7, 1e-6, 0.3)], ids=["maxwell", "power law"])
+@pytest.mark.parametrize("direction", ["x", "-y"])
+def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(material, direction):
+    """Full contact of a wave has mu = k^2 A^2 Im E*(k V) / (4 p0), on any number of rows."""
+    side, shape, amplitude, speed, k = 1e-3, (21, 5), 1e-7, 0.1, 2 * np.pi / 1e-3
+    wave = rv.wavy(amplitude, side, (side, side / 7), shape, waves=1)
+    if direction == "-y":
+        wave = wave.transpose().rename(x="y", y="x")
+    modulus = 1 / complex(complex_compliance(material, k * speed))
+    pressure = 3 * amplitude * k * abs(modulus)
+    ds = rv.friction(
+        wave,
+        material,
+        pressure=pressure,
+        speeds=speed,
+        direction=direction,
+        fields=("pressure",),
+        tolerance=1e-6,
+        progress=False,
+    )
+    exact = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
+    assert float(ds.friction_coefficient[0]) == pytest.approx(exact, rel=1e-5)
+    assert float(ds.pressure[0].mean()) == pytest.approx(pressure, rel=1e-9)
+    across = "y" if direction == "x" else "x"
+    assert float((ds.pressure[0].max(across) - ds.pressure[0].min(across)).max()) == 0
+
+
+def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion():
+    rough = rv.self_affine((1e-3, 1e-3), (15, 11), hurst=0.8, rms_slope=0.1, seed=1)
+    with pytest.raises(InputError, match="creeps without end"):
+        rv.friction(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)

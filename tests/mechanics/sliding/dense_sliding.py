@@ -1,0 +1,135 @@
+"""Steady sliding of line contacts by dense matrices and active sets: the oracle of the iterative solver.
+
+``python tests/mechanics/sliding/dense_sliding.py 256 512`` prints the table of docs/performance.md.
+"""
+
+import sys
+from functools import partial
+
+import numpy as np
+
+import roughvisc as rv
+from roughvisc.mechanics.halfspace.love import HALF_SPACE
+from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+
+PERIOD, TIME = 1e-3, 1e-3
+
+
+def rubber(ratio=3.0):
+    """Modulus 1 MPa at once, and so many times the compliance retarded."""
+    return rv.zener(1e6, 1e6 / ratio, 1e6 / ratio * TIME)
+
+
+def slid(height, material, speed, load, body=HALF_SPACE, side=PERIOD, **settings):
+    """On a square surface, or on a strip of square cells."""
+    nx, ny = height.shape
+    spacing = (side / nx, side / ny if ny > 3 else side / nx)
+    sliding = Sliding(body, partial(complex_compliance, material), height.shape, spacing, speed)
+    return steady_state(sliding, height.max() - height, load, **settings)
+
+
+def dense_matrix(symbol):
+    """The matrix whose first column is the response of the other cells to pressure on the first one."""
+    n = len(symbol)
+    return np.fft.ifft(symbol).real[(np.arange(n)[:, None] - np.arange(n)) % n]
+
+
+def settled(matrix, gap, total, active, most):
+    """Pressure by a dense active-set method, or None where the set does not settle."""
+    for _ in range(most):
+        cells = np.flatnonzero(active)
+        system = np.block([[matrix[np.ix_(cells, cells)], -np.ones((len(cells), 1))], [np.ones((1, len(cells))), 0.0]])
+        solution = np.linalg.solve(system, np.append(-gap[cells], total))
+        pressure = np.zeros(len(gap))
+        pressure[cells] = solution[:-1]
+        opening = gap + matrix @ pressure - solution[-1]
+        wrong = (active & (pressure < 0)) | (~active & (opening < -1e-13 * np.ptp(gap)))
+        if not wrong.any():
+            return pressure
+        active = active ^ wrong
+        if not active.any():
+            return None
+    return None
+
+
+def dense(height, material, speed, load, start=None):
+    """The same equations of a line contact by dense matrices and active sets: pressure of the cells. [Pa]
+
+    ``g + K p >= delta`` with equality where ``p > 0``. Where the set does not settle at once, the skew part of the
+    matrix is added in steps, each of which begins with the contact of the one before.
+    """
+    n = len(height)
+    q = 2 * np.pi * np.fft.fftfreq(n, PERIOD / n)
+    symbol = np.zeros(n, complex)
+    symbol[1:] = 2 / np.abs(q[1:]) * complex_compliance(material, -q[1:] * speed)
+    if n % 2 == 0:
+        symbol[n // 2] = symbol[n // 2].real
+    gap, total = height.max() - height, load / (PERIOD / n) ** 2
+    lowest = gap < np.quantile(gap, 0.3)
+    pressure = settled(dense_matrix(symbol), gap, total, lowest if start is None else start, 15)
+    if pressure is not None:
+        return pressure
+    pressure = settled(dense_matrix(symbol.real + 0j), gap, total, lowest, 100)
+    done, step = 0.0, 1.0
+    while done < 1:
+        step = min(step, 1 - done)
+        found = settled(dense_matrix(symbol.real + 1j * (done + step) * symbol.imag), gap, total, pressure > 0, 12)
+        if found is None:
+            step /= 2
+            assert step > 1e-6, "the active set does not settle"
+        else:
+            pressure, done, step = found, done + step, 2 * step
+    return pressure
+
+
+def line_profiles(cells):
+    """Heights of lines: a wave, a rough line and a broad bump. [m]"""
+    x = (np.arange(cells) + 0.5) / cells
+    rough = rv.self_affine(
+        (PERIOD, 3 * PERIOD / cells), (cells, 3), hurst=0.8, rms_slope=0.1, rolloff=PERIOD / 3, seed=1
+    )
+    return {"wave": 1e-5 * np.cos(2 * np.pi * x), "rough": rough.values[:, 0], "broad": -1e-5 * np.abs(2 * x - 1) ** 4}
+
+
+def strong_errors(height, ratio, load, speeds, tolerance):
+    """Of each speed: true and stated error of the pressure (L1), whether it converged, iterations."""
+    cells, active, rows = len(height), None, []
+    load = load * 256 / cells  # a row of square cells
+    for speed in speeds:
+        exact = dense(height, rubber(ratio), speed, load, active)
+        active = exact > 0
+        found = slid(height[:, None], rubber(ratio), speed, load, tolerance=tolerance)
+        error = np.abs(found.pressure[:, 0] - exact).sum() / exact.sum()
+        rows.append((error, found.residual, found.converged, found.iterations))
+    return np.array(rows)
+
+
+def main():
+    print("| cells | moduli | tolerance | error / tolerance | stated / true | iterations |")
+    print("|---|---|---|---|---|---|")
+    speeds = np.geomspace(1e-4, 10, 10)
+    for cells in map(int, sys.argv[1:]):
+        for ratio in (3.0, 30.0, 300.0, 3000.0):
+            for tolerance in (1e-2, 1e-3, 1e-4):
+                rows = np.concatenate(
+                    [
+                        strong_errors(height, ratio, load, speeds, tolerance)
+                        for height in line_profiles(cells).values()
+                        for load in (3e-6, 1e-4)
+                    ]
+                )
+                errors, stated, converged, iterations = rows.T
+                assert converged.all()
+                large = errors > tolerance / 50
+                part = stated[large] / errors[large]
+                print(
+                    f"| {cells} | {ratio:g} | {tolerance:g} | {np.max(errors) / tolerance:.2f} "
+                    f"| {part.min():.2f} to {part.max():.2f} ({large.sum()} of {len(rows)}) "
+                    f"| {np.median(iterations):.0f}, at most {iterations.max():.0f} |",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()
