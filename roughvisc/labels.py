@@ -13,7 +13,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
-from roughvisc.variables import FLAGS, VARIABLES, Variable
+from roughvisc.variables import FLAGS, OLDER_NAMES, VARIABLES, Variable
 from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -111,14 +111,32 @@ def expect_history(dataset: xr.Dataset) -> None:
         raise InputError("the result lies over the speed of steady sliding: expected a history over time")
 
 
+def expect_current_names(dataset: xr.Dataset) -> None:
+    """Refuse a result of a former version as xarray alone opens it: its names have other meanings.
+
+    Raises
+    ------
+    InputError
+        If it holds a variable under an older name.
+    """
+    for name, today in OLDER_NAMES.items():
+        if name in dataset.variables:
+            raise InputError(
+                f"the result holds {name!r}, which is {today!r} today: a former version of roughvisc wrote it; open it "
+                "by rv.open_result, which gives its variables the names of today"
+            )
+
+
 def expect_declared_units(dataset: xr.Dataset) -> None:
     """Refuse a result that was converted to other units: what is derived from it and drawn is counted in SI.
 
     Raises
     ------
     InputError
-        If a declared variable states a unit that is not the declared one in other words, or holds a pint array.
+        If a declared variable states a unit that is not the declared one in other words, or holds a pint array; or if
+        a variable has its name of a former version, in which other names have other meanings.
     """
+    expect_current_names(dataset)
     for name, variable in dataset.variables.items():
         declared = VARIABLES[str(name)].units if name in VARIABLES else ""
         if declared and "units" not in variable.attrs and hasattr(variable.data, "magnitude"):

@@ -14,7 +14,7 @@ PACKAGE = ROOT / "roughvisc"
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
 _LABELS = {"errors", "labels", "notebook", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
-_STORAGE = {*_STATEMENT, "study.statement", "mechanics.hereditary", "mechanics.fields"}
+_STORAGE = {*_STATEMENT, "study.statement", "mechanics.contact", "mechanics.hereditary", "mechanics.fields"}
 _SIMULATION = {
     *_STORAGE,
     "study.storage",

@@ -11,7 +11,7 @@ TRIANGLE = rv.Program().load(1.0, over=1.0).load(0.0, over=1.0)
 
 
 def radius_of(ds):
-    return np.sqrt(ds.contact_area_corrected.values / np.pi)
+    return np.sqrt(ds.contact_area.values / np.pi)
 
 
 @pytest.mark.parametrize("cells", [129, pytest.param(257, marks=pytest.mark.long)])

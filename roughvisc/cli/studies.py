@@ -207,7 +207,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of what is found. [default: results/STUDY-trade]")
 @click.option("--apply", "target", metavar="PART", help="Write the setting for this accuracy into STUDY: 1%.")
-@click.option("--quantity", default="contact_area_corrected", help="Whose accuracy --apply means.", show_default=True)
+@click.option("--quantity", default="contact_area", help="Whose accuracy --apply means.", show_default=True)
 @click.option("--budget", metavar="TIME", default="5 min", help="Wall time of all runs together.", show_default=True)
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
@@ -238,7 +238,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
-    recommend.known_quantity(quantity, "--quantity")
+    quantity = recommend.known_quantity(quantity, "--quantity")
     if target is not None:
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)

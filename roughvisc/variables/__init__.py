@@ -7,6 +7,7 @@ through the gap and of the contact spots have files of their own.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 from roughvisc.variables.entry import Variable as Variable
@@ -17,6 +18,12 @@ from roughvisc.variables.transport import LEAK_MEANINGS, TRANSPORT
 #: How an accepted step ended; the values of ``status``, in order.
 STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
+
+#: Number of the meaning that the names below have; results state it in the attribute ``result_format``. Raised by
+#: whoever gives a name another meaning: :mod:`roughvisc.study.storage.formats` then reads what was written before.
+RESULT_FORMAT = 2
+#: Older names of variables, which may be given until release 0.1.0, and what they are called now.
+OLDER_NAMES = {"contact_area_corrected": "contact_area"}
 
 _GRID = ("x", "y")
 _FRAME = ("time", "x", "y")
@@ -110,20 +117,32 @@ VARIABLES: dict[str, Variable] = {
     "contact_area": Variable(
         _SERIES,
         "m^2",
-        "real contact area, counted",
-        "cells that carry pressure",
-        ancillary=("contact_area_lower", "contact_area_upper"),
-        short="contact area, counted",
-    ),
-    "contact_area_corrected": Variable(
-        _SERIES,
-        "m^2",
         "real contact area, corrected for the grid",
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
+        ancillary=(
+            "contact_area_lower",
+            "contact_area_upper",
+            "contact_area_solver_lower",
+            "contact_area_solver_upper",
+            "grid_error_area",
+        ),
         short="contact area",
     ),
-    "contact_fraction": Variable(_SERIES, "1", "contact area over nominal area", short="contact fraction"),
+    "contact_area_counted": Variable(
+        _SERIES,
+        "m^2",
+        "area of the cells in contact",
+        "the cells that carry pressure, counted; larger than contact_area, since cells at the edge count as a whole",
+        short="contact area, counted",
+    ),
+    "contact_fraction": Variable(
+        _SERIES,
+        "1",
+        "contact area over nominal area",
+        "contact_area over the area of the whole grid, absent cells included",
+        short="contact fraction",
+    ),
     "mean_gap": Variable(
         _SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",), short="mean gap"
     ),
@@ -170,13 +189,30 @@ VARIABLES: dict[str, Variable] = {
     "work_error": Variable(_SERIES, "J", "stated error of the work"),
     "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy"),
     "contact_area_lower": Variable(
-        _SERIES, "m^2", "area that is certainly in contact", "counted, at the stated error; without the grid's part"
+        _SERIES,
+        "m^2",
+        "lower bound in practice on the contact area",
+        "contact_area_solver_lower less the error of the grid: grid_error_area times the largest contact area",
     ),
     "contact_area_upper": Variable(
         _SERIES,
         "m^2",
-        "area that is not certainly out of contact",
-        "counted, at the stated error; without the grid's part",
+        "upper bound in practice on the contact area",
+        "contact_area_solver_upper and the error of the grid: grid_error_area times the largest contact area",
+    ),
+    "contact_area_solver_lower": Variable(
+        _SERIES,
+        "m^2",
+        "lower bound on the contact area that this grid gives",
+        "the contact area without the cells that time steps and contact solver leave in doubt; without the error of "
+        "the grid, which is mostly larger",
+    ),
+    "contact_area_solver_upper": Variable(
+        _SERIES,
+        "m^2",
+        "upper bound on the contact area that this grid gives",
+        "the contact area with the cells that time steps and contact solver leave in doubt; without the error of the "
+        "grid, which is mostly larger",
     ),
     "grid_error": Variable(
         _SERIES,
@@ -189,17 +225,21 @@ VARIABLES: dict[str, Variable] = {
     "grid_error_area": Variable(
         _SERIES,
         "1",
-        "bound in practice on the relative error of the corrected contact area due to the grid",
+        "bound in practice on the error of the contact area due to the grid, over the largest contact area",
         "as grid_error, and from the number of faces at the contact's edge",
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time"),
     # derived from a result: see roughvisc.views.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
-    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster"),
-    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster"),
+    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
+    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
     "cluster_area": Variable(
-        ("time", "cluster"), "m^2", "area of a contact cluster", "largest first; missing beyond the number of clusters"
+        ("time", "cluster"),
+        "m^2",
+        "area of a contact cluster",
+        "its cells, counted: all clusters together are contact_area_counted; largest first; missing beyond the number "
+        "of clusters",
     ),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
@@ -303,8 +343,22 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME and name not in TRANSPORT)
 
 
+def current_name(name: str) -> str:
+    """Name of a variable today; of an older one, with a warning that says so.
+
+    Examples
+    --------
+    >>> current_name("contact_area")
+    'contact_area'
+    """
+    if name not in OLDER_NAMES:
+        return name
+    warnings.warn(f"{name} is now {OLDER_NAMES[name]}: the older name goes with release 0.1.0", FutureWarning, 3)
+    return OLDER_NAMES[name]
+
+
 #: What is known of any contact.
-STATE = ("force", "approach", "contact_area", "contact_area_corrected", "contact_fraction", "mean_gap")
+STATE = ("force", "approach", "contact_area", "contact_area_counted", "contact_fraction", "mean_gap")
 #: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
 STEPPED = (*STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
 

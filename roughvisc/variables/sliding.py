@@ -71,11 +71,9 @@ SLIDING: dict[str, Variable] = {
     "grid_error_area": Variable(
         ("speed",),
         "1",
-        "bound in practice on the relative error of the corrected contact area due to the grid",
+        "bound in practice on the relative error of the contact area due to the grid",
         "as grid_error_friction, and from the number of faces at the contact's edge",
     ),
     "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
-    "last_octave_area": Variable(
-        ("speed",), "1", "part of the corrected contact area that the shortest octave of waves adds"
-    ),
+    "last_octave_area": Variable(("speed",), "1", "part of the contact area that the shortest octave of waves adds"),
 }

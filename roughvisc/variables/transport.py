@@ -16,20 +16,20 @@ TRANSPORT: dict[str, Variable] = {
         "m^3/s",
         "leak rate: volume of fluid that flows through the gap in unit time",
         "with the pressure drop over the length of the map along the flow; zero where leak_status says closed",
-        ancillary=("leak_rate_lower", "leak_rate_upper", "leak_status"),
+        ancillary=("leak_rate_solver_lower", "leak_rate_solver_upper", "leak_status"),
         short="leak rate",
     ),
-    "leak_rate_lower": Variable(
+    "leak_rate_solver_lower": Variable(
         _SERIES,
         "m^3/s",
-        "lower bound on the leak rate",
-        "of the equations on the cells (Thomson): without the error of the grid and that of the gap",
+        "lower bound on the leak rate that the equations of this grid have",
+        "of the solution of these equations alone (Thomson): without the error of the grid and that of the gap",
     ),
-    "leak_rate_upper": Variable(
+    "leak_rate_solver_upper": Variable(
         _SERIES,
         "m^3/s",
-        "upper bound on the leak rate",
-        "of the equations on the cells (Dirichlet): without the error of the grid and that of the gap",
+        "upper bound on the leak rate that the equations of this grid have",
+        "of the solution of these equations alone (Dirichlet): without the error of the grid and that of the gap",
     ),
     "leak_status": Variable(
         _SERIES,

@@ -45,8 +45,8 @@ def test_strip__in_every_figure(strip, draw):
 def test_strip__clusters_have_the_area_of_their_cells(strip):
     found = observables.clusters(strip)
     assert found.cluster_count.values.tolist() == [2, 2]
-    np.testing.assert_allclose(found.cluster_count * found.cluster_area_mean, strip.contact_area, rtol=1e-12)
-    np.testing.assert_allclose(observables.cluster_areas(strip).cluster_area.sum("cluster"), strip.contact_area)
+    np.testing.assert_allclose(found.cluster_count * found.cluster_area_mean, strip.contact_area_counted, rtol=1e-12)
+    np.testing.assert_allclose(observables.cluster_areas(strip).cluster_area.sum("cluster"), strip.contact_area_counted)
     assert float(found.cluster_area_largest[0]) >= CELL
 
 

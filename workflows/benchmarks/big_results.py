@@ -70,10 +70,10 @@ def made_up(cells, frames):
             "force": ("time", time_),
             "approach": ("time", 1e-6 * time_),
             "contact_area": ("time", areas),
-            "contact_area_corrected": ("time", areas),
+            "contact_area_counted": ("time", areas),
         },
         coords={"time": time_, "x": x, "y": x},
-        attrs={"boundary": "periodic", "title": "made up", "tolerance": 1e-3},
+        attrs={"boundary": "periodic", "title": "made up", "tolerance": 1e-3, "result_format": 2},
     )
 
 

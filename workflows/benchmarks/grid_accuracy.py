@@ -85,7 +85,7 @@ def _against(ds, exact, load, apex, points=8):
 
 
 def _row(ds, pressure, approach, area):
-    found, raw = float(ds.contact_area_corrected[0]), float(ds.contact_area[0])
+    found, raw = float(ds.contact_area[0]), float(ds.contact_area_counted[0])
     side = float(ds.x[1] - ds.x[0])
     return {
         "cells": raw / side**2,
@@ -113,7 +113,7 @@ def scans(seeds, cells=(32, 48), finer=5, shortcuts=(4.0, 8.0, 16.0), fractions=
                     exact = pressed(fine, load, **settings)
                     pressure = pressure_distance(ds, exact)[0] / load
                     approach = float(ds.approach[0] / exact.approach[0]) - 1
-                    row = _row(ds, pressure, approach, float(exact.contact_area_corrected[0]))
+                    row = _row(ds, pressure, approach, float(exact.contact_area[0]))
                     yield {"kind": f"scan, {boundary}", "radius": shortcut, "data": True} | row
 
 

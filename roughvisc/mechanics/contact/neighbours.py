@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
@@ -59,3 +60,41 @@ def staircase(contact: Mask, free: Mask, cell_area: float, periodic: bool, **out
     faces = faces_between(contact, free, periodic, **outside)
     # a face across x is dy long and lies in a strip dx wide, and the other way round
     return PERIMETER_CORRECTION * cell_area * faces
+
+
+def area_bounds(counted: ArrayLike, area: ArrayLike, inside: ArrayLike, outside: ArrayLike) -> tuple[Array, Array]:
+    """Bounds on a contact area where it is uncertain of some cells whether they are in contact. [m2]
+
+    Parameters
+    ----------
+    counted, area : array_like
+        Contact area, counted and less :func:`staircase`. [m2]
+    inside, outside : array_like
+        Area of the uncertain cells in contact, and of those out of it. [m2]
+
+    Returns
+    -------
+    lower, upper : ndarray
+        `area` lies between them. [m2]
+
+    Notes
+    -----
+    A cell that changes sides changes the count by one cell and the staircase by the cell's four faces at most. Each
+    cell in contact counts more than its faces take off: the area grows with each cell that comes into contact, and
+    is never more than the count.
+
+    Examples
+    --------
+    >>> lower, upper = area_bounds(10.0, 9.0, 1.0, 0.5)
+    >>> round(float(lower), 3), round(float(upper), 3)
+    (7.648, 9.676)
+    """
+    counted, area, inside, outside = (np.asarray(one, dtype=float) for one in (counted, area, inside, outside))
+    most = 1 + 4 * PERIMETER_CORRECTION
+    return np.maximum(area - most * inside, 0.0), np.minimum(area + most * outside, counted + outside)
+
+
+def bounds_with_grid(lower: ArrayLike, upper: ArrayLike, error: ArrayLike) -> tuple[Array, Array]:
+    """Bounds on a contact area, with an error of the grid that comes on top. [m2]"""
+    lower, upper, error = (np.asarray(one, dtype=float) for one in (lower, upper, error))
+    return np.maximum(lower - error, 0.0), upper + error

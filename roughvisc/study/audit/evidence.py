@@ -104,7 +104,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     attrs = _with_the_case(dataset.attrs, case)
     force = dataset["force"].values
     row = dataset.isel(time=int(np.flatnonzero(force >= force.max() * (1 - 1e-9))[-1]))  # crept as far as it has
-    area = float(row.get("contact_area_corrected", math.nan))
+    area = float(row.get("contact_area", math.nan))
     texture, size, slope = None, (math.nan, math.nan), math.nan
     if "height" in dataset:
         height = dataset["height"].load()

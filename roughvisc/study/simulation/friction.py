@@ -25,6 +25,7 @@ from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.checkpoint import Keeper, Reached
 from roughvisc.study.storage.records import RowsInMemory
+from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
 
@@ -166,6 +167,7 @@ def rub(
             log.warning("%s", notes[name])
     dataset.attrs = {
         "Conventions": "CF-1.11",
+        "result_format": RESULT_FORMAT,
         "model_note": MODEL,
         "direction": curve.direction,
         "history": str(ground.height.attrs.get("history", "")),

@@ -47,7 +47,7 @@ class CoarserFaces:
     def errors(
         self, found: SteadyState, speed: float, law: Material, force: float, tolerance: float
     ) -> dict[str, float]:
-        """Relative errors of friction and corrected area at a speed, missing where no coarser copy has a solution.
+        """Relative errors of friction and contact area at a speed, missing where no coarser copy has a solution.
 
         Parameters
         ----------
@@ -73,14 +73,14 @@ class CoarserFaces:
             for one, other in pairwise(runs)
         )
         friction = float(grid_uncertainty("friction", near[0], far[0], self._ratio))
-        area = float(grid_uncertainty("contact_area_corrected", near[1], far[1], self._ratio))
+        area = float(grid_uncertainty("contact_area", near[1], far[1], self._ratio))
         contact = found.pressure > 0
         counting = counting_error(contact, faces_between(contact, ~contact, True))
         return {"grid_error_friction": friction, "grid_error_area": float(np.maximum(area, counting))}  # NaN stays
 
 
 def _told(state: SteadyState, spacing: tuple[float, float]) -> tuple[float, float]:
-    """Friction force [N] and corrected area [m2] of a steady state; missing where it did not converge."""
+    """Friction force [N] and contact area [m2] of a steady state; missing where it did not converge."""
     if not state.converged:
         return math.nan, math.nan
     return state.power_force, areas(state.pressure > 0, spacing)[1]

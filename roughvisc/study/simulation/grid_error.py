@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import RoughviscError
-from roughvisc.mechanics.contact.neighbours import neighbours
+from roughvisc.mechanics.contact.neighbours import bounds_with_grid, neighbours
 from roughvisc.study.simulation.coarser import coarser, pressure_distance
 from roughvisc.study.simulation.grid_convergence import grid_uncertainty
 from roughvisc.topography.indenters import grown
@@ -41,7 +41,7 @@ _GIVEN = 1e-12
 def with_grid_error(
     dataset: xr.Dataset, height: xr.DataArray, press_again: Callable[[xr.DataArray, list[float]], xr.Dataset]
 ) -> xr.Dataset:
-    """A result with ``grid_error`` and ``grid_error_area`` at its kept times.
+    """A result with ``grid_error``, ``grid_error_area`` and bounds on the contact area at its kept times.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def with_grid_error(
     Notes
     -----
     ``grid_error`` is the larger one of the errors of the pressure (L1, over the largest force, so that the error of
-    the force is in it) and of the approach (over the largest), ``grid_error_area`` that of the corrected area. All
+    the force is in it) and of the approach (over the largest), ``grid_error_area`` that of the contact area. All
     runs have an error in time within the tolerance, so that these are no estimates much below it. Missing where
     there is no coarser solution; where there is one but no third grid, the safety factor is larger.
     """
@@ -68,7 +68,7 @@ def with_grid_error(
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)
         nothing = np.full(dataset.sizes["time"], math.nan)
-        return dataset.assign(grid_error=("time", nothing), grid_error_area=("time", nothing))
+        return _with_errors(dataset, nothing, nothing)
     third = None
     try:
         fewest = coarser(height, 4.0)
@@ -83,14 +83,20 @@ def with_grid_error(
     found = {
         "pressure": grid_uncertainty("pressure", *_differences(runs, _pressures), ratio),
         "approach": grid_uncertainty("approach", near_approach, far_approach, ratio),
-        "area": grid_uncertainty(
-            "contact_area_corrected", *_differences(runs, _histories("contact_area_corrected")), ratio
-        ),
+        "area": grid_uncertainty("contact_area", *_differences(runs, _histories("contact_area")), ratio),
     }
     from_peak, from_force, from_area = _from_peak(dataset, _peak(height), near_approach < _GIVEN)
     error = np.max([found["pressure"], found["approach"], from_edge, from_peak, from_force], axis=0)
     area = np.max([found["area"], from_counting, from_area], axis=0)
-    return dataset.assign(grid_error=("time", error), grid_error_area=("time", area))
+    return _with_errors(dataset, error, area)
+
+
+def _with_errors(dataset: xr.Dataset, error: Array, area: Array) -> xr.Dataset:
+    """A result with errors of the grid, and bounds on the contact area that hold them."""
+    solver = (dataset[f"contact_area_solver_{end}"].values for end in ("lower", "upper"))
+    lower, upper = bounds_with_grid(*solver, area * _largest(dataset, "contact_area"))
+    found = {"grid_error": error, "grid_error_area": area, "contact_area_lower": lower, "contact_area_upper": upper}
+    return dataset.assign({name: ("time", values) for name, values in found.items()})
 
 
 Runs = tuple[xr.Dataset, xr.Dataset, xr.Dataset | None]
@@ -137,12 +143,12 @@ def _from_peak(dataset: xr.Dataset, peak: float, given: Mask) -> tuple[Array, Ar
     """
     approach = np.abs(dataset["approach"].values)
     part = np.where(given & (approach > 0), 2 * peak / np.maximum(approach, peak or 1.0), 0.0)
-    follow = [part * dataset[name].values / _largest(dataset, name) for name in ("force", "contact_area_corrected")]
+    follow = [part * dataset[name].values / _largest(dataset, name) for name in ("force", "contact_area")]
     return np.where(given, 0.0, peak / _largest(dataset, "approach")), follow[0], follow[1]
 
 
 def _left_open(dataset: xr.Dataset, time: int) -> tuple[float, float]:
-    """Errors of pressure and corrected area, relative to the largest, that the edge of a contact may hide."""
+    """Errors of pressure and contact area, relative to the largest, that the edge of a contact may hide."""
     pressure = dataset["pressure"].values[time]
     contact = pressure > 0
     if not contact.any():
@@ -155,7 +161,7 @@ def _left_open(dataset: xr.Dataset, time: int) -> tuple[float, float]:
     hidden = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # all of it where no cell lies inside
     hidden += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
     force = float(dataset["force"][time]) / _largest(dataset, "force")
-    area = float(dataset["contact_area"][time]) / _largest(dataset, "contact_area_corrected")
+    area = float(dataset["contact_area_counted"][time]) / _largest(dataset, "contact_area")
     return hidden * force, counted * area
 
 

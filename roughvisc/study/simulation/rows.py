@@ -20,10 +20,10 @@ from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.friction_rows import friction_row
 from roughvisc.study.simulation.mirror import quarter, unfold
 from roughvisc.study.simulation.scene import Ground
-from roughvisc.study.simulation.stated import solver_in_doubt, stated
+from roughvisc.study.simulation.stated import stated, stated_area
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
-from roughvisc.variables import STATUS_MEANINGS, STEPPED, of_step
+from roughvisc.variables import RESULT_FORMAT, STATUS_MEANINGS, STEPPED, of_step
 from roughvisc.variables.slides import STEPPED_IN_SLIDES
 
 #: A row that states more than so many tolerances is none where every step is kept and the row is not asked for.
@@ -74,6 +74,7 @@ class Rows:
         shown, window = step.shown, self._ground.window
         contact = shown.contact.positive()
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
+        area = max(touching - _staircase(contact, step.scene), 0.0)
         arrays: dict[str, Array] = {}
         if window.whole:
             mean_gap = self._mean_of_gap(step, contact)
@@ -87,14 +88,15 @@ class Rows:
             "time": shown.time,
             "force": shown.force,
             "approach": shown.approach,
-            **stated(step, self.series_error, touching, solver_in_doubt(step, contact)),
+            **stated(step, self.series_error),
+            **stated_area(step, contact, touching, area),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
             "status": self._status(step, converged, contact),
             "wall_time": wall_time,
-            "contact_area": touching,
-            "contact_area_corrected": max(touching - _staircase(contact, step.scene), 0.0),
-            "contact_fraction": touching / self._area(),
+            "contact_area": area,
+            "contact_area_counted": touching,
+            "contact_fraction": area / self._area(),
             "mean_gap": mean_gap,
             **friction_row(step),
         }
@@ -131,6 +133,7 @@ class Rows:
             coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values},
             attrs={
                 "Conventions": "CF-1.11",
+                "result_format": RESULT_FORMAT,
                 **self._settings.told(),
                 "history": str(height.attrs.get("history", "")),
             },
@@ -259,7 +262,7 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     scene, state = step.scene, step.state
     if scene.time_step is not None or in_slide(step):  # the steps are as long as they are
         return True
-    found = stated(step, series_error, 0.0)
+    found = stated(step, series_error)
     most = _AT_MOST * scene.tolerance
     if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
         return False

@@ -100,7 +100,8 @@ def simulate(
         ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
     grid_error : bool
         Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
-        the grid makes: ``grid_error`` and ``grid_error_area`` at the kept times.
+        the grid makes: ``grid_error``, ``grid_error_area`` and the bounds ``contact_area_lower`` and
+        ``contact_area_upper`` at the kept times.
     thickness : float, optional
         Of a sheet of the material on a rigid base, in place of a half-space. With periodic boundaries and a Poisson
         ratio below a half, the approach holds the compression of the sheet itself. [m]

@@ -91,7 +91,7 @@ class Speeds:
         ground, force = self._ground, self._force
         pressure, displacement = self._turn.back(found.pressure), self._turn.back(found.displacement)
         contact = pressure > 0
-        area, corrected = areas(contact, ground.spacing)
+        counted, area = areas(contact, ground.spacing)
         gap = np.maximum(ground.gap + displacement - found.approach, 0.0)
         gap[contact] = 0.0
         whole = "full_contact" if contact.all() else "converged"
@@ -100,7 +100,7 @@ class Speeds:
             "nominal_pressure": force / ground.nominal_area,
             "approach": found.approach,
             "contact_area": area,
-            "contact_area_corrected": corrected,
+            "contact_area_counted": counted,
             "contact_fraction": area / ground.nominal_area,
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
@@ -124,7 +124,7 @@ class Speeds:
         area = areas(without.pressure > 0, self._ground.spacing)[1]
         return {
             "last_octave_friction": 1 - without.power_force / found.power_force,
-            "last_octave_area": 1 - area / row["contact_area_corrected"],
+            "last_octave_area": 1 - area / row["contact_area"],
         }
 
     def dataset(self) -> xr.Dataset:

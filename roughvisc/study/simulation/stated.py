@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.contact.neighbours import area_bounds
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.stepping.scene import Step
 
@@ -46,9 +47,24 @@ def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
     return area * sum(inside for inside, _ in found), area * sum(outside for _, outside in found)
 
 
-def stated(
-    step: Step, series_error: float, area: float, in_doubt: tuple[float, float] = (0.0, 0.0)
-) -> dict[str, float]:
+def stated_area(step: Step, contact: NDArray[np.bool_], counted: float, area: float) -> dict[str, float]:
+    """Bounds on the contact area of a step, by the cells that time steps and contact solver leave in doubt. [m2]
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    contact : ndarray of bool
+        Cells in contact.
+    counted, area : float
+        Contact area, counted and corrected for the grid. [m2]
+    """
+    in_doubt, unknown = solver_in_doubt(step, contact), step.uncertainty
+    lower, upper = area_bounds(counted, area, unknown.inside + in_doubt[0], unknown.outside + in_doubt[1])
+    return {"contact_area_solver_lower": float(lower), "contact_area_solver_upper": float(upper)}
+
+
+def stated(step: Step, series_error: float) -> dict[str, float]:
     """Work and energies of a step, and what is stated of its accuracy.
 
     Parameters
@@ -57,10 +73,6 @@ def stated(
         An accepted step.
     series_error : float
         Relative error of the series that stands for the material.
-    area : float
-        Counted contact area. [m2]
-    in_doubt : pair of float
-        Area in contact and out of it that the contact solver leaves in doubt. [m2]
 
     Notes
     -----
@@ -101,6 +113,4 @@ def stated(
         "approach_error": approach,
         "work_error": unknown.work + carried * abs(step.work),
         "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
-        "contact_area_lower": max(area - unknown.inside - in_doubt[0], 0.0),
-        "contact_area_upper": area + unknown.outside + in_doubt[1],
     }

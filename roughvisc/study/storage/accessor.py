@@ -14,6 +14,8 @@ import xarray as xr
 
 #: Before the name of a figure.
 _PLOT = "plot_"
+#: Module that gives a result of a former version the names of today.
+_FORMATS = "roughvisc.study.storage.formats"
 #: beginning of a method's name -> module whose public names follow
 _ROOMS = {"": "roughvisc.views.observables", _PLOT: "roughvisc.views.plot"}
 
@@ -25,7 +27,8 @@ class ResultAccessor:
     Parameters
     ----------
     dataset : xarray.Dataset
-        A result, or several as :func:`roughvisc.open_results` opens them.
+        A result, or several as :func:`roughvisc.open_results` opens them; one of a former version, opened by xarray
+        alone, is taken under the names of today.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -39,7 +42,7 @@ class ResultAccessor:
         if name.removeprefix(start) not in room.__all__:
             raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(_methods())}")
         function = getattr(room, name.removeprefix(start))
-        method = partial(function, self._dataset)
+        method = partial(function, import_module(_FORMATS).to_current(self._dataset))
         method.__doc__ = function.__doc__
         return method
 

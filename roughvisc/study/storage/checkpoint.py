@@ -28,6 +28,7 @@ from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
 from roughvisc.study.storage.store import whole_file
+from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
 
@@ -102,7 +103,7 @@ def save_checkpoint(path: Path, reached: Reached, key: str) -> None:
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
     stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
-    plain = {"key": key, "revision": NUMERICS_REVISION, "reached": stated}
+    plain = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT, "reached": stated}
     with whole_file(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
@@ -112,15 +113,15 @@ def load_checkpoint(path: Path, key: str) -> Reached | None:
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
-        found = plain["key"], plain["revision"]
-        if found == (key, NUMERICS_REVISION):
+        found = plain["key"], plain["revision"], plain.get("result_format", 1)
+        if found == (key, NUMERICS_REVISION, RESULT_FORMAT):
             reached = Reached(**{name: _together(value, arrays) for name, value in plain["reached"].items()})
     except FileNotFoundError:
         return None
     except (Damaged, OSError, KeyError, TypeError, ValueError) as error:
         log.warning("%s: is damaged and not used: %s", path, error)
         return None
-    if found != (key, NUMERICS_REVISION):
+    if found != (key, NUMERICS_REVISION, RESULT_FORMAT):
         log.warning("%s: belongs to another case or revision and is not used", path)
         return None
     return reached

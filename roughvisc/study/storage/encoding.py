@@ -28,6 +28,8 @@ _MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area", "
     "dissipated_energy_error",
     "contact_area_lower",
     "contact_area_upper",
+    "contact_area_solver_lower",
+    "contact_area_solver_upper",
     "friction_coefficient",
     "friction_force_error",
     "slope_friction_force",

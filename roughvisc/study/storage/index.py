@@ -23,15 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.seal import seal, unsealed
 from roughvisc.study.storage.store import NETCDF, require_whole, result_files, whole_file
+from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
 
 log = logging.getLogger("roughvisc")
 
 INDEX, LATEST = ".index.npz", ".latest.json"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 3
+_LAYOUT = 4
 #: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
@@ -46,6 +48,8 @@ _HISTORIES = tuple(
         if variable.dims in ((rows,), ("step",)) and name != "step"
     )
 )
+#: The same, and what they are called in results of former versions.
+_STORED = tuple(dict.fromkeys((*_HISTORIES, *FORMER_NAMES)))
 
 
 @dataclass(frozen=True)
@@ -121,19 +125,23 @@ def read_entry(path: Path) -> Entry:
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-            histories = {name: file[name][:] for name in _HISTORIES if name in file.variables}
+            stored = {name: file[name][:] for name in _STORED if name in file.variables}
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
         raise InputError(
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
+    try:
+        histories = {name: v for name, v in current_histories(stored, attributes).items() if name in _HISTORIES}
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     along = rows_of(histories)
     absent = [name for name in (along, "force", "status", RESIDUALS[along]) if name not in histories]
     if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
-    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
+    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)} | {"result_format": RESULT_FORMAT}
     return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float))
 
 

@@ -22,7 +22,17 @@ from roughvisc.variables.rows import VOCABULARIES
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
 #: Attributes that all results of a sweep share.
-_SHARED = ("Conventions", "source", "references", "comment", "boundary", "tolerance", "method", "direction")
+_SHARED = (
+    "Conventions",
+    "result_format",
+    "source",
+    "references",
+    "comment",
+    "boundary",
+    "tolerance",
+    "method",
+    "direction",
+)
 
 
 @overload

@@ -23,9 +23,11 @@ import numpy as np
 from roughvisc.errors import FolderError, InputError
 from roughvisc.labels import annotate
 from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
+from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.study.storage.seal import flaw, seal
 from roughvisc.units import shown
+from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
+#: What every result says of itself, whatever else it says.
+_FIRST_ATTRIBUTES = {"Conventions": "CF-1.11", "result_format": RESULT_FORMAT}
 #: Free space below which a write that failed is put down to a full disk. [bytes]
 _NEARLY_FULL = 1 << 20
 
@@ -141,12 +145,12 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
-    dataset = _in_characters(_with_labels_named(annotate(dataset)))
+    dataset = _in_characters(_with_labels_named(annotate(to_current(dataset))))
     with whole_file(path) as temporary:
         try:
             with _new_file(temporary) as file:
                 with NETCDF:
-                    file.setncatts({"Conventions": "CF-1.11"} | plain_attributes(dataset.attrs))
+                    file.setncatts(_FIRST_ATTRIBUTES | plain_attributes(dataset.attrs))
                     for dimension, size in dataset.sizes.items():
                         file.createDimension(str(dimension), size)
                 # all are declared before any is written: each change of mode would write the file's metadata anew
@@ -297,6 +301,10 @@ def open_result(path: str | Path) -> xr.Dataset:
         raise InputError(
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
+    try:
+        dataset = to_current(dataset)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
     found = _foreign(dataset)
     if found:
         dataset.close()

@@ -33,9 +33,11 @@ _TOLD: dict[Rows, tuple[str, ...]] = {
         "force",
         "nominal_pressure",
         "approach",
-        "contact_area_corrected",
+        "contact_area",
         "contact_area_lower",
         "contact_area_upper",
+        "contact_area_solver_lower",
+        "contact_area_solver_upper",
         "contact_fraction",
         "mean_gap",
         "sliding_distance",
@@ -54,7 +56,7 @@ _TOLD: dict[Rows, tuple[str, ...]] = {
         "force",
         "nominal_pressure",
         "approach",
-        "contact_area_corrected",
+        "contact_area",
         "contact_fraction",
         "mean_gap",
         "grid_error_friction",
@@ -82,9 +84,9 @@ def to_table(out: str | Path) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Indexed by the number of the case. Columns: title; what was varied, under its dotted key, in the unit that the
-        study states; at the last kept time force, approach, contact area corrected for the grid with its bounds,
-        fraction, mean gap, friction where the profile slides, and what was observed; of a curve of friction the same
-        where friction is largest, with that speed; the largest stated error and its parts; status, message and file.
+        study states; at the last kept time force, approach, contact area with its bounds, contact fraction, mean gap,
+        friction where the profile slides, and what was observed; of a curve of friction the same where friction is
+        largest, with that speed; the largest stated error and its parts; status, message and file.
         Units stand in brackets.
 
     Raises

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]
 
 #: What is compared, in the order of the results.
-QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_corrected", "mean_gap")
+QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
 #: A cell whose centre has no finite pressure is averaged over so many points each way.
 _POINTS = 32
 
@@ -72,7 +72,7 @@ class ClosedForm:
     def errors(self, dataset: xr.Dataset) -> dict[str, float]:
         """Errors of a result at these times: the worst over the times, over the largest exact value."""
         area = np.pi * self.radius**2
-        wanted = {"approach": self.approach, "contact_area": area, "contact_area_corrected": area}
+        wanted = {"approach": self.approach, "contact_area": area, "contact_area_counted": area}
         found = {name: relative(dataset[name].values - exact, exact) for name, exact in wanted.items()}
         offsets = (dataset[axis].values - at for axis, at in zip(("x", "y"), self.centre, strict=True))
         x, y = np.meshgrid(*offsets, indexing="ij")

@@ -11,6 +11,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.store import plain_attributes, whole_file
 from roughvisc.units import quantity
 
@@ -49,7 +50,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
     """
     try:
         with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
-            dataset = file.load()
+            dataset = to_current(file.load())
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be opened: {error}: expected a trade of roughvisc (.nc)") from error
     if "run_time" not in dataset or "quantity" not in dataset.dims:

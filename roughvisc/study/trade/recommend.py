@@ -12,16 +12,15 @@ from roughvisc.errors import InputError
 from roughvisc.study.trade.exact import QUANTITIES
 from roughvisc.study.trade.ladder import step_text
 from roughvisc.units import quantity as quantity_in
-from roughvisc.variables import VARIABLES
+from roughvisc.variables import VARIABLES, current_name
 
 #: The accuracies that are advised on unasked.
 TARGETS = (1e-2, 1e-3)
 #: Wall times within this factor are taken to be the same.
 _ALIKE = 1.1
-#: What quantities are called in words; the area meant where none is named is the corrected one.
+#: What quantities are called in words.
 WORDS = {
-    name: VARIABLES[name].short
-    for name in ("contact_area_corrected", "pressure", "approach", "contact_area", "mean_gap")
+    name: VARIABLES[name].short for name in ("contact_area", "pressure", "approach", "contact_area_counted", "mean_gap")
 }
 
 
@@ -87,7 +86,8 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
 
 
 def known_quantity(quantity: str, name: str = "quantity") -> str:
-    """The quantity, if there is one of that name."""
+    """The quantity, if there is one of that name, or was before."""
+    quantity = current_name(quantity)
     if quantity not in QUANTITIES:
         raise InputError(f"{name}: found {quantity!r}: expected one of {', '.join(QUANTITIES)}")
     return quantity
@@ -95,7 +95,7 @@ def known_quantity(quantity: str, name: str = "quantity") -> str:
 
 def recommendation(dataset: xr.Dataset) -> str:
     """Advice in words, a line for each quantity that something is known of."""
-    advised = [name for name in WORDS if name != "contact_area"]
+    advised = [name for name in WORDS if name != "contact_area_counted"]
     known = [name for name in advised if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     lines = [_advice(dataset, name) for name in known]
     return "\n".join(lines + ([_of_the_scan(dataset)] if dataset.attrs.get("grid_is_data") else []))
@@ -103,7 +103,7 @@ def recommendation(dataset: xr.Dataset) -> str:
 
 def _of_the_scan(dataset: xr.Dataset) -> str:
     """What the spacing of the points makes of the contact area, which no setting mends."""
-    name = "contact_area_corrected"
+    name = "contact_area"
     found = dict(zip(dataset["coarsening"].values, dataset["coarsening_error"].sel(quantity=name).values, strict=True))
     parts = [f"{percent(found[k])} on cells {k:g} times as long" for k in sorted(found) if k > 1 and found[k] > 0]
     unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=name))

@@ -23,6 +23,7 @@ from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
 from roughvisc.study.trade.finest import Finest
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
+from roughvisc.variables import RESULT_FORMAT
 
 #: Kept times where a study keeps all accepted steps, which differ from setting to setting.
 _INSTANTS = 9
@@ -180,6 +181,7 @@ def _labelled(
     dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(QUANTITIES)}))
     dataset.attrs = {
         "Conventions": "CF-1.11",
+        "result_format": RESULT_FORMAT,
         "title": case.title,
         "source": f"roughvisc {metadata.version('roughvisc')}",
         "comment": "One case computed under many settings, each timed and held against 'reference'; attribute 'case' "

@@ -66,7 +66,7 @@ def _distance(dataset: xr.Dataset) -> Array:
 
 
 def _radius(dataset: xr.Dataset) -> Array:
-    return np.sqrt(dataset["contact_area_corrected"].values / np.pi)
+    return np.sqrt(dataset["contact_area"].values / np.pi)
 
 
 def _pressure_error(dataset: xr.Dataset, exact: Callable[[Array, float], Array], beyond: float = 0.0) -> float:
@@ -168,7 +168,7 @@ def crossed_waves(cells: int) -> Rows:
         ds = _press(surface, _UNIT, Program().load(ratio * full, over=0), boundary="periodic")
         round_area = exact if limit == "low" else 1 - exact  # two in each period
         radius = np.sqrt(round_area / 2 / np.pi)
-        error = abs(float(ds.contact_area_corrected[0]) - exact) / round_area
+        error = abs(float(ds.contact_area[0]) - exact) / round_area
         shape = (2 * np.pi * radius) ** 2 / 8
         what = "contact area" if limit == "low" else "area of the gaps"
         yield f"{what} at {ratio} p*", error, shape + 2 * _radius_error(1 / cells, radius) + _TOLERANCE

@@ -75,9 +75,8 @@ def _history_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
         ("Approach at the end", readable(float(last["approach"]), "m")),
         (
             "Contact area at the end",
-            f"{readable(float(last['contact_area_corrected']), 'm^2')} corrected for the grid, "
-            f"{readable(float(last['contact_area']), 'm^2')} counted"
-            f" ({100 * float(last['contact_fraction']):.3g} % of the grid)",
+            f"{readable(float(last['contact_area']), 'm^2')}, {100 * float(last['contact_fraction']):.3g} % of the "
+            f"grid; {readable(float(last['contact_area_counted']), 'm^2')} counted",
         ),
         *_slid(last),
         *_leak_rate(dataset),

@@ -13,7 +13,7 @@ from roughvisc.study.trade.recommend import duration, front
 from roughvisc.views.console.tables import size
 
 #: Errors that are shown, and their headings.
-_ERRORS = {"pressure": "pressure", "approach": "approach", "contact_area_corrected": "area", "mean_gap": "gap"}
+_ERRORS = {"pressure": "pressure", "approach": "approach", "contact_area": "area", "mean_gap": "gap"}
 
 
 def trade_table(dataset: xr.Dataset) -> Group:
@@ -29,7 +29,7 @@ def trade_table(dataset: xr.Dataset) -> Group:
     table.add_column("setting", min_width=18)
     for heading in ("time", "transf.", "memory", *_ERRORS.values()):
         table.add_column(heading, justify="right", no_wrap=True)
-    best = front(dataset, "contact_area_corrected")
+    best = front(dataset, "contact_area")
     for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
         if not np.isfinite(row["run_time"]):

@@ -48,9 +48,9 @@ from roughvisc.views.observables import contact, history
 
 #: A map's side along y over that along x from which the map takes the whole height.
 _TALL = 1.2
-_HISTORIES = ("force", "approach", "contact_area_corrected")
+_HISTORIES = ("force", "approach", "contact_area")
 #: The same of a program that slides.
-_OF_SLIDES = ("friction_coefficient", "approach", "contact_area_corrected")
+_OF_SLIDES = ("friction_coefficient", "approach", "contact_area")
 
 
 def _writer(path: Path, rate: float):

@@ -29,7 +29,7 @@ from roughvisc.views.observables import history
 from roughvisc.views.observables.area_theories import asperity_fraction, persson_fraction
 from roughvisc.views.observables.derived import material_of
 
-_AREA = "contact_area_corrected"
+_AREA = "contact_area"
 #: What the lines of the theories are, and what they assume.
 _THEORIES = (
     "low loads: $A = \\sqrt{2\\pi}\\,F / (E^*\\,h^\\prime)$, little contact (Bush, Gibson, Thomas)\n"

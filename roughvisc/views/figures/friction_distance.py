@@ -12,7 +12,7 @@ from roughvisc.views.figures.axes import BLUE, GREEN, VERMILION, letter_panels, 
 from roughvisc.views.figures.histories import failed_frames, leave_room
 from roughvisc.views.observables import history
 
-_PANELS = (("friction_coefficient", BLUE), ("contact_area_corrected", GREEN))
+_PANELS = (("friction_coefficient", BLUE), ("contact_area", GREEN))
 
 
 @styled

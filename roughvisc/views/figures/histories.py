@@ -33,14 +33,14 @@ from roughvisc.views.observables import history as over_steps
 _PANELS = (
     ("force", BLUE),
     ("approach", VERMILION),
-    ("contact_area_corrected", GREEN),
+    ("contact_area", GREEN),
     ("mean_gap", PURPLE),
     ("work", ORANGE),
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
-    "contact_area_corrected": (
-        ("contact_area", "counted", "k", (0, (4, 2))),
+    "contact_area": (
+        ("contact_area_counted", "counted", "k", (0, (4, 2))),
         ("persson_contact_area", "Persson", "0.5", (0, (1, 1.5))),
     ),
     "work": (
@@ -49,7 +49,7 @@ _BESIDE = {
     ),
 }
 #: The line that they stand beside.
-_ITSELF = {"contact_area_corrected": "corrected for the grid", "work": "in all"}
+_ITSELF = {"contact_area": "corrected for the grid", "work": "in all"}
 #: What is stated of accuracy first, then its parts, and what comes on top.
 _ERRORS = (
     ("stated_error", "stated", "k", 1.6),
@@ -105,9 +105,9 @@ def _draw_history(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, steps: xr.Datas
 
 def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     """Contact fraction on the right of the panel of the area, where the two are proportional."""
-    if "contact_fraction" not in steps or "contact_area" not in steps:
+    if "contact_fraction" not in steps:
         return
-    area = unit_for(steps["contact_area_corrected"], "m^2")(steps["contact_area"])  # what the fraction is counted by
+    area = unit_for(steps["contact_area"], "m^2")(steps["contact_area"])
     touching = area > 0
     if not touching.any():
         return
@@ -202,7 +202,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     axis = TimeAxis.of(steps["time"])
     for ax, (name, colour) in zip(axes, panels, strict=False):
         _draw_history(ax, axis, dataset, steps, name, colour)
-        if name == "contact_area_corrected":
+        if name == "contact_area":
             _fraction_axis(ax, steps)
     if costs:
         _draw_cost(axes[-2], axis, dataset)

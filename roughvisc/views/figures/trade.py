@@ -16,7 +16,7 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.trade.ladder import short, step_text
 from roughvisc.study.trade.recommend import WORDS, front, uncertainty
-from roughvisc.variables import VARIABLES
+from roughvisc.variables import VARIABLES, current_name
 from roughvisc.views.figures.axes import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, letter_panels, new_figure, styled
 
 #: family of settings -> marker and colour, told apart by either
@@ -47,7 +47,7 @@ _PLACES = (
 
 
 @styled
-def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area_corrected", "pressure")) -> Figure:
+def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area", "pressure")) -> Figure:
     """Wall time against error of every setting, with the Pareto front: what no other setting beats in both.
 
     Errors that the reference cannot tell from zero lie in the grey band below; a setting whose error is exactly zero
@@ -58,7 +58,7 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area_correc
     dataset : xarray.Dataset
         Of :func:`roughvisc.trade`.
     quantities : sequence of str
-        One panel for each: ``pressure``, ``approach``, ``contact_area``, ``contact_area_corrected``, ``mean_gap``.
+        One panel for each: ``pressure``, ``approach``, ``contact_area``, ``contact_area_counted``, ``mean_gap``.
 
     Returns
     -------
@@ -71,6 +71,7 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area_correc
     """
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
+    quantities = [current_name(name) for name in quantities]
     for name in quantities:
         if name not in WORDS:
             raise InputError(f"quantities holds {name!r}: expected some of {', '.join(WORDS)}")

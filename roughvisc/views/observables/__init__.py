@@ -71,7 +71,7 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
         found += [clusters(dataset), percolation(dataset)]
     if "gap" in dataset:
         found.append(gap_statistics(dataset))
-    if "contact_area" in dataset or "contact_area_corrected" in dataset:
+    if "contact_area" in dataset:
         found.append(area_growth(dataset))
     if "force" in dataset and "approach" in dataset:
         secant = secant_stiffness(dataset)

@@ -54,10 +54,10 @@ def leakage(
     Returns
     -------
     xarray.Dataset
-        Over time ``leak_rate``, ``leak_rate_lower``, ``leak_rate_upper`` [m3/s]; ``leak_status``, one of its
-        ``flag_values``; ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which hold for any fluid; with `flow`
-        also ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` say what it was asked
-        with.
+        Over time ``leak_rate``, ``leak_rate_solver_lower`` and ``leak_rate_solver_upper`` [m3/s]; ``leak_status``, one
+        of its ``flag_values``; ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which hold for any fluid; with
+        `flow` also ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` say what it was
+        asked with.
 
     Raises
     ------
@@ -113,8 +113,8 @@ def leakage(
     transmissivity = conductance * (sizes[along] / sizes[across])
     variables = {
         "leak_rate": conductance * drop,
-        "leak_rate_lower": lower * drop,
-        "leak_rate_upper": upper * drop,
+        "leak_rate_solver_lower": lower * drop,
+        "leak_rate_solver_upper": upper * drop,
         "leak_status": status.astype("int8"),
         "transmissivity": transmissivity,
         "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
@@ -125,7 +125,7 @@ def leakage(
     asked: dict[str, Any] = {"along": along, "sides": "periodic" if wrap else "closed"}
     described["transmissivity"].attrs |= asked
     described["hydraulic_aperture"].attrs |= asked
-    for name in ("leak_rate", "leak_rate_lower", "leak_rate_upper"):
+    for name in ("leak_rate", "leak_rate_solver_lower", "leak_rate_solver_upper"):
         described[name].attrs |= asked | fluid
     return described
 

@@ -70,7 +70,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        A result; the area corrected for the grid is preferred where it is there.
+        A result.
     since : float
         The instant from which time is counted, such as the end of a loading ramp. [s]
 
@@ -84,8 +84,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     InputError
         If the result holds no contact area.
     """
-    name = "contact_area_corrected" if "contact_area_corrected" in dataset else "contact_area"
-    need(dataset, name)
+    need(dataset, "contact_area")
 
     def measure(area, time):
         grown = (time > since) & (area > 0)
@@ -93,7 +92,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
         exponent[grown] = _slope(np.log(area[grown]), np.log(time[grown] - since))
         return exponent
 
-    return describe(xr.Dataset({"area_growth_exponent": along_time(measure, dataset[name], dataset["time"])}))
+    return describe(xr.Dataset({"area_growth_exponent": along_time(measure, dataset["contact_area"], dataset["time"])}))
 
 
 def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:

@@ -37,7 +37,7 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "force": _largest(dataset, "force", "N"),
         "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
         "approach": _last(last, "approach", "m"),
-        "area": _last(last, "contact_area_corrected", "m^2"),
+        "area": _last(last, "contact_area", "m^2"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
         "stated_error": _worst(dataset, *_STATED[over]),
         "time_error": _worst(dataset, "time_error"),

@@ -236,7 +236,7 @@ def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
     """Histories of every step as lines in a unit of their own, and where each frame lies on them."""
     charts, steps = [], history(dataset)
     places = np.searchsorted(steps["time"].values, dataset["time"].values[chosen], side="right") - 1
-    for name in ("force", "approach", "contact_area_corrected"):
+    for name in ("force", "approach", "contact_area"):
         if name in steps:
             label = VARIABLES[name].label
             values = steps[name].values.astype(float)
@@ -335,8 +335,8 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
             "force",
             "nominal_pressure",
             "approach",
-            "contact_area_corrected",
             "contact_area",
+            "contact_area_counted",
             "mean_gap",
             "work",
             "sliding_distance",

@@ -37,7 +37,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree the times may differ.
     quantity : str, optional
-        A history of every case, such as ``"approach"``; by default the contact area, corrected where all have it, or
+        A history of every case, such as ``"approach"``; by default the contact area, or
         the contact fraction where the surfaces differ in size.
     by : str, optional
         Dotted key of the parameter that colours the lines; by default the one with the most numbers.
@@ -52,8 +52,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
         If the results are no sweep, or a name is unknown.
     """
     cases = cases_of(results)
-    quantity = quantity or cases.area
-    cases.need(quantity)
+    quantity = cases.history_named(quantity)
     ordered = sorted(cases.parameters, key=lambda one: (not one.numeric, -len(one.levels)))
     first = cases.parameter(by) if by else ordered[0] if ordered else _numbered(len(cases.members))
     facets = _facets([one for one in ordered if one is not first], len(cases.members))

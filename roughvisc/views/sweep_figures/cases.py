@@ -13,9 +13,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.parameters import identifier
-from roughvisc.variables import VARIABLES
+from roughvisc.variables import VARIABLES, current_name
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_names import names_of
@@ -157,18 +158,25 @@ class Cases:
 
     @property
     def area(self) -> str:
-        """Name of the contact area that every case has: the fraction where sizes differ, else corrected or counted."""
+        """Name of the contact area to compare: the fraction where sizes differ and all cases have it."""
         if not self.alike_in_size and all("contact_fraction" in member for member in self.members):
             return "contact_fraction"
-        corrected = all("contact_area_corrected" in member for member in self.members)
-        return "contact_area_corrected" if corrected else "contact_area"
+        return "contact_area"
 
-    def need(self, quantity: str) -> None:
-        """Refuse a quantity that is no history of every case."""
+    def history_named(self, quantity: str | None) -> str:
+        """Name of a history that every case has; by default that of the contact area.
+
+        Raises
+        ------
+        InputError
+            If a case has none of that name.
+        """
+        quantity = self.area if quantity is None else current_name(quantity)
         for member in self.members:
             if quantity not in member or member[quantity].dims != ("time",):
                 known = [str(name) for name in member.data_vars if member[name].dims == ("time",)]
                 raise InputError(f"quantity is {quantity!r}: expected a history of every case: {', '.join(known)}")
+        return quantity
 
 
 def cases_of(results: Any) -> Cases:
@@ -201,6 +209,8 @@ def cases_of(results: Any) -> Cases:
         raise InputError(
             "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
         )
+    for member in members:
+        expect_current_names(member)
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
     found = [

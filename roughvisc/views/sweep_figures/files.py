@@ -41,7 +41,7 @@ def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
 
 
 #: What files are called after other than the quantity.
-_FILES = {"contact_area_corrected": "area", "contact_area": "area", "contact_fraction": "area"}
+_FILES = {"contact_area": "area", "contact_fraction": "area"}
 
 
 def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
@@ -77,7 +77,7 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
 
 
 def _word(name: str) -> str:
-    return name.removesuffix("_corrected").replace("_", " ").capitalize()
+    return name.replace("_", " ").capitalize()
 
 
 def _holds(cases: Cases, name: str) -> bool:

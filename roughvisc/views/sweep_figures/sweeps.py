@@ -59,8 +59,8 @@ def sweep(
     results : xarray.Dataset or xarray.DataTree
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
     quantity : str, optional
-        A history of every case, such as ``"approach"`` or ``"wall_time"``; by default the contact area, corrected where
-        all have it.
+        A history of every case, such as ``"approach"`` or ``"wall_time"``; by default the contact area, or the
+        contact fraction where the surfaces differ in size.
     times : float or sequence of float, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
         by default up to four, a line each; else by default the last, or where the cases differ most if they differ
@@ -84,8 +84,7 @@ def sweep(
     if kind not in ("auto", "lines", "map"):
         raise InputError(f"kind is {kind!r}: expected 'auto', 'lines' or 'map'")
     cases = cases_of(results)
-    quantity = quantity or cases.area
-    cases.need(quantity)
+    quantity = cases.history_named(quantity)
     across = _across(cases, along)
     as_map = kind == "map" or (kind == "auto" and _suits_map(cases, along))
     if as_map and len(across) < 2:

@@ -23,7 +23,7 @@ def judged(scan, fine, pressure):
     true = abs(found / exact - 1)
     return (
         (found.grid_error_friction.values, true.friction_coefficient.values),
-        (found.grid_error_area.values, true.contact_area_corrected.values),
+        (found.grid_error_area.values, true.contact_area.values),
     )
 
 

@@ -58,7 +58,7 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     force = abs(float(ds.force[0]) / (np.pi / 2 * slope) - 1)
     approach = abs(float(ds.approach[0]) / exact.approach - 1)
     assert float(ds.grid_error[0]) > max(force, approach)
-    assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area_corrected[0]) / np.pi - 1)
+    assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area[0]) / np.pi - 1)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,8 @@ def pressed_by_hand(approach=(1.0, 2.0)):
     pressure = np.zeros((6, 5))
     pressure[1:4, 1:3] = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
     histories = {"approach": list(approach), "force": [21.0, 42.0]}
-    histories |= {"contact_area": [6.0, 5.5], "contact_area_corrected": [5.0, 4.0]}
+    histories |= {"contact_area": [5.0, 4.0], "contact_area_counted": [6.0, 5.5]}
+    histories |= {"contact_area_solver_lower": [4.5, 3.5], "contact_area_solver_upper": [5.5, 4.0]}
     return xr.Dataset(
         {"height": (("x", "y"), np.zeros((6, 5))), "pressure": (("time", "x", "y"), np.stack([pressure, 2 * pressure]))}
         | {name: ("time", values) for name, values in histories.items()},

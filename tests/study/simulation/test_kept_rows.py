@@ -44,7 +44,7 @@ def stood(**changes):
 
 
 def test_stated_errors__add_up_those_of_time_solver_and_series():
-    found = stated(stood(), 0.03, 2.0)
+    found = stated(stood(), 0.03)
     solved = 0.01 + 0.02 * 0.1  # now, and what of before is left
     assert found["pressure_error"] == pytest.approx((0.3 + solved * 4.0) / 8.0 + 0.03)
     assert found["force_error"] == 0, "given"
@@ -52,8 +52,6 @@ def test_stated_errors__add_up_those_of_time_solver_and_series():
     assert found["stated_error"] == pytest.approx(max(found["pressure_error"], found["approach_error"] / 0.5))
     assert found["work_error"] == pytest.approx(0.13 + (0.5 * solved + 0.03) * 5.0)
     assert found["dissipated_energy_error"] == pytest.approx(0.17 + (0.5 * solved + 0.03) * 0.25)
-    assert (found["contact_area_lower"], found["contact_area_upper"]) == pytest.approx((1.4, 2.9))
-    assert stated(stood(), 0.03, 0.5)["contact_area_lower"] == 0
     assert (found["work"], found["stored_energy"], found["dissipated_energy"]) == (-5.0, 1.5, -0.25)
     assert (found["time_error"], found["residual"], found["residual_bound"]) == (0.02, 0.01, 0.3)
 
@@ -64,7 +62,7 @@ def test_stated_errors__add_up_those_of_time_solver_and_series():
      ("approach", False, True, True)],
 )  # fmt: skip
 def test_stated_error__of_what_the_program_gives_is_none(control, given, force, approach):
-    found = stated(stood(control=control, given=given), 0.03, 2.0)
+    found = stated(stood(control=control, given=given), 0.03)
     solved = 0.01 + 0.02 * 0.1
     assert found["force_error"] == pytest.approx((0.07 + solved * 4.0 + 0.03 * 8.0) * force)
     assert found["approach_error"] == pytest.approx((0.011 + 0.045 * 0.2 + 0.03 * 0.5 + 0.005 * 0.1 * 0.5) * approach)
@@ -78,7 +76,7 @@ def test_stated_error__is_the_largest_relative_one(worst, expected):
     exact = {"residual": 0.0, "bound": 0.0, "given": False, "uncertainty": unknown}
     scene = SimpleNamespace(remembers=False, tolerance=0.1)
     least = 0.015 * 0.1 * 4.0 / 8.0  # stated of an elastic pressure in any case
-    found = stated(stood(**exact, scene=scene), 0.0, 0.0)["stated_error"]
+    found = stated(stood(**exact, scene=scene), 0.0)["stated_error"]
     assert found == pytest.approx(expected + least * (worst != "approach"))
 
 
@@ -87,11 +85,11 @@ def test_stated_errors__of_surfaces_that_never_touched_are_those_of_the_solver()
     nothing = SimpleNamespace(force=0.0, approach=0.0)
     unknown = SimpleNamespace(**dict.fromkeys(("pressure", "force", "approach", "work", "dissipated"), 0.0))
     unknown.inside = unknown.outside = 0.0
-    found = stated(stood(state=rest, shown=nothing, uncertainty=unknown), 0.03, 0.0)
+    found = stated(stood(state=rest, shown=nothing, uncertainty=unknown), 0.03)
     assert found["pressure_error"] == found["stated_error"] == 0.01
     assert found["force_error"] == found["approach_error"] == 0
     # without a past there is none whose errors are left
-    found = stated(stood(scene=SimpleNamespace(remembers=False, tolerance=0.1)), 0.0, 0.0)
+    found = stated(stood(scene=SimpleNamespace(remembers=False, tolerance=0.1)), 0.0)
     assert found["pressure_error"] == pytest.approx((0.3 + 0.01 * 4.0) / 8.0)
 
 
@@ -215,9 +213,10 @@ def test_row__is_counted_and_shown_over_the_whole_surface(case):
         assert ds.displacement[i].values == pytest.approx(surface(kept, displacement), rel=1e-9)
         assert ds.gap[i].values == pytest.approx(surface(kept, gap), rel=1e-9, abs=1e-9, nan_ok=True)
         touching = images * np.count_nonzero(pressure)
-        assert ds.contact_area[i] == pytest.approx(touching * cell)
-        assert ds.contact_fraction[i] == pytest.approx(touching / size)
-        assert ds.contact_area_upper[i] == ds.contact_area[i] > ds.contact_area_corrected[i] >= 0
+        assert ds.contact_area_counted[i] == pytest.approx(touching * cell)
+        assert ds.contact_fraction[i] == pytest.approx(float(ds.contact_area[i]) / (size * cell))
+        assert ds.contact_area_solver_upper[i] == ds.contact_area[i] < ds.contact_area_counted[i]
+        assert ds.contact_area_solver_lower[i] == ds.contact_area[i] >= 0
         if kept.ground.window.whole:
             assert ds.mean_gap[i] == pytest.approx(np.nanmean(gap))
         else:  # what presses into the contact below the solver's tolerance is not cut there: this level is no solution
@@ -252,7 +251,10 @@ def test_row__of_a_grid_that_has_grown_is_counted_over_the_larger_one(mirror):
         assert np.array_equal(ds.pressure[row].values, surface(kept, pressure))
         assert ds.displacement[row].values == pytest.approx(surface(kept, displacement), rel=1e-9)
         assert ds.gap[row].values == pytest.approx(surface(kept, gap), rel=1e-9, abs=1e-9)
-        assert ds.contact_fraction[row] == pytest.approx(images * np.count_nonzero(pressure) / size)
+        count = images * np.count_nonzero(pressure)
+        fraction = count / size * ds.contact_area[row] / ds.contact_area_counted[row]
+        assert ds.contact_fraction[row] == pytest.approx(float(fraction))
+        assert ds.contact_area_counted[row] == pytest.approx(count * float(np.prod(kept.ground.spacing)))
         opening = kept.ground.gap + displacement - level
         assert ds.mean_gap[row] == pytest.approx(opening.mean() if row == 0 else gap.mean(), rel=1e-9)
 
@@ -291,7 +293,7 @@ def test_corrected_area__of_one_cell_is_less_by_its_four_faces():
     )
     kept.rows.add(step, True, 0.0)
     ds = kept.rows.dataset()
-    assert ds.contact_area_corrected[0] == pytest.approx(ds.contact_area[0] * (1 - 4 * 0.088))
+    assert ds.contact_area[0] == pytest.approx(ds.contact_area_counted[0] * (1 - 4 * 0.088))
 
 
 def test_rows__keep_nothing_of_larger_arrays():

@@ -63,7 +63,7 @@ def test_quarter__gives_what_the_whole_surface_gives(name, grounds, monkeypatch)
         "approach",
         "work",
         "contact_area",
-        "contact_area_corrected",
+        "contact_area_counted",
         "contact_fraction",
         "mean_gap",
     ]:

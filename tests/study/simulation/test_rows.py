@@ -66,8 +66,8 @@ def test_every_row__states_an_error(material, program, times):
     for name in ("stated_error", "time_error", "residual", "pressure_error", "force_error", "approach_error"):
         assert np.isfinite(ds[name]).all(), name
         assert (ds[name] >= 0).all(), name
-    assert (ds.contact_area_lower <= ds.contact_area).all()
-    assert (ds.contact_area <= ds.contact_area_upper).all()
+    assert (ds.contact_area_solver_lower <= ds.contact_area).all()
+    assert (ds.contact_area <= ds.contact_area_solver_upper).all()
 
 
 def test_ancillary_variables__exist():
@@ -111,7 +111,7 @@ def soft_steps(control):
 def test_steps_that_state_more_than_three_tolerances__are_no_rows(control):
     over = []
     for step in soft_steps(control):
-        found = stated(step, 0.0, 0.0)
+        found = stated(step, 0.0)
         over.append(max(found["stated_error"], found["work_error"] / step.state.largest_work) / step.scene.tolerance)
         if keeps_its_word(step, 0.0):
             assert over[-1] <= 3

@@ -18,7 +18,13 @@ from roughvisc.study.storage.store import open_result, whole_file, write_result
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
 MISSING = {
     *("stated_error", "time_error", "residual", "residual_bound", "pressure_error", "approach_error", "work_error"),
-    *("stored_energy", "dissipated_energy", "dissipated_energy_error", "contact_area_lower", "contact_area_upper"),
+    *(
+        "stored_energy",
+        "dissipated_energy",
+        "dissipated_energy_error",
+        "contact_area_solver_lower",
+        "contact_area_solver_upper",
+    ),
 }
 MISSING_AT_STEPS = {"step_stored_energy", "step_dissipated_energy", "step_time_error"}
 

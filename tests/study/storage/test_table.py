@@ -49,7 +49,7 @@ def test_table__says_what_the_results_say(folder):
                 "time [s]": ds.time[-1],
                 "force [N]": ds.force[-1],
                 "approach [m]": ds.approach[-1],
-                "contact_area_corrected [m^2]": ds.contact_area_corrected[-1],
+                "contact_area [m^2]": ds.contact_area[-1],
                 "contact_fraction": ds.contact_fraction[-1],
                 "mean_gap [m]": ds.mean_gap[-1],
                 "largest stated_error": ds.stated_error.max(),
@@ -100,7 +100,7 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
 
 def test_results__are_frames_of_pandas(folder):
     results = rv.open_results(folder)
-    frame = results[["force", "contact_area_corrected"]].to_dataframe().reset_index()
+    frame = results[["force", "contact_area"]].to_dataframe().reset_index()
     assert len(frame) == 2 * 3
     assert np.array_equal(frame["force"], results.force.values.ravel())
     assert np.array_equal(frame["program.0.load"].unique(), [5e-4, 1e-3])

@@ -22,7 +22,7 @@ from roughvisc.study.trade.ladder import Setting
 from roughvisc.views.console.trade_table import trade_table
 from roughvisc.views.figures.trade import _FAMILIES
 
-AREA = "contact_area_corrected"
+AREA = "contact_area"
 #: setting, wall time [s], error
 MADE_UP = [
     (Setting(1e-1), 1.0, 0.05),

@@ -23,7 +23,7 @@ def slid():
         "approach": np.linspace(0, 1e-6, count),
         "friction_coefficient": np.array(FRICTION),
         "sliding_distance": 1e-6 * np.array(DISTANCE),
-        "contact_area_corrected": 1e-9 * np.append(0.0, np.arange(8.0, 0, -1)),
+        "contact_area": 1e-9 * np.append(0.0, np.arange(8.0, 0, -1)),
         "status": np.zeros(count, dtype=int),
     }
     fields = {"pressure": (("time", "x", "y"), np.ones((count, *grid)))}
@@ -67,7 +67,7 @@ def test_frames__tell_the_distance(slid):
 
 
 def test_sweep__of_slides_is_drawn_over_time_and_not_over_speed(slid):
-    other = slid.assign(contact_area_corrected=2 * slid["contact_area_corrected"])
+    other = slid.assign(contact_area=2 * slid["contact_area"])
     results = xr.concat([slid, other], xr.DataArray([1.0, 2.0], dims="case", name="load"))
     names = [name for name, _, _ in sweep_figures(results)]
     assert "histories" in names

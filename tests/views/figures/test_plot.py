@@ -171,7 +171,7 @@ def test_history__data_and_units():
     assert accuracy.get_xlabel() == "Time [s]"
     assert accuracy.get_xscale() == "symlog"
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
-    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area_corrected"])
+    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area"])
     assert list(lines(accuracy)) == ["stated", "time steps", "contact solver (estimate)", "tolerance"]
     np.testing.assert_allclose(lines(accuracy)["stated"].get_ydata(), ds["stated_error"])
     np.testing.assert_allclose(lines(accuracy)["contact solver (estimate)"].get_ydata(), ds["residual"])
@@ -226,7 +226,7 @@ def test_area_against_load__one_line_a_case_and_the_low_load_line():
     (ax,) = figure.axes
     assert {"soft", "hard", "low loads, glassy"} <= set(lines(ax))
     assert ax.get_xscale() == ax.get_yscale() == "log"
-    np.testing.assert_allclose(lines(ax)["hard"].get_ydata(), 2e6 * ds["contact_area_corrected"])
+    np.testing.assert_allclose(lines(ax)["hard"].get_ydata(), 2e6 * ds["contact_area"])
     x, y = lines(ax)["low loads, glassy"].get_data()
     assert ds.attrs["boundary"] == "periodic", "slopes across the border count"
     steps = {name: float(ds[name][1] - ds[name][0]) for name in "xy"}
@@ -429,14 +429,14 @@ def test_distributions__every_curve_encloses_one():
             assert np.sum(values * np.diff(limits)) == pytest.approx(1.0)
 
 
-def test_contact_clusters__areas_add_up_to_the_contact_area():
+def test_contact_clusters__areas_add_up_to_the_counted_area():
     ds = made.rough_creep()
     count, area, sizes = plot.contact_clusters(ds, times=[-1]).axes
     number, mean = count.lines[0].get_ydata(), lines(area)["mean"].get_ydata()
-    np.testing.assert_allclose(number * mean, 1e6 * ds["contact_area"], rtol=1e-9)
+    np.testing.assert_allclose(number * mean, 1e6 * ds["contact_area_counted"], rtol=1e-9)
     steps = sizes.lines[0]
     assert steps.get_ydata()[-1] == number[-1]
-    assert np.sum(steps.get_xdata()) == pytest.approx(1e6 * float(ds["contact_area"][-1]))
+    assert np.sum(steps.get_xdata()) == pytest.approx(1e6 * float(ds["contact_area_counted"][-1]))
 
 
 def test_surface__panels_and_missing_points():

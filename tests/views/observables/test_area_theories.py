@@ -61,7 +61,7 @@ def test_solution__lies_near_the_theories():
     program = rv.Program().pressure(3e4, over=0.05).hold(1.0)
     ds = rv.simulate(SURFACE, RUBBER, program, boundary="periodic", tolerance=1e-2, times=4, progress=False, fields=())
     theory = area_by_theory(ds, material=RUBBER)
-    part = (ds["contact_area_corrected"] / theory["persson_contact_area"])[1:]
+    part = (ds["contact_area"] / theory["persson_contact_area"])[1:]
     assert ((part > 0.9) & (part < 2.0)).all()
     figure = plot.history(ds.assign_attrs(case=CASE), persson=True)
     (line,) = (line for ax in figure.axes for line in ax.lines if line.get_label() == "Persson")
@@ -87,7 +87,7 @@ def test_where_theories_do_not_hold__says_so(attrs, message):
 
 
 def test_figure__draws_both_theories_up_to_the_nominal_area():
-    ds = loaded([0.0, 1.0], [0.0, 3e5]).assign(contact_area_corrected=("time", [0.0, 0.5 * SIDE**2]))
+    ds = loaded([0.0, 1.0], [0.0, 3e5]).assign(contact_area=("time", [0.0, 0.5 * SIDE**2]))
     (ax,) = plot.area_against_load(ds, contact_modulus=4e6).axes
     drawn = {line.get_label(): line for line in ax.lines}
     x, y = drawn["Persson"].get_data()

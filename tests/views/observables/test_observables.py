@@ -196,9 +196,9 @@ def test_area_growth__of_a_power_law_is_its_exponent():
     np.testing.assert_allclose(found[1:], 0.37, rtol=1e-12)
 
 
-def test_area_growth__prefers_the_corrected_area():
+def test_area_growth__is_not_that_of_the_count():
     time = np.array([1.0, 2.0, 4.0])
-    ds = histories(time, contact_area=time, contact_area_corrected=time**2)
+    ds = histories(time, contact_area_counted=time, contact_area=time**2)
     np.testing.assert_allclose(observables.area_growth(ds)["area_growth_exponent"], 2.0)
 
 

@@ -91,7 +91,7 @@ def test_sweep__of_one_parameter_has_a_line_for_each_time():
     ds = stacked(product(program__0__load=[0.04, 0.01, 0.02]), by_load)
     (ax,) = plot.sweep(ds, times=[1.2, -1]).axes
     assert ax.get_xlabel() == "Load [mN]"
-    assert ax.get_ylabel() == "Contact area, counted [mm²]"
+    assert ax.get_ylabel() == "Contact area [mm²]"
     assert set(lines(ax)) == {"t = 1 s", "t = 10 s"}
     for label, share in (("t = 1 s", 0.75), ("t = 10 s", 1.0)):
         x, y = lines(ax)[label].get_data()
@@ -224,7 +224,7 @@ def test_sweep__over_many_decades_has_the_unit_of_their_middle():
     assert second.levels.tolist() == [1e-8, 1e-6]
     ax = plot.sweep(stacked(holds, lambda v: v["program.1.hold"] ** 0.25)).axes[0]
     assert ax.get_xscale() == ax.get_yscale() == "log"
-    assert ax.get_ylabel() == "Contact area, counted [m²]"
+    assert ax.get_ylabel() == "Contact area [m²]"
 
 
 def test_sweep__parameters_of_one_name_are_told_apart():
@@ -309,7 +309,7 @@ def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
     for name in ("area", "histories"):
         assert figures[name].axes[0].get_ylabel() == "Contact fraction [%]"
     alike = ds.assign(contact_fraction=ds.contact_area / 1e-5)
-    assert plot.sweep(alike).axes[0].get_ylabel().startswith("Contact area, counted [")
+    assert plot.sweep(alike).axes[0].get_ylabel().startswith("Contact area [")
 
 
 def test_histories_of_cases__that_nothing_tells_apart_are_numbered():
