@@ -60,8 +60,9 @@ def format_of(names: Container[str], attributes: Mapping[Any, Any]) -> int:
     """
     if "result_format" in attributes:
         found = attributes["result_format"]
-        if isinstance(found, int | np.integer) and 1 <= found <= RESULT_FORMAT:
-            return int(found)
+        found = found.item() if isinstance(found, np.generic) else found
+        if isinstance(found, int) and 1 <= found <= RESULT_FORMAT:
+            return found
         raise InputError(
             f"result_format is {shown(found)}: expected 1 to {RESULT_FORMAT}, the formats that this version of "
             "roughvisc reads"

@@ -1,11 +1,18 @@
 """The contact area with the interval that it is stated in, and with the error of its grid."""
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import boundaries, examples, of_whole_runs, surfaces
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.contact.neighbours import area_bounds
 from roughvisc.mechanics.stepping import attempt
+from roughvisc.topography.grid import nominal_area
 
 SHAPE, SIZE, APEX = (35, 32), (1.6, 1.5), (0.81, 0.735)
 CELL = SIZE[0] * SIZE[1] / (SHAPE[0] * SHAPE[1])
@@ -25,12 +32,12 @@ def pressed(material, program, **settings):
 
 
 def cells(ds, name):
-    return np.rint(ds[name].values / CELL).astype(int)
+    return np.round(ds[name].values / CELL, 6)
 
 
 @pytest.fixture(scope="module", params=MATERIALS)
 def pulled(request):
-    """Counts of cells, one column an instant: lower, counted, upper, true; in steps of a tenth and a fortieth.
+    """Areas in cells, one column an instant: lower, found, upper, true; in steps of a tenth and a fortieth.
 
     True are those in steps of an eightieth. Only the steps leave an error: the contact is solved sharply.
     """
@@ -46,11 +53,11 @@ def pulled(request):
 
 
 @pytest.mark.parametrize("step", [0.1, 0.025])
-def test_true_count__lies_in_the_interval(pulled, step):
-    lower, counted, upper, true = pulled[step]
+def test_true_area__lies_in_the_interval(pulled, step):
+    lower, found, upper, true = pulled[step]
     assert np.all((lower <= true) & (true <= upper)), pulled[step]
-    if step == 0.1:  # it is put to the test: the count alone would be wrong
-        assert np.any(true != counted)
+    if step == 0.1:  # it is put to the test: the area alone would be wrong
+        assert np.any(true != found)
 
 
 def test_interval__is_narrow_and_shrinks_with_the_steps(pulled):
@@ -93,3 +100,68 @@ def test_corrected_area__is_that_of_the_closed_form_within_its_error(material):
     off = np.abs(ds.contact_area.values / exact - 1)
     assert np.all(off <= ds.grid_error_area)
     assert np.all(ds.grid_error_area <= 0.1)
+
+
+def hertz_errors(cells, count=12):
+    """Root mean squares of the relative errors of the area and of the count, over places of the apex in its cell."""
+    sides, places = (3.2 / cells, 3.2 / (cells - 1)), np.random.default_rng(0).random((count, 2))
+    load, exact = 0.1, math.pi * (0.75 * 10.0 * 0.1) ** (2 / 3)  # of a ball of radius 10 and unit contact modulus
+    found = []
+    for place in places:
+        x, y = ((np.arange(n) - n / 2 + at) * d for n, at, d in zip((cells, cells - 1), place, sides, strict=True))
+        ball = rv.from_array(-(x[:, None] ** 2 + y**2) / 20.0, sides)
+        ds = rv.simulate(ball, rv.elastic(0.25), rv.Program().load(load, over=0), fields=(), progress=False)
+        found.append([float(ds[name][0]) / exact - 1 for name in ("contact_area", "contact_area_counted")])
+    return np.sqrt(np.mean(np.square(found), axis=0))
+
+
+def test_area_of_a_hertzian_circle__converges_faster_than_the_count():
+    """The count with the side of the cell, the area with its power 1.5: what is left is the scatter of the count."""
+    coarse, fine = hertz_errors(12), hertz_errors(96)
+    area, count = np.log(coarse / fine) / math.log(8)
+    assert area > 1.3
+    assert 0.9 < count < 1.2
+    assert fine[0] < fine[1] / 4
+
+
+def by_hand(contact, periodic):
+    """Cells in contact, and these less 0.088 for each face to a cell out of contact."""
+    (nx, ny), faces = contact.shape, 0
+    for i, j in np.argwhere(contact):
+        for k, m in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
+            if periodic or (0 <= k < nx and 0 <= m < ny):
+                faces += not contact[k % nx, m % ny]
+    return np.count_nonzero(contact), np.count_nonzero(contact) - 0.088 * faces
+
+
+@examples(60)
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.floats(0, 1), st.floats(0, 1))
+def test_bounds__hold_the_area_whichever_cells_in_doubt_touch(seed, periodic, part, doubted):
+    rng = np.random.default_rng(seed)
+    contact, doubtful = rng.random((7, 6)) < part, rng.random((7, 6)) < doubted
+    lower, upper = area_bounds(
+        *by_hand(contact, periodic), np.count_nonzero(contact & doubtful), np.count_nonzero(~contact & doubtful)
+    )
+    other = np.where(doubtful & (rng.random((7, 6)) < 0.5), ~contact, contact)
+    assert lower - 1e-9 <= by_hand(other, periodic)[1] <= upper + 1e-9
+    assert upper <= contact.size, "no more than there is"
+
+
+@of_whole_runs
+@given(surfaces(), boundaries, st.booleans())
+def test_area__lies_within_its_bounds(height, boundary, soft):
+    material = rv.zener(1.0, 0.2, 0.1) if soft else rv.elastic(1.0)
+    load = rv.Program().load(0.02, over=0.5).hold(0.5).load(0.005, over=0.5)
+    ds = rv.simulate(
+        height, material, load, boundary=boundary, edge="accept", grid_error=True, times=5, fields=(), progress=False
+    )
+    np.testing.assert_allclose(ds.contact_fraction, ds.contact_area / nominal_area(height), rtol=1e-12)
+    assert (ds.contact_area <= ds.contact_area_counted).all()
+    assert (ds.contact_area_solver_lower <= ds.contact_area).all()
+    assert (ds.contact_area <= ds.contact_area_solver_upper).all()
+    known = np.isfinite(ds.grid_error_area)
+    assert known.any()
+    assert (ds.contact_area_lower[known] <= ds.contact_area_solver_lower[known]).all()
+    assert (ds.contact_area_upper[known] >= ds.contact_area_solver_upper[known]).all()
+    grid = ds.contact_area_upper - ds.contact_area_solver_upper
+    np.testing.assert_allclose(grid[known], ds.grid_error_area[known] * ds.contact_area.max(), rtol=1e-6, atol=1e-12)

@@ -643,3 +643,22 @@ def test_lock__of_a_process_that_is_being_cleared_away_is_waited_for(tmp_path):
         with held(path) as lock:
             lock.check()
     assert not path.exists()
+
+
+@pytest.mark.parametrize("name", ["modes", "sliding"])
+def test_checkpoint_of_the_former_format__is_not_gone_on_from(whole, tmp_path, caplog, name):
+    """Its rows have areas of another meaning: the run begins anew, and no row is left of them."""
+    case, expected, steps = whole(CASES[name])
+    unfinished = stopped(case, tmp_path, steps // 2)
+    for path in unfinished.glob("checkpoint.*"):
+        with open(path, "rb", buffering=0) as stream:
+            plain, arrays = records.read_record(stream)
+        del plain["result_format"]  # former versions state none
+        with open(path, "wb", buffering=0) as stream:
+            records.write_record(stream, plain, arrays)
+    stop = Stop()
+    with caplog.at_level(logging.WARNING, "roughvisc"):
+        path = run_case(case, tmp_path, stop=stop)
+    assert stop.asked == steps
+    assert "belongs to another case or revision and is not used" in caplog.text
+    assert values(path) == expected
