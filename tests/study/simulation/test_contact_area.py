@@ -135,15 +135,19 @@ def by_hand(contact, periodic):
 
 
 @examples(60)
-@given(st.integers(0, 2**32 - 1), st.booleans(), st.floats(0, 1), st.floats(0, 1))
+@given(st.integers(0, 2**32 - 1), st.booleans(), st.floats(0, 1), st.sampled_from([0.03, 0.1, 0.5]))
 def test_bounds__hold_the_area_whichever_cells_in_doubt_touch(seed, periodic, part, doubted):
     rng = np.random.default_rng(seed)
     contact, doubtful = rng.random((7, 6)) < part, rng.random((7, 6)) < doubted
     lower, upper = area_bounds(
         *by_hand(contact, periodic), np.count_nonzero(contact & doubtful), np.count_nonzero(~contact & doubtful)
     )
-    other = np.where(doubtful & (rng.random((7, 6)) < 0.5), ~contact, contact)
-    assert lower - 1e-9 <= by_hand(other, periodic)[1] <= upper + 1e-9
+    for other in (
+        contact & ~doubtful,
+        contact | doubtful,
+        np.where(rng.random((7, 6)) < 0.5, contact ^ doubtful, contact),
+    ):
+        assert lower - 1e-9 <= by_hand(other, periodic)[1] <= upper + 1e-9
     assert upper <= contact.size, "no more than there is"
 
 
