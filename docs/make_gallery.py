@@ -31,7 +31,7 @@ FIGURES = {
         "area": lambda results: rv.plot.area_against_load(by_load(results)),
     },
     "two_parameters": {
-        "map": lambda results: rv.plot.sweep(results, "contact_area_corrected"),
+        "map": lambda results: rv.plot.sweep(results, "contact_area"),
         "lines": lambda results: rv.plot.sweep(
             results, "approach", times=[0.01, 0.05], kind="lines"
         ),

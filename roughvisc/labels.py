@@ -6,14 +6,14 @@ A variable that is not declared, or whose dimensions differ, is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
+from collections.abc import Container, Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity
-from roughvisc.variables import FLAGS, OLDER_NAMES, VARIABLES, Variable
+from roughvisc.units import quantity, shown
+from roughvisc.variables import FLAGS, OLDER_NAMES, RESULT_FORMAT, VARIABLES, Variable
 from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -111,20 +111,52 @@ def expect_history(dataset: xr.Dataset) -> None:
         raise InputError("the result lies over the speed of steady sliding: expected a history over time")
 
 
+def format_of(names: Container[Hashable], attributes: Mapping[Any, Any]) -> int:
+    """Format of a result.
+
+    Without a number it is 1 if it has the attributes or the names that results of format 1 have. What a user has put
+    together without attributes has the names of today.
+
+    Parameters
+    ----------
+    names : container of hashable
+        Variables that it holds.
+    attributes : mapping
+        Of the result.
+
+    Raises
+    ------
+    InputError
+        If the number is none that this version can read.
+    """
+    if "result_format" in attributes:
+        found = attributes["result_format"]
+        found = found.item() if isinstance(found, np.generic) else found
+        if isinstance(found, int) and 1 <= found <= RESULT_FORMAT:
+            return found
+        raise InputError(
+            f"result_format is {shown(found)}: expected 1 to {RESULT_FORMAT}, the formats that this version of "
+            "roughvisc reads"
+        )
+    if "contact_area_counted" in names:
+        return RESULT_FORMAT
+    return 1 if "tolerance" in attributes or any(name in names for name in OLDER_NAMES) else RESULT_FORMAT
+
+
 def expect_current_names(dataset: xr.Dataset) -> None:
     """Refuse a result of a former version as xarray alone opens it: its names have other meanings.
 
     Raises
     ------
     InputError
-        If it holds a variable under an older name.
+        If its format is another than that of today.
     """
-    for name, today in OLDER_NAMES.items():
-        if name in dataset.variables:
-            raise InputError(
-                f"the result holds {name!r}, which is {today!r} today: a former version of roughvisc wrote it; open it "
-                "by rv.open_result, which gives its variables the names of today"
-            )
+    found = format_of(dataset.variables, dataset.attrs)
+    if found != RESULT_FORMAT:
+        raise InputError(
+            f"the result is of format {found}, in which 'contact_area' and other names have another meaning than today "
+            f"(format {RESULT_FORMAT}): expected it as rv.open_result opens its file"
+        )
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:
@@ -134,7 +166,7 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
     ------
     InputError
         If a declared variable states a unit that is not the declared one in other words, or holds a pint array; or if
-        a variable has its name of a former version, in which other names have other meanings.
+        the result is of a former format, in which names have other meanings.
     """
     expect_current_names(dataset)
     for name, variable in dataset.variables.items():

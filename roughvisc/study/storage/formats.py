@@ -9,16 +9,15 @@ solver.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.labels import annotate
-from roughvisc.units import shown
-from roughvisc.variables import OLDER_NAMES, RESULT_FORMAT, of_step
+from roughvisc.labels import annotate, format_of
+from roughvisc.variables import RESULT_FORMAT, of_step
 from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -38,38 +37,6 @@ _FORMER = (*_RENAMED, "contact_fraction", "contact_area_lower", "contact_area_up
 _PREFIXES = ("", of_step(""))
 #: All names that have another meaning in format 1.
 FORMER_NAMES = tuple(f"{prefix}{name}" for prefix in _PREFIXES for name in _FORMER)
-
-
-def format_of(names: Container[str], attributes: Mapping[Any, Any]) -> int:
-    """Format of a result.
-
-    Without a number it is 1 if it has the attributes or the names that results of format 1 have. What a user has put
-    together without attributes has the names of today.
-
-    Parameters
-    ----------
-    names : container of str
-        Variables that it holds.
-    attributes : mapping
-        Of the result.
-
-    Raises
-    ------
-    InputError
-        If the number is none that this version can read.
-    """
-    if "result_format" in attributes:
-        found = attributes["result_format"]
-        found = found.item() if isinstance(found, np.generic) else found
-        if isinstance(found, int) and 1 <= found <= RESULT_FORMAT:
-            return found
-        raise InputError(
-            f"result_format is {shown(found)}: expected 1 to {RESULT_FORMAT}, the formats that this version of "
-            "roughvisc reads"
-        )
-    if "contact_area_counted" in names:
-        return RESULT_FORMAT
-    return 1 if "tolerance" in attributes or any(name in names for name in OLDER_NAMES) else RESULT_FORMAT
 
 
 def current_histories(histories: Mapping[str, Array], attributes: Mapping[Any, Any]) -> dict[str, Array]:
