@@ -286,7 +286,7 @@ def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):
     assert invoke("new", "plain.npy", "--unit", "um", "--spacing", "1um,2um", "-o", "a/plain.toml")[0] == 0
     (case,) = read_cases("a/plain.toml")
     height = case.settings.surface.raw()
-    assert (height.shape, float(height.x[0]), float(height.y[0])) == ((20, 30), 5e-7, 1e-6)
+    assert (height.shape, float(height.x[0]), float(height.y[0])) == ((30, 20), 5e-7, 1e-6)
 
 
 def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
@@ -347,12 +347,38 @@ def test_scan__lists_channels_and_parameters(invoke, tmp_path):
     np.save(tmp_path / "plain.npy", z[0])
     status, _, err = invoke("scan", "plain.npy")
     assert status == 2
-    assert err.endswith("it states no unit of length: pass --unit (such as --unit=um)\n")
+    missing = (
+        "no unit of its heights and no size: pass --unit (such as --unit=um), and pass --spacing (such as --spacing="
+    )
+    assert f"it states {missing}1um,1um)\n" in err
+    status, _, err = invoke("scan", "plain.npy", "--spacing", "1um")
+    assert err.endswith("it states no unit of its heights: pass --unit (such as --unit=um)\n")
     status, _, err = invoke("scan", "plain.npy", "--unit", "m")
     assert status == 2
     assert err.endswith("it states no size: pass --spacing (such as --spacing=1um,1um)\n")
     assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
-    assert rv.open_scan(tmp_path / "plain.toml").shape == (20, 30)
+    assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
+
+
+def test_scan__takes_a_unit_of_heights_and_says_what_a_large_slope_means(invoke, tmp_path):
+    x, y = np.meshgrid(np.arange(17), np.arange(21), indexing="ij")
+    z = 0.5 * np.sin(x) * np.sin(y)
+    np.savetxt(tmp_path / "points.xyz", np.column_stack([1e-3 * x.ravel(), 1e-3 * y.ravel(), z.ravel()]))
+    status, out, err = invoke("scan", "points.xyz", "--unit", "mm,um", "--card")
+    assert (status, err) == (0, "")
+    assert 'unit = "mm"\nheight_unit = "um"' in out
+    height = rv.open_scan(tmp_path / "points.toml")
+    np.testing.assert_allclose(height, 1e-6 * z, atol=1e-15)
+    np.testing.assert_allclose(height.x, (np.arange(17) + 0.5) * 1e-6)
+    assert re.search(r"Slope +the rms slope is 0\.\d+ after these steps *\n +-> nothing to do", out)
+    table = out[out.index("[surface]") : out.index("Picture:")]
+    (tmp_path / "study.toml").write_text(table + BALL[BALL.index("[material]") :])
+    np.testing.assert_allclose(rv.read_study(tmp_path / "study.toml").settings.surface.raw(), 1e-6 * z, atol=1e-15)
+    steep = invoke("scan", "points.xyz", "--unit", "um,mm", "--force")[1]
+    assert "check the units of x, y and of the heights, and the spacing" in " ".join(steep.split())
+    status, _, err = invoke("scan", "points.xyz", "--unit", "mm,parsec per")
+    assert status == 2
+    assert "--unit is '1 parsec per'" in err
 
 
 def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_path, scan_file):

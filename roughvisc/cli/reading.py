@@ -11,12 +11,14 @@ import click
 from roughvisc.errors import InputError
 
 _OPTIONS = (
-    click.option("--unit", help="Unit of length, where the file states none: um."),
+    click.option(
+        "--unit", help="Unit of length, where the file states none: um; or of x and y, and of heights: mm,um."
+    ),
     click.option("--channel", help="Name or number of the channel. [default: the height]"),
     click.option("--spacing", help="Distance of the points, where the file states none: 1um, or 1um,2um."),
     click.option("--format", help="Format, where the suffix does not tell; auto: have it guessed."),
 )
-_NAMES = "unit|spacing|format|channel"
+_NAMES = "unit|height_unit|spacing|format|channel"
 
 
 def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -28,9 +30,11 @@ def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def read_options(unit: str | None, channel: str | None, spacing: str | None, format: str | None) -> dict[str, Any]:
     """The options as :func:`roughvisc.open_scan` takes them."""
+    lateral, _, vertical = (unit or "").partition(",")
     return {
         "format": format,
-        "unit": unit,
+        "unit": lateral.strip() or None,
+        "height_unit": vertical.strip() or None,
         "channel": int(channel) if channel is not None and channel.isdecimal() else channel,
         "spacing": _sides(spacing),
     }
@@ -54,8 +58,8 @@ def naming_options(message: str) -> str:
 
     Examples
     --------
-    >>> naming_options("it states no unit of length: pass unit= (such as unit='um')")
-    'it states no unit of length: pass --unit (such as --unit=um)'
+    >>> naming_options("it states no unit of its heights: pass unit= (such as unit='um')")
+    'it states no unit of its heights: pass --unit (such as --unit=um)'
     >>> naming_options("it states no size: pass spacing=(dx, dy) [m]")
     'it states no size: pass --spacing (such as --spacing=1um,1um)'
     """
@@ -63,7 +67,8 @@ def naming_options(message: str) -> str:
     message = message.replace(" (see supported_formats())", "")
     message = re.sub(rf"\b({_NAMES})='(\w+)'", r"--\1=\2", message)
     message = re.sub(rf"\b({_NAMES})=(?=\W|$)", r"--\1", message)
-    return re.sub(rf"(^|: )({_NAMES}) is ", r"\1--\2 is ", message)
+    message = re.sub(rf"(^|: )({_NAMES}) is ", r"\1--\2 is ", message)
+    return message.replace("--height_unit", "--unit")  # which takes both units
 
 
 def naming_keys(message: str) -> str:
@@ -71,8 +76,8 @@ def naming_keys(message: str) -> str:
 
     Examples
     --------
-    >>> naming_keys("it states no unit of length: pass unit= (such as unit='um')")
-    'it states no unit of length: pass the key unit (such as unit = "um")'
+    >>> naming_keys("it states no unit of its heights: pass unit= (such as unit='um')")
+    'it states no unit of its heights: pass the key unit (such as unit = "um")'
     """
     message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", 'the key spacing (such as spacing = "1 um")', message)
     message = message.replace(" (see supported_formats())", "")

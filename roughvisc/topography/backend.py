@@ -33,7 +33,7 @@ class ScanArray(BackendArray):
     path : str
         The scan.
     options : dict
-        ``format``, ``channel``, ``unit`` and ``spacing`` of :func:`roughvisc.open_scan`.
+        ``format``, ``channel``, ``unit``, ``height_unit`` and ``spacing`` of :func:`roughvisc.open_scan`.
     shape : tuple of int
         Cells ``(nx, ny)``.
     checksum : str
@@ -60,7 +60,15 @@ class RoughviscBackend(BackendEntrypoint):
     """Instrument files, grid files and surface cards as a Dataset with the variable ``height`` over (x, y)."""
 
     description = "Scans of surfaces: X3P, SDF and the instrument formats that SurfaceTopography reads"
-    open_dataset_parameters = ("filename_or_obj", "drop_variables", "format", "channel", "unit", "spacing")
+    open_dataset_parameters = (
+        "filename_or_obj",
+        "drop_variables",
+        "format",
+        "channel",
+        "unit",
+        "height_unit",
+        "spacing",
+    )
 
     def open_dataset(
         self,
@@ -70,6 +78,7 @@ class RoughviscBackend(BackendEntrypoint):
         format: str | None = None,
         channel: int | str | None = None,
         unit: str | None = None,
+        height_unit: str | None = None,
         spacing: float | tuple[float, float] | None = None,
     ) -> xr.Dataset:
         """The header of a scan; its heights are read when they are used.
@@ -80,7 +89,7 @@ class RoughviscBackend(BackendEntrypoint):
             As :func:`roughvisc.open_scan` takes it.
         drop_variables : str or iterable of str, optional
             Variables to leave out.
-        format, channel, unit, spacing : optional
+        format, channel, unit, height_unit, spacing : optional
             As for :func:`roughvisc.open_scan`.
 
         Returns
@@ -96,7 +105,7 @@ class RoughviscBackend(BackendEntrypoint):
         """
         from roughvisc.topography.scans import outline
 
-        options = {"format": format, "channel": channel, "unit": unit, "spacing": spacing}
+        options = {"format": format, "channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
         h = outline(filename_or_obj, **options)
         if "card" not in h.attrs:
             path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder

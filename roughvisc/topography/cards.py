@@ -22,7 +22,7 @@ from roughvisc.topography.recipes import RECIPES, UNITS, make
 from roughvisc.units import quantity, shown
 
 _PROVENANCE = ("title", "description", "licence", "source")
-_FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "spacing")
+_FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "height_unit", "spacing")
 
 
 def is_card(path: Path, format: str | None) -> bool:
@@ -162,7 +162,7 @@ def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
         raise InputError(
             f"the checksum of {path.name} is {found}, sha256 says {card['sha256']}: the file was changed or damaged"
         )
-    options = {key: card[key] for key in ("format", "channel", "unit") if key in card}
+    options = {key: card[key] for key in ("format", "channel", "unit", "height_unit") if key in card}
     if "spacing" in card:
         options["spacing"] = _quantities(card["spacing"], "m", "spacing")
     if is_card(path, options.get("format")):

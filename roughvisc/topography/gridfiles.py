@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -41,9 +42,16 @@ def is_labelled(path: Path) -> bool:
 
 
 def open_grid(
-    path: Path, channel: Channel, unit: float | None, spacing: tuple[float, float] | None, heights: bool = True
+    path: Path,
+    channel: Channel,
+    unit: float | None,
+    height_unit: float | None,
+    spacing: tuple[float, float] | None,
+    heights: bool = True,
 ) -> xr.DataArray:
     """One variable as a labelled grid in metres, with the attributes and coordinates that it has.
+
+    ``unit`` is the metres in one unit of what states none, ``height_unit`` that of the heights where it is another.
 
     Coordinates keep their origin; where they descend, the grid is turned round with them. Without `heights`, those
     are NaN that take no memory.
@@ -55,7 +63,9 @@ def open_grid(
         h = h.copy(data=values).compute()
     extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
     h = h.transpose("x", "y")
-    metres = _metres(unit_of(h), unit, channel.name)
+    metres = _metres(unit_of(h), unit if height_unit is None else height_unit, channel.name)
+    if height_unit is not None and not math.isclose(metres, height_unit):
+        raise InputError(f"its heights are in {unit_of(h)!r}: leave height_unit= out, or scale them afterwards")
     axes = []
     for axis, given in zip(("x", "y"), spacing or (None, None), strict=True):
         if given is not None:

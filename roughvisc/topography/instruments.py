@@ -2,8 +2,8 @@
 
 Orientation: y points up, as on the map of a microscope. x3pio and sdfio give rows along y, ascending, so that
 ``height(x, y)`` is the transpose. SurfaceTopography gives (x, y), for many formats with the top line first: those are
-turned over here, and :mod:`roughvisc.topography.orientation` says of each format how that was told. Of plain text,
-row j of the file is ``y[j]``, as it stands there.
+turned over here, and :mod:`roughvisc.topography.orientation` says of each format how that was told. Row j of a matrix
+in plain text or in a NumPy file is ``y[j]``, and runs along x.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
@@ -80,9 +80,10 @@ class Opened:
         All channels of the file.
     load : callable
         ``load(channel, unit)`` with the metres in one unit of the file where it states none, gives heights over
-        (x, y) and the cell sides, or None for these. [m]
+        (x, y) and the cell sides, or None for these. [m] It is called twice where x and y have another unit.
     sides : callable
-        ``sides(channel, unit)``: the cell sides as the header has them, None where it does not tell. [m]
+        ``sides(channel, unit)``: the cell sides as the header has them, None where it does not tell. [m] They do not
+        depend on ``unit`` where the file states the unit of x and y.
     default : int or None
         Index of the channel that the library takes.
     instrument : str
@@ -258,7 +259,7 @@ def _csv(path: Path) -> Opened:
     opened = _tried(path, "xyz")
     if isinstance(opened, Opened):
         return opened
-    return replace(_surface_topography(path, "asc", source=separated_by_blanks(path)), format="csv")
+    return replace(_surface_topography(path, "asc"), format="csv")
 
 
 def _npy(path: Path) -> Opened:
@@ -266,9 +267,9 @@ def _npy(path: Path) -> Opened:
     areal = heights.ndim == 2 and heights.dtype.kind in "fiu"
 
     def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
-        return np.multiply(heights, unit, dtype=float), None
+        return np.multiply(heights.T, unit, dtype=float, order="C"), None
 
-    return Opened("npy", (Channel(0, "array", areal, heights.shape, None),), load)
+    return Opened("npy", (Channel(0, "array", areal, heights.shape[::-1], None),), load)
 
 
 def _detected(path: Path) -> str:
@@ -288,14 +289,14 @@ def _tried(path: Path, format: str) -> Opened | Exception:
         return error
 
 
-def _surface_topography(path: Path, format: str, source: TextIO | None = None) -> Opened:
+def _surface_topography(path: Path, format: str) -> Opened:
     from SurfaceTopography.IO import lookup_reader_by_format
     from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
 
     if format not in lookup_reader_by_format:
         known = sorted({*lookup_reader_by_format, *OWN_SUFFIXES})
         raise InputError(f"format is {format!r}: expected one of {', '.join(known)}, or 'auto'")
-    reader = lookup_reader_by_format[format](str(path) if source is None else source)
+    reader = lookup_reader_by_format[format](separated_by_blanks(path) if format in _TEXT else str(path))
     theirs = list(reader.channels)
 
     def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
@@ -325,8 +326,15 @@ def _surface_topography(path: Path, format: str, source: TextIO | None = None) -
         return unit if channel.unit is None else float(get_unit_conversion_factor(channel.unit, "m"))
 
     def cells(sizes: Any, shape: tuple[int, ...], channel: Channel, unit: float | None) -> tuple[float, ...]:
-        scale = metres(channel, unit)
-        return tuple(float(f"{float(size) * scale:.15g}") / n for size, n in zip(sizes, shape, strict=True))
+        lateral = (metres(channel, unit),) * len(shape)
+        if channel.unit is None:  # a header may state the units of x and y alone, which the library then leaves as read
+            header = theirs[channel.index].info.get("raw_metadata", {})
+            named = header.get("xunit") or header.get("yunit"), header.get("yunit") or header.get("xunit")
+            lateral = (
+                lateral if named[0] is None else tuple(float(get_unit_conversion_factor(one, "m")) for one in named)
+            )
+        scaled = zip(sizes, lateral, shape, strict=True)
+        return tuple(float(f"{float(size) * scale:.15g}") / n for size, scale, n in scaled)
 
     default = getattr(reader, "_default_channel_index", None)
     described = theirs[0].info.get("instrument", {}) if theirs else {}

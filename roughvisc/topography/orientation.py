@@ -25,6 +25,8 @@ _STATED = {
     "nc": "verified: the coordinates in the file",
     "xyz": "verified: the coordinates in the file",
 }
+#: Formats that are a matrix and no more: what one is called.
+_MATRICES = {"asc": "text matrix", "csv": "CSV matrix", "npy": "NumPy array"}
 
 
 def top_line_first(format: str) -> bool:
@@ -52,5 +54,7 @@ def orientation(format: str) -> str:
     """
     told = _TOP_FIRST.get(format) or _STATED.get(format)
     if told is None:
-        return "not verified: the first line of the file is taken to be y = 0; it may be a mirror image"
+        kind = _MATRICES.get(format, f"{format} file")
+        rows = "its rows are taken to run along x and the first to be y = 0"
+        return f"not verified: {kind}, {rows}; it may be a mirror image"
     return told if told.startswith("verified") else f"not verified: {told}"

@@ -13,6 +13,7 @@ import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
 _FEWEST = 16
 #: No height in an array is further from zero: beyond, numbers stand for missing points. [m]
 FARTHEST = 1e3
+_PASS_UNIT, _PASS_SPACING = "pass unit= (such as unit='um')", "pass spacing=(dx, dy) [m]"
 _READER = threading.RLock()
 
 
@@ -45,17 +47,19 @@ def read_file(
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
+    height_unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
     """Grid of an instrument or grid file; without `heights` they are NaN that take no memory, where a header tells all.
 
     The options are those of :func:`roughvisc.open_scan`.
     """
-    metres = None if unit is None else quantity(f"1 {unit}", "m", "unit")
+    given = {"unit": unit, "height_unit": height_unit}
+    units = _Units(*(None if one is None else quantity(f"1 {one}", "m", key) for key, one in given.items()))
     sides = None if spacing is None else pair("spacing", spacing)
     read = _from_grid if _is_grid(path, format) else _from_instrument
     before = path.stat()
-    h, opened, chosen = read(path, format, channel, metres, sides, heights)
+    h, opened, chosen = read(path, format, channel, units, sides, heights)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
     now = path.stat()
@@ -66,7 +70,7 @@ def read_file(
     attrs |= {"instrument": opened.instrument} if opened.instrument else {}
     attrs |= {"other_channels": ", ".join(others)} if others else {}
     how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
-    how += f", unit {unit} as given" if unit else ""
+    how += "".join(f", {key} {one} as given" for key, one in given.items() if one)
     h = noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
     if heights:
         finite(h, str(path))
@@ -80,7 +84,8 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m]
+        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m] A matrix whose rows
+        run along x, as in the files that :func:`roughvisc.open_scan` reads, is to be transposed.
     spacing : float or pair of float
         Cell sides (dx, dy). [m]
 
@@ -158,7 +163,7 @@ def _from_instrument(
     path: Path,
     format: str | None,
     channel: Any,
-    unit: float | None,
+    units: _Units,
     sides: tuple[float, float] | None,
     heights: bool,
 ) -> tuple[xr.DataArray, Opened, Channel]:
@@ -166,15 +171,18 @@ def _from_instrument(
         opened = instruments.open_instrument(path, format)
         try:
             chosen = _chosen(opened, channel)
-            _unit_known(chosen, unit)
-            found = None if heights else sides or opened.sides(chosen, unit)
+            _check_units(opened, chosen, units, sides)
+            lateral, vertical = units.lateral, units.vertical
+            found = None if heights else sides or opened.sides(chosen, lateral)
             values = np.broadcast_to(np.nan, chosen.shape)
             if found is None:  # a few headers do not tell: their files are read for it
-                values, found = opened.load(chosen, unit)
+                values, found = opened.load(chosen, vertical)
+                if sides is None and found is not None and lateral != vertical:
+                    found = opened.sides(chosen, lateral) or opened.load(chosen, lateral)[1]
         finally:
             opened.close()
         if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
-            raise InputError("it states no size: pass spacing=(dx, dy) [m]")
+            raise InputError(f"it states no size: {_PASS_SPACING}")
         h = labelled(values, sides or found)
     for complaint in opened.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
@@ -185,15 +193,15 @@ def _from_grid(
     path: Path,
     format: str | None,
     channel: Any,
-    unit: float | None,
+    units: _Units,
     sides: tuple[float, float] | None,
     heights: bool,
 ) -> tuple[xr.DataArray, Opened, Channel]:
     with _reading(path):
-        opened = Opened("nc", gridfiles.grid_channels(path), load=lambda *_: None)
+        opened = Opened("nc", gridfiles.grid_channels(path), load=lambda *_: (np.empty(0), (1.0, 1.0)))
         chosen = _chosen(opened, channel)
-        _unit_known(chosen, unit)
-        h = gridfiles.open_grid(path, chosen, unit, sides, heights)
+        _check_units(opened, chosen, units, sides)
+        h = gridfiles.open_grid(path, chosen, units.lateral, units.heights, sides, heights)
         return checked(h, "grid"), opened, chosen
 
 
@@ -215,13 +223,44 @@ def _chosen(opened: Opened, channel: int | str | None) -> Channel:
     raise InputError(f"channel is {channel!r}: expected one of {listed}")
 
 
-def _unit_known(chosen: Channel, unit: float | None) -> None:
-    if chosen.unit is None and unit is None:
-        raise InputError("it states no unit of length: pass unit= (such as unit='um')")
-    if chosen.unit is not None and unit is not None:
+@dataclass(frozen=True)
+class _Units:
+    """Metres in the unit that a user gives for x and y, and in the one for heights; None where none is given."""
+
+    lateral: float | None
+    heights: float | None
+
+    @property
+    def vertical(self) -> float | None:
+        """Metres in the unit of heights, which is that of x and y unless another is given."""
+        return self.lateral if self.heights is None else self.heights
+
+
+def _check_units(opened: Opened, chosen: Channel, units: _Units, sides: tuple[float, float] | None) -> None:
+    """Refuse units that contradict those in the file, and a file that states none where none are given."""
+    if chosen.unit is not None:
         stated = quantity(f"1 {chosen.unit}", "m", "the unit in the file")
-        if not math.isclose(stated, unit):
-            raise InputError(f"it states its unit as {chosen.unit!r}: leave unit= out, or scale the heights afterwards")
+        for key, unit in (("unit", units.lateral), ("height_unit", units.heights)):
+            if unit is not None and not math.isclose(stated, unit):
+                raise InputError(
+                    f"it states its unit as {chosen.unit!r}: leave {key}= out, or scale the heights afterwards"
+                )
+    elif units.vertical is None:
+        if sides is None and opened.load(chosen, 1.0)[1] is None:
+            raise InputError(f"it states no unit of its heights and no size: {_PASS_UNIT}, and {_PASS_SPACING}")
+        raise InputError(f"it states no unit of its heights: {_PASS_UNIT}")
+    elif units.heights is not None and sides is None:
+        if _states_lateral_unit(opened, chosen):
+            if units.lateral is not None:
+                raise InputError("it states the unit of x and y: pass the unit of its heights alone, as unit=")
+        elif units.lateral is None and opened.load(chosen, 1.0)[1] is not None:
+            raise InputError("it states no unit of x and y: pass unit= (such as unit='mm')")
+
+
+def _states_lateral_unit(opened: Opened, chosen: Channel) -> bool:
+    """Whether the cell sides in the header have a unit, so that they do not change with the one that is given."""
+    found = opened.sides(chosen, 1.0)
+    return found is not None and found == opened.sides(chosen, 2.0)
 
 
 def existing(path: Any) -> Path:

@@ -16,6 +16,7 @@ def open_scan(
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
+    height_unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
     """Heights of a scanned surface, from an instrument file, a grid file or a surface card.
@@ -33,6 +34,9 @@ def open_scan(
         ``other_channels``.
     unit : str, optional
         Unit of length in a file that states none, as ``"um"``.
+    height_unit : str, optional
+        Unit of the heights in a file that states none, where it is another than that of x and y: points in mm, mm, um
+        are read by ``unit="mm", height_unit="um"``.
     spacing : float or pair of float, optional
         Cell sides (dx, dy), in place of what the file says. [m]
 
@@ -41,7 +45,8 @@ def open_scan(
     xarray.DataArray
         Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
         is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel,
-        orientation (whether y is known to point up, or the map may be a mirror image) and ``history``.
+        orientation (whether y is known to point up, or the map may be a mirror image) and ``history``. Rows of a matrix
+        in text, CSV or NumPy run along x: row j of the file is ``y[j]``.
 
     Raises
     ------
@@ -54,7 +59,8 @@ def open_scan(
     UserWarning
         If the checksum in an X3P file is wrong.
     """
-    return outline(path, heights=True, format=format, channel=channel, unit=unit, spacing=spacing)
+    options = {"format": format, "channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
+    return outline(path, heights=True, **options)
 
 
 def outline(
@@ -64,6 +70,7 @@ def outline(
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
+    height_unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
     """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
@@ -72,8 +79,9 @@ def outline(
     """
     path = existing(path)
     if is_card(path, format):
-        h = open_card(path, channel=channel, unit=unit, spacing=spacing)
+        h = open_card(path, channel=channel, unit=unit, height_unit=height_unit, spacing=spacing)
         if heights:
             finite(h, str(path))
         return h
-    return read_file(path, heights=heights, format=format, channel=channel, unit=unit, spacing=spacing)
+    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
+    return read_file(path, heights=heights, format=format, **options)

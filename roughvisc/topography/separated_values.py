@@ -1,65 +1,103 @@
-"""Matrices with commas, semicolons or tabs between the numbers, as a text that has blanks there."""
+"""Text scans with commas, semicolons or tabs between the numbers, as a text that has blanks there."""
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from pathlib import Path
 from typing import TextIO
 
 from roughvisc.errors import InputError
+from roughvisc.topography.text_numbers import decimal_mark, plain_number, read_text
 
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
+_NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
+#: What separates -> a row of numbers with decimal points.
+_ROW = {sign: re.compile(rf" *{_NUMBER}(?: *{sign} *{_NUMBER})* *") for sign in ";\t,"}
+_ROW[" "] = re.compile(rf"\s*{_NUMBER}(?:\s+{_NUMBER})*\s*")
+#: What may be a number with a decimal comma where blanks separate.
+_WITH_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
+#: A length with a decimal comma in a line that is none of numbers, such as ``# Width: 12,5 um``.
+_LENGTH = re.compile(r"(?<=[:=])(\s*)(\d[\d.]*,\d+)(?=\s*\w{0,2}m\b)")
 #: What stands for a missing height.
 _MISSING = ("", "nan", "bad", "-", "#n/a", "n/a")
 
 
 def separated_by_blanks(path: Path) -> TextIO:
-    """A file of separated values as a text of numbers with blanks between them.
+    """A file of separated values as a text of numbers with decimal points and blanks between them.
 
     Parameters
     ----------
     path : path
-        Values between commas, semicolons or tabs; with semicolons or tabs a comma may be the decimal sign. Empty
-        values are missing heights. Lines of other text, such as ``# Width: 26 um``, stay as they are.
+        Values between blanks, commas, semicolons or tabs, with a decimal point or a decimal comma. Empty values are
+        missing heights. Lines of other text, such as ``# Width: 26 um``, stay as they are.
 
     Returns
     -------
     file
-        The text, in memory.
+        The text in UTF-8, in memory.
 
     Raises
     ------
+    UnicodeError
+        If it is no text.
     InputError
-        If a line of the matrix holds what is no number.
+        If a line of the matrix holds what is no number, or the decimal mark cannot be told.
     """
-    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    text = read_text(path)
+    lines = text.splitlines()
+    if not all(_ROW[" "].fullmatch(line) or (line[:1] in ("#", "") and "," not in line) for line in lines):
+        text = "\n".join(_rewritten(lines)) + "\n"
+    return io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8")
+
+
+def _rewritten(lines: list[str]) -> list[str]:
+    """Lines with blanks between their numbers, which have decimal points."""
     split = [_values(line) for line in lines]
-    matrix = [values for values in split if _numbers(values)]
+    matrix = [number for number, found in enumerate(split) if _is_row(lines[number], *found)]
     if not matrix:
-        return io.StringIO("\n".join(lines) + "\n")
-    for number, (line, values) in enumerate(zip(lines, split, strict=True), 1):
-        odd = [value for value in values if not _NUMBER.fullmatch(value)]
-        if len(values) == len(matrix[0]) and odd and len(odd) < len(values) and not _numbers(values):
-            raise InputError(f"line {number}: found {odd[0]!r} among numbers ({line[:60]!r}): expected numbers")
-    shown = (" ".join(values) if _numbers(values) else line for line, values in zip(lines, split, strict=True))
-    return io.StringIO("\n".join(shown) + "\n")
+        return lines
+    if all(lines[number].rstrip().endswith(split[number][0]) for number in matrix):  # a separator ends every row
+        split = [(between, values[: max(len(values) - 1, 1)]) for between, values in split]
+    first, (separator, last) = matrix[0], split[matrix[-1]]
+    rows = {number for number, (_, values) in enumerate(split) if values == ["nan"] * len(last)}.union(matrix)
+    cells = [value for number in matrix for value in split[number][1] if "," in value or "." in value]
+    mark = decimal_mark(cells or [found[2] for line in lines for found in _LENGTH.finditer(line)], separator)
+    expected = f"expected numbers with a decimal {'point' if mark == '.' else 'comma'}"
+    for number, (line, (between, values)) in enumerate(zip(lines, split, strict=True)):
+        if mark == "." and _ROW[between].fullmatch(line):
+            lines[number] = line.replace(between, " ")
+            continue
+        plain = [value if value == "nan" else plain_number(value, mark) for value in values]
+        odd = [value for value, found in zip(values, plain, strict=True) if found is None]
+        broken = len(odd) < len(values) == len(last) and (between != " " or number > first) and line[:1] != "#"
+        if odd and (number in rows or broken):
+            raise InputError(f"line {number + 1}: found {odd[0]!r} among numbers ({line[:60]!r}): {expected}")
+        if number in rows:
+            lines[number] = " ".join(map(str, plain))
+        else:
+            lines[number] = _LENGTH.sub(lambda found: found[1] + (plain_number(found[2], mark) or found[2]), line)
+    return lines
 
 
-def _values(line: str) -> list[str]:
-    """The values of a line, ``nan`` where one is missing; one value where it has no separators."""
-    separator = next((sign for sign in ";\t," if sign in line), None)
-    if separator is None:
-        return [line]
-    values = [value.strip().strip('"') for value in line.strip(" \r\n").split(separator)]
-    if values[-1] == "":  # a separator at the end of the line
-        values.pop()
-    if separator != ",":
-        values = [value.replace(",", ".") for value in values]
-    return ["nan" if value.lower() in _MISSING else value for value in values]
+def _values(line: str) -> tuple[str, list[str]]:
+    """What separates the values of a line, and these, ``nan`` where one is missing."""
+    separator = next((sign for sign in ";\t," if sign in line), " ")
+    cells = line.split()
+    if separator == "," and len(cells) > 1 and all(map(_WITH_COMMA.fullmatch, cells)):
+        separator = " "
+    if separator != " ":
+        quoted = '"' in line
+        cells = (
+            next(csv.reader([line], delimiter=separator, skipinitialspace=True)) if quoted else line.split(separator)
+        )
+        cells = [cell.strip() for cell in cells]
+    return separator, ["nan" if cell.lower() in _MISSING else cell for cell in cells]
 
 
-def _numbers(values: list[str]) -> bool:
-    """Whether values are two numbers at least, or missing ones among numbers."""
+def _is_row(line: str, separator: str, values: list[str]) -> bool:
+    """Whether the values of a line are two numbers at least, or missing ones among numbers."""
+    if len(values) < 2 or _ROW[separator].fullmatch(line):
+        return len(values) > 1
     known = [value for value in values if value != "nan"]
-    return len(values) > 1 and bool(known) and all(_NUMBER.fullmatch(value) for value in known)
+    return bool(known) and all(plain_number(value, ".") or plain_number(value, ",") for value in known)

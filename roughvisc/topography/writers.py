@@ -84,7 +84,8 @@ def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], opti
     folder : path
         Where the card is going to be: the file is named relative to it.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened; None where
+        it does not.
 
     Raises
     ------
@@ -96,7 +97,7 @@ def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], opti
         raise InputError(f"{file}: is a surface card already: expected a scan file")
     lines = [f"title = {_text(file.stem)}", f"file = {_text(Path(os.path.relpath(file, folder)).as_posix())}"]
     lines.append(f"sha256 = {_text(sha256(file))}")
-    for key in ("format", "channel", "unit", "spacing"):
+    for key in ("format", "channel", "unit", "height_unit", "spacing"):
         value = options.get(key)
         if value is not None:
             lines.append(f"{key} = {_text(value) if isinstance(value, str) else _numbers(value)}")
@@ -132,7 +133,8 @@ def surface_table(
     folder : path
         Where the study is going to be: a file below it is named relative to it, any other by its whole path.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened; None where
+        it does not.
     steps : mapping
         Conditioning steps, as :func:`~roughvisc.topography.cards.condition` takes them. [m]
     remarks : mapping, optional
@@ -141,7 +143,7 @@ def surface_table(
     file, remarks = Path(file), remarks or {}
     near = Path(os.path.relpath(file, folder))
     entries = {"file": _text((file.resolve() if near.parts[0] == ".." else near).as_posix())}
-    for key in ("format", "channel", "unit"):
+    for key in ("format", "channel", "unit", "height_unit"):
         if options.get(key) is not None:
             entries[key] = _text(options[key]) if isinstance(options[key], str) else str(options[key])
     if options.get("spacing") is not None:

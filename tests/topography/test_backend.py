@@ -54,7 +54,7 @@ def test_engine__opens_cards_and_takes_the_options_of_open_scan(tmp_path):
     xr.testing.assert_identical(lazily(path), open_scan(path))
     np.save(tmp_path / "scan.npy", tilted())
     h = lazily(tmp_path / "scan.npy", unit="um", spacing=CELL)
-    np.testing.assert_allclose(h, tilted() * 1e-6)
+    np.testing.assert_allclose(h, tilted().T * 1e-6)
     assert "height" not in xr.open_dataset(path, engine=RoughviscBackend, drop_variables="height")
     with pytest.raises(InputError, match=r"scan\.npy: it states no unit"):
         lazily(tmp_path / "scan.npy")

@@ -122,6 +122,85 @@ def test_points__are_placed_by_their_coordinates_in_any_order(tmp_path):
         np.testing.assert_allclose(spacing(h), CELL, rtol=1e-6)
 
 
+def test_points__have_heights_in_a_unit_of_their_own(tmp_path):
+    """x and y in mm, heights in um, as profilometers export them; the lines are shuffled."""
+    path = write_xyz(tmp_path / "scan.xyz", 1e3 * tilted(missing=False))
+    h = open_scan(path, unit="mm", height_unit="um")
+    np.testing.assert_allclose(h, 1e-3 * tilted(missing=False), rtol=1e-8)
+    np.testing.assert_allclose(spacing(h), (2e-9, 3e-9), rtol=1e-6)
+    lazily = xr.open_dataarray(path, engine=RoughviscBackend, unit="mm", height_unit="um")
+    xr.testing.assert_identical(lazily.load(), h)
+    assert "no unit of x and y: pass unit=" in refusal(path, height_unit="um")
+    np.testing.assert_allclose(spacing(open_scan(path, height_unit="um", spacing=CELL)), CELL)
+    with pytest.raises(InputError, match="height_unit is '1 s'"):
+        open_scan(path, unit="mm", height_unit="s")
+
+
+def test_height_unit__in_a_grid_file_counts_where_it_states_none(tmp_path):
+    h = from_array(tilted(), CELL)
+    path = tmp_path / "scan.nc"
+    bare = xr.DataArray(h.values, dims=("x", "y"), coords={axis: 1e3 * h[axis].values for axis in "xy"}, name="height")
+    bare.to_netcdf(path)
+    found = open_scan(path, unit="mm", height_unit="um")
+    np.testing.assert_allclose(found, 1e-6 * tilted())
+    np.testing.assert_allclose(spacing(found), CELL)
+    bare.assign_attrs(units="um").to_netcdf(path)
+    np.testing.assert_allclose(open_scan(path, unit="mm"), 1e-6 * tilted())
+    assert "heights are in 'um'" in refusal(path, unit="mm", height_unit="nm")
+    h.to_netcdf(path)
+    assert "leave height_unit= out" in refusal(path, height_unit="um")
+
+
+def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):
+    """26 um and 27 um stay what they are, whatever unit the heights have."""
+    path = write_text(tmp_path / "scan.txt", header="# Width: 26 µm\n# Height: 27.0 µm\n")
+    for options in ({"unit": "nm"}, {"height_unit": "nm"}):
+        h = open_scan(path, **options)
+        np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
+        np.testing.assert_allclose(h, 1e-9 * tilted(missing=False), rtol=1e-9)
+    assert "it states the unit of x and y" in refusal(path, unit="mm", height_unit="nm")
+    path.write_text(path.read_text().replace(".", ",").replace("26 ", "26,0 "))
+    np.testing.assert_array_equal(open_scan(path, unit="nm"), h)
+    path.write_text("# Width: 2,5 µm\n# Height: 7,5 µm\n" + "1 2 3 4 5\n" * 5)  # the header alone has decimals
+    np.testing.assert_allclose(spacing(open_scan(path, unit="nm")), (5e-7, 1.5e-6), rtol=1e-12)
+
+
+def test_matrix__lies_the_same_way_in_text_and_in_numpy(tmp_path):
+    """A letter as it is written, first line first: rows run along x in every file of a matrix."""
+    letter = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], float)
+    np.save(tmp_path / "f.npy", letter)
+    for name, separator in (("f.csv", ","), ("f.txt", " ")):
+        np.savetxt(tmp_path / name, letter, delimiter=separator)
+    for name, kind in (("f.npy", "NumPy array"), ("f.csv", "CSV matrix"), ("f.txt", "text matrix")):
+        h = open_scan(tmp_path / name, unit="um", spacing=(1e-6, 2e-6))
+        assert h.sizes == {"x": 4, "y": 5}
+        np.testing.assert_allclose([h.sel(y=y) for y in h.y], 1e-6 * letter)
+        assert f"{kind}, its rows are taken to run along x and the first to be y = 0" in h.attrs["orientation"]
+        message = refusal(tmp_path / name)
+        assert "no unit of its heights and no size: pass unit=" in message
+        assert "and pass spacing=" in message
+
+
+@pytest.mark.parametrize(
+    ("rows", "found"),
+    [("1 2 3\n4 six 6\n7 8 9", "six"), ("1 2 3\n4 1.2.3 6\n7 8 9", "1.2.3"), ("1;2;3\n4;1-2;6\n7;8;9", "1-2")],
+)
+def test_matrix__with_a_broken_row_is_refused_and_not_read_without_it(rows, found, tmp_path):
+    for suffix in ("txt", "csv"):
+        path = tmp_path / f"scan.{suffix}"
+        path.write_text(rows + "\n1 1 1\n")
+        assert f"line 2: found {found!r} among numbers" in refusal(path, unit="um", spacing=1e-6)
+
+
+def test_matrix__of_which_a_row_is_missing_as_a_whole_keeps_it(tmp_path):
+    for name, row in (("scan.csv", ";;;"), ("scan.txt", "nan nan nan nan")):
+        separator = row[0] if row[0] == ";" else " "
+        lines = [separator.join("1234"), row, separator.join("5678"), row]
+        (tmp_path / name).write_text("\n".join(lines) + "\n")
+        h = open_scan(tmp_path / name, unit="um", spacing=1e-6)
+        np.testing.assert_array_equal(np.isnan(h), np.broadcast_to([False, True, False, True], (4, 4)))
+
+
 def test_spacing__is_size_over_number(tmp_path):
     """A text matrix of 13 x 9 points that states 26 um x 27 um: 2 um and 3 um, not 26/12 and 27/8."""
     np.testing.assert_allclose(spacing(open_scan(write_text(tmp_path / "scan.txt"))), CELL, rtol=1e-12)

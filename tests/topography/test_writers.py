@@ -59,7 +59,7 @@ def test_card_text__makes_a_card_that_opens_as_the_file(tmp_path):
 
 def test_card_text__states_the_options_that_the_file_needs(tmp_path):
     np.save(tmp_path / "scan.npy", tilted())
-    options = {"unit": "um", "spacing": CELL, "format": "npy", "channel": 0}
+    options = {"unit": "mm", "height_unit": "um", "spacing": CELL, "format": "npy", "channel": 0}
     (tmp_path / "card.toml").write_text(card_text(tmp_path / "scan.npy", tmp_path, options))
     xr.testing.assert_equal(rv.open_scan(tmp_path / "card.toml"), rv.open_scan(tmp_path / "scan.npy", **options))
 

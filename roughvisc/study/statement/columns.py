@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from roughvisc.errors import InputError
 from roughvisc.topography.readers import regular
+from roughvisc.topography.text_numbers import decimal_mark, plain_number, read_text
 from roughvisc.units import quantity
 
 _HEADING = re.compile(r"\s*(?P<name>[^\[\(]*?)\s*(?:[\[\(]\s*(?P<unit>.*?)\s*[\]\)])?\s*")
@@ -30,9 +32,10 @@ def read_columns(
     Parameters
     ----------
     path : path
-        A CSV file of numbers, with commas, semicolons or tabs between them. Lines that begin with ``#`` are comments.
-        The first line may be a heading, ``time [ms], load [N]``: the columns are then found by name, in any order,
-        and converted; without one they are taken in the order of `units`, in SI.
+        A CSV file of numbers, with commas, semicolons or tabs between them, and a decimal point or a decimal comma.
+        Lines that begin with ``#`` are comments. The first line may be a heading, ``time [ms], load [N]``: the columns
+        are then found by name, in any order, and converted; without one they are taken in the order of `units`, in SI,
+        and there are no others.
     units : mapping of str to str
         Name of each column wanted, and the unit it is wanted in.
     given : mapping of str to str, optional
@@ -48,56 +51,59 @@ def read_columns(
     Raises
     ------
     InputError
-        If the file cannot be read, a column is missing, a unit does not fit, or a cell is no finite number; the
-        line is named.
+        If the file cannot be read, holds no rows, a column is missing, a unit does not fit, a row has more cells than
+        there are columns, or a cell is no finite number; the line is named.
     """
-    lines = _lines(Path(path))
+    separator, lines = _lines(Path(path))
     if not lines:
         raise InputError(f"{path}: holds no rows: expected columns {', '.join(units)}")
-    number, heading = lines[0]
-    headed = not _is_number(heading[0])
+    top, heading = lines[0]
+    headed = all(plain_number(heading[0], mark) is None for mark in ".,")
     names = [name for name in units if headed or name not in optional]
     places: list[int | None] = list(range(len(names)))
     stated: list[str | None] = [None] * len(names)
     if headed:
         places, stated = _from_heading(path, heading, names, optional)
         lines = lines[1:]
+        if not lines:
+            raise InputError(f"{path}: holds no rows below the heading in line {top}: expected {', '.join(names)}")
+    wanted = [place for place in places if place is not None]
+    try:
+        mark = decimal_mark((cells[place] for _, cells in lines for place in wanted if place < len(cells)), separator)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    width = len(heading) if headed else len(names)
     given = given or {}
     factors = [_factor(path, n, own, given.get(n), units[n]) for n, own in zip(names, stated, strict=True)]
     columns: dict[str, list[float]] = {name: [] for name in units}
     for number, cells in lines:
+        if any(cells[width:]):
+            raise InputError(f"{path}, line {number}: found {len(cells)} cells: expected {width}, one for each column")
         for name, place, factor in zip(names, places, factors, strict=True):
             if place is None:
                 continue
-            if place >= len(cells) or not _is_number(cells[place]):
+            value = float(plain_number(cells[place], mark) or "nan") if place < len(cells) else math.nan
+            if not math.isfinite(value):
                 found = repr(cells[place]) if place < len(cells) else f"{len(cells)} columns"
                 raise InputError(f"{path}, line {number}: found {found}: expected a number for {name}")
-            columns[name].append(float(f"{float(cells[place]) * factor:.15g}"))
+            columns[name].append(float(f"{value * factor:.15g}"))
     return tuple(columns.values())
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Rows of cells with their line numbers, without blank lines and comments."""
+def _lines(path: Path) -> tuple[str, list[tuple[int, list[str]]]]:
+    """What separates the cells, and rows of cells with their line numbers, without blank lines and comments."""
     try:
         regular(path)
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_text(path)
+    except (OSError, UnicodeError) as error:
         raise InputError(f"{path}: cannot be read as a CSV file: {error}") from error
     kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     separator = next((mark for mark in (";", "\t", ",") if kept and mark in kept[0][1]), ",")
     rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
     try:
-        return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+        return separator, [(i, [cell.strip() for cell in row]) for (i, _), row in zip(kept, rows, strict=False)]
     except csv.Error as error:  # a cell without end
         raise InputError(f"{path}: cannot be read as a table: {error}") from error
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        quantity(float(cell), "1")  # refuses nan and inf
-    except ValueError:
-        return False
-    return True
 
 
 def _from_heading(

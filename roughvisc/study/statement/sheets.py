@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.topography.readers import regular
+from roughvisc.topography.text_numbers import decimal_mark, plain_number, read_text
 from roughvisc.units import is_quantity, quantity
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[\(]\s*(?P<unit>[^\[\]\(\)]*?)\s*[\]\)]")
@@ -22,8 +24,6 @@ _BETWEEN = (" in ", "/", ",", "_", " ")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 #: lines that a heading is sought in
 _FIRST = 200
-#: thousands are grouped by any of these beside the other decimal mark
-_GROUPING = str.maketrans("", "", " '\u00a0\u202f")
 
 Row = tuple[int, list[str]]
 
@@ -63,26 +63,39 @@ def read_sheet(
         If the file cannot be read, a column or its unit is not found, or a cell is no number; the line is named.
     """
     path = Path(path)
-    rows = _rows(path)
+    separator, rows = _rows(path)
     at, places = _heading(path, rows, wanted)
     below = at + 1 < len(rows) and not any(_is_number(_cell(rows[at + 1][1], place)) for place in places.values())
     data = rows[at + 1 + below :]
     if not data:
         raise InputError(f"{path}: holds no rows below the heading in line {rows[at][0]}: expected numbers")
+    width = len(rows[at][1])
+    for line, row in data:
+        if any(row[width:]) or (separator == " " and len(row) != width):
+            raise InputError(
+                f"{path}, line {line}: found {len(row)} cells under a heading of {width}: expected as many"
+            )
+    mark = decimal or _decimal_mark(
+        path, [_cell(row, place) for _, row in data for place in places.values()], separator
+    )
     columns = {}
     for key, place in places.items():
         heading = rows[at][1][place].strip()
         stated = _cell(rows[at + 1][1], place) if below else ""
         factor = _factor(path, key, wanted[key], heading, stated)
         cells = [_cell(row, place) for _, row in data]
-        numbers = _numbers(path, key, heading, cells, [line for line, _ in data], decimal)
+        numbers = _numbers(path, key, heading, cells, [line for line, _ in data], mark)
         columns[key] = np.array([float(f"{number * factor:.15g}") for number in numbers])
     return columns, [line for line, _ in data]
 
 
-def _rows(path: Path) -> list[Row]:
-    """Rows of cells with their line numbers, without blank lines and comments."""
-    text = _text(path)
+def _rows(path: Path) -> tuple[str, list[Row]]:
+    """What separates the cells, and rows of cells with their line numbers, without blank lines and comments."""
+    try:
+        regular(path)
+        text = read_text(path)
+    except (OSError, UnicodeError) as error:
+        raise InputError(f"{path}: cannot be read as a table: {error}") from error
     kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if not kept:
         raise InputError(f"{path}: holds no rows: expected a heading and numbers")
@@ -90,26 +103,11 @@ def _rows(path: Path) -> list[Row]:
     separator = next((mark for mark in (";", "\t") if mark in last), ",")
     blanks = last.split()
     if separator == "," and len(blanks) > 1 and all(_NUMBER.fullmatch(cell) for cell in blanks):
-        return [(i, line.split()) for i, line in kept]
+        return " ", [(i, line.split()) for i, line in kept]
     rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
     try:
-        return [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
+        return separator, [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
     except csv.Error as error:  # a cell without end
-        raise InputError(f"{path}: cannot be read as a table: {error}") from error
-
-
-def _text(path: Path) -> str:
-    """The text of a file in the encodings that Windows programs write."""
-    try:
-        regular(path)
-        raw = path.read_bytes()
-        if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return raw.decode("utf-16")
-        try:
-            return raw.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            return raw.decode("cp1252")
-    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a table: {error}") from error
 
 
@@ -118,7 +116,7 @@ def _cell(row: Sequence[str], place: int) -> str:
 
 
 def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell.translate(_GROUPING)) is not None
+    return any(plain_number(cell.strip(), mark) is not None for mark in ".,")
 
 
 def _named(text: str) -> str:
@@ -178,35 +176,20 @@ def _factor(path: Path, key: str, one: Wanted, heading: str, below: str) -> floa
     return quantity(f"1 {unit}", one.unit, f"{path}: unit of column {heading!r}")
 
 
-def _numbers(
-    path: Path, key: str, heading: str, cells: Sequence[str], lines: Sequence[int], decimal: str | None
-) -> list[float]:
+def _numbers(path: Path, key: str, heading: str, cells: Sequence[str], lines: Sequence[int], mark: str) -> list[float]:
     """Numbers of a column."""
-    cells = [cell.translate(_GROUPING) for cell in cells]
-    mark = decimal or _decimal_mark(path, key, heading, cells)
-    other = "," if mark == "." else "."
-    plain = [cell.replace(other, "").replace(mark, ".") for cell in cells]
-    for line, cell, text in zip(lines, cells, plain, strict=True):
-        if _NUMBER.fullmatch(text) is None:
+    numbers = [float(plain_number(cell, mark) or "nan") for cell in cells]
+    for line, cell, number in zip(lines, cells, numbers, strict=True):
+        if not math.isfinite(number):
             raise InputError(f"{path}, line {line}: found {cell!r}: expected a number for {key} ({heading})")
-    return [float(text) for text in plain]
+    return numbers
 
 
-def _decimal_mark(path: Path, key: str, heading: str, cells: Sequence[str]) -> str:
-    """The decimal mark of a column: where both marks stand in a number the last one, otherwise the only one."""
-    commas = [cell for cell in cells if "," in cell]
-    if not commas:
-        return "."
-    both = next((cell for cell in commas if "." in cell), None)
-    if both is not None:
-        return max(".,", key=both.rfind)
-    points = next((cell for cell in cells if "." in cell), None)
-    if points is not None:
-        raise InputError(
-            f"{path}: column {heading!r} ({key}) holds {commas[0]!r} and {points!r}: expected one decimal mark, or "
-            "decimal = ',' or decimal = '.'"
-        )
-    return "." if any(cell.count(",") > 1 for cell in commas) else ","
+def _decimal_mark(path: Path, cells: Sequence[str], separator: str) -> str:
+    try:
+        return decimal_mark(cells, separator)
+    except InputError as error:
+        raise InputError(f"{path}: {error}, or decimal = ',' or decimal = '.'") from None
 
 
 def as_wanted(column: Any, unit: str) -> Wanted:

@@ -14,6 +14,8 @@ from roughvisc.views.console.tables import readable
 
 #: What is to be done where nothing is.
 _NOTHING = "nothing to do"
+#: Root mean square slope above which a unit or the spacing is mostly wrong. [-]
+_STEEP = 1.0
 
 
 def advice_table(found: Inspection) -> Group:
@@ -42,6 +44,7 @@ def advice(found: Inspection) -> Iterator[tuple[str, str, str]]:
     yield _tilt(found)
     yield _form(found)
     yield _borders(found)
+    yield _slope(found)
     yield from _noise(found)
 
 
@@ -123,6 +126,18 @@ def _borders(found: Inspection) -> tuple[str, str, str]:
             ),
         )
     return "Borders", seen, 'boundary = "periodic" as it is: neither mirror nor taper'
+
+
+def _slope(found: Inspection) -> tuple[str, str, str]:
+    seen = f"the rms slope is {found.rms_slope:.2g} after these steps"
+    if found.rms_slope <= _STEEP:
+        return "Slope", seen, _NOTHING
+    return (
+        "Slope",
+        f"{seen}, which is steeper than 45°: hardly a measured surface is",
+        "check the units of x, y and of the heights, and the spacing: one of them is mostly wrong; if they are right, "
+        "the small slopes that contact of half-spaces supposes are not there",
+    )
 
 
 def _noise(found: Inspection) -> Iterator[tuple[str, str, str]]:

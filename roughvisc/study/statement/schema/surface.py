@@ -79,12 +79,14 @@ class FromFile(Raw):
     format: optional(Text) = None
     channel: either(_channel, ["string", "integer"], _CHANNEL) = None
     unit: optional(Text) = None
+    height_unit: optional(Text) = None
     spacing: optional(SIZE) = None
 
     def raw(self) -> xr.DataArray:
         from roughvisc.topography.scans import open_scan
 
-        return open_scan(self.file, format=self.format, channel=self.channel, unit=self.unit, spacing=self.spacing)
+        keys = ("format", "channel", "unit", "height_unit", "spacing")
+        return open_scan(self.file, **{key: getattr(self, key) for key in keys})
 
 
 class FromRecipe(Raw):

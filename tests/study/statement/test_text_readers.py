@@ -1,0 +1,221 @@
+"""Every reader of text on the same numbers: encodings, separators, decimal marks. Right, or refused by name."""
+
+import codecs
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.statement.columns import read_columns
+
+#: Numbers that show a lost mark, sign or row; as they are written with a decimal point.
+TIMES, VALUES = ("0", "0.5", "2.25", "10.125"), ("0", "1.5", "1200.75", "3.0625")
+HEIGHTS = [[f"{-0.25 + 1.5 * i + 0.125 * j * j:.3f}" for i in range(5)] for j in range(4)]  # line j, column i
+ENCODINGS = {
+    "UTF-8": str.encode,
+    "UTF-8 with its mark": lambda text: text.encode("utf-8-sig"),
+    "UTF-16 little": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
+    "UTF-16 big": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
+    "Windows-1252": lambda text: text.encode("cp1252"),
+    "CRLF": lambda text: text.replace("\n", "\r\n").encode(),
+    "empty last line": lambda text: f"{text}\n\n".encode(),
+    "no last line break": lambda text: text.rstrip("\n").encode(),
+}
+#: separator, decimal mark
+STYLES = [(",", "."), (";", "."), ("\t", "."), (" ", "."), (";", ","), ("\t", ","), (" ", ","), ('","', ",")]
+
+
+def written(rows, separator, mark):
+    """Rows as text; with a separator that holds quotation marks, each cell between them."""
+    quote = '"' if '"' in separator else ""
+    return "".join(f"{quote}{separator.join(row).replace('.', mark)}{quote}\n" for row in rows)
+
+
+def table(*heading):
+    return lambda _: [*([heading] if heading else []), *zip(TIMES, VALUES, strict=True)]
+
+
+def points(_):
+    return [(f"{0.5 * i:.2f}", f"{1.5 * j:.2f}", z) for j, line in enumerate(HEIGHTS) for i, z in enumerate(line)]
+
+
+def of_program(path):
+    program = rv.read_program(path, time="t", load="F", thin=0, start="first")
+    return np.array([segment.end for segment in program.segments])
+
+
+SCAN = 1e-6 * np.array(HEIGHTS, float).T  # [m]
+#: name -> suffix, rows, what reads them, and the numbers that come out
+READERS = {
+    "columns by name": (
+        "csv",
+        table("time [s]", "load [N]"),
+        lambda path: np.array(read_columns(path, {"load": "N", "time": "s"})),
+        np.array([VALUES, TIMES], float),
+    ),
+    "columns in order": (
+        "csv",
+        table(),
+        lambda path: np.array(read_columns(path, {"time": "s", "load": "N"})),
+        np.array([TIMES, VALUES], float),
+    ),
+    "history of a machine": ("txt", table("t[s]", "F[N]"), of_program, np.array(VALUES[1:], float)),
+    **{
+        f"matrix in {suffix}": (
+            suffix,
+            lambda _: HEIGHTS,
+            lambda path: rv.open_scan(path, unit="um", spacing=1e-6).values,
+            SCAN,
+        )
+        for suffix in ("csv", "txt", "asc", "dat")
+    },
+    **{
+        f"points in {suffix}": (
+            suffix,
+            points,
+            lambda path: rv.open_scan(path, unit="mm", height_unit="um").values,
+            SCAN,
+        )
+        for suffix in ("csv", "txt", "xyz")
+    },
+}
+#: What has no blanks between its cells, and is refused where it finds them.
+NO_BLANKS = ("columns by name", "columns in order")
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_path):
+    suffix, rows, read, expected = READERS[reader]
+    path = tmp_path / f"numbers.{suffix}"
+    for separator, mark in STYLES:
+        text = written(rows(separator), separator, mark)
+        if separator == " " and reader in NO_BLANKS:
+            path.write_text(text)
+            with pytest.raises(InputError, match=r"numbers\.csv"):
+                read(path)
+            continue
+        for name, encode in ENCODINGS.items():
+            path.write_bytes(encode(text))
+            np.testing.assert_allclose(read(path), expected, rtol=1e-12, err_msg=f"{separator!r} {mark} {name}")
+        path.write_bytes(text.encode("utf-16-le"))  # without its mark
+        with pytest.raises(InputError, match=r"numbers\.\w+: .*zero bytes"):
+            read(path)
+
+
+#: damage -> separator, decimal mark, and the last cell
+DAMAGE = {
+    "decimal commas between commas": (",", ",", None),
+    "two marks": (";", ",", "3.0625"),
+    "a word": (";", ",", "six"),
+    "two marks in one number": (";", ",", "1,5.25"),
+}
+
+
+@pytest.mark.parametrize(
+    ("reader", "damage"),
+    # a matrix with decimal commas between commas is the same text as one of twice as many whole numbers
+    [(r, d) for r in READERS for d in DAMAGE if "matrix" not in r or d != "decimal commas between commas"],
+)
+def test_text__that_is_ambiguous_or_damaged_is_refused(reader, damage, tmp_path):
+    suffix, rows, read, _ = READERS[reader]
+    separator, mark, last = DAMAGE[damage]
+    text = written(rows(separator), separator, mark).rstrip("\n")
+    path = tmp_path / f"numbers.{suffix}"
+    path.write_text(f"{text.rpartition(separator)[0]}{separator}{last}\n" if last else text)
+    with pytest.raises(InputError, match=r"numbers\.\w+"):
+        read(path)
+
+
+@pytest.mark.parametrize("heading", ["time;load\n", "# made by hand\ntime;load", "time [ms],load [mN]\r\n\r\n"])
+def test_heading_without_rows__says_what_is_expected(heading, tmp_path):
+    path = tmp_path / "empty.csv"
+    path.write_text(heading)
+    with pytest.raises(
+        InputError, match=r"empty\.csv: holds no rows below the heading in line \d: expected time, load"
+    ):
+        read_columns(path, {"time": "s", "load": "N"})
+    path.write_text("# nothing but a comment\n")
+    with pytest.raises(InputError, match=r"empty\.csv: holds no rows: expected columns time, load"):
+        read_columns(path, {"time": "s", "load": "N"})
+
+
+STUDY = """
+[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.2 mm"
+shape = [9, 7]
+[material]
+MATERIAL
+[[program]]
+PROGRAM
+"""
+_ELASTIC, _LOAD = 'model = "elastic"\nshear_modulus = "1 MPa"', 'load = "1 mN"\nover = 0'
+
+
+@pytest.mark.parametrize(
+    ("material", "program", "heading", "key"),
+    [
+        ('model = "tabulated"\nfile = "t.csv"', _LOAD, "time,compliance", "material.file"),
+        ('model = "relaxation_table"\nfile = "t.csv"', _LOAD, "time,modulus", "material.file"),
+        (
+            'model = "dynamic"\nfrequency_unit = "Hz"\nfile = "t.csv"',
+            _LOAD,
+            "frequency,storage,loss",
+            "material.file",
+        ),
+        (_ELASTIC, 'table = "t.csv"', "time,load", "program.0.table"),
+        (_ELASTIC, 'table = { file = "t.csv" }', "time [s],load [N]", "program.0.table"),
+    ],
+)
+def test_heading_without_rows__is_refused_by_key_and_file(material, program, heading, key, tmp_path):
+    (tmp_path / "t.csv").write_text(f"{heading}\n")
+    (tmp_path / "study.toml").write_text(STUDY.replace("MATERIAL", material).replace("PROGRAM", program))
+    with pytest.raises(InputError, match=rf"{key}: .*t\.csv: holds no rows below the heading in line 1"):
+        rv.read_study(tmp_path / "study.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("0,0\n1,5,2,5\n", "line 2: found 4 cells: expected 2"),
+        ("time,load\n0,0\n1,5,2,5\n", "line 3: found 4 cells: expected 2"),
+        ('"1,250","2,000"\n"3,125","1,500"\n', "holds '1,250', which may have a decimal comma or be thousands"),
+        ("0;1,5\n1;2.25\n", "holds '1,5' and '2.25': expected one decimal mark"),
+        ("0;1e999\n1;2\n", "line 1: found '1e999': expected a number for load"),
+    ],
+)
+def test_columns__that_could_be_other_numbers_are_refused(text, found, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        read_columns(path, {"time": "s", "load": "N"})
+    assert str(refused.value).startswith(f"{path}")
+    assert found in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("t [s],F [N]\n0,0\n1,5,2,5\n", "line 3: found 4 cells under a heading of 2"),
+        ("Test t[s] F[N] Path\n0 0 7\n1 2 8\n", "found 3 cells under a heading of 4"),
+        ("t [s];F [N]\n0;0\n1;1e999\n", "line 3: found '1e999': expected a number for load"),
+    ],
+)
+def test_history__whose_cells_do_not_fit_its_heading_is_refused(text, found, tmp_path):
+    path = tmp_path / "machine.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        rv.read_program(path, time="t", load="F")
+    assert str(refused.value).startswith(f"{path}")
+    assert found in str(refused.value)
+
+
+def test_history__with_a_stated_decimal_mark_refuses_what_has_another(tmp_path):
+    path = tmp_path / "machine.csv"
+    path.write_text("t [s];F [N]\n0;0\n1;2.5\n")
+    with pytest.raises(InputError, match=r"line 3: found '2\.5': expected a number for load"):
+        rv.read_program(path, time="t", load="F", decimal=",")
+    path.write_text("t [s];F [N]\n0;0\n1;1.250,5\n")
+    assert rv.read_program(path, time="t", load="F", decimal=",").segments[-1].end == 1250.5
