@@ -26,7 +26,12 @@ def is_outgrown(scene: Scene, instant: Instant) -> bool:
 
 def at_edge(scene: Scene, contact: Sparse) -> bool:
     """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
-    if scene.halfspace.boundary != "free" or scene.accept_edge:
+    return not scene.accept_edge and at_border(scene, contact)
+
+
+def at_border(scene: Scene, contact: Sparse) -> bool:
+    """Whether there is pressure at the border of a free-space domain."""
+    if scene.halfspace.boundary != "free":
         return False
     pressure = contact.field()
     borders = (-1,) if scene.halfspace.mirrored else (0, -1)

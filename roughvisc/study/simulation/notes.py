@@ -101,6 +101,20 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
     return note + " Use mirror = true or taper under [surface]."
 
 
+def edge_note(time: float) -> str:
+    """What to say of contact that came to the border of a free-space domain, as ``edge = "accept"`` allows.
+
+    Parameters
+    ----------
+    time : float
+        End of the first step in which it was there. [s]
+    """
+    return (
+        f"Contact came to the border of the surface, found first in the step to {time:.3g} s: there the surface acts as "
+        'a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "accept").'
+    )
+
+
 def body_note(
     kernel: Kernel, settings: Settings, size: tuple[float, float], compliance: float, force: float, approach: float
 ) -> str:

@@ -16,6 +16,7 @@ from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
 from roughvisc.mechanics.stepping.attempt import segment_number
+from roughvisc.mechanics.stepping.domain import at_border
 from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.friction_rows import friction_row
 from roughvisc.study.simulation.mirror import quarter, unfold
@@ -58,6 +59,9 @@ class Rows:
         self._settings = settings
         self._store = store
         self.series_error = series_error
+        earlier = (plain.get("border") for plain in store.plain)
+        #: When contact was found at the border of a free-space domain first, where that is accepted. [s]
+        self.border: float | None = next((time for time in earlier if time is not None), None)
         single = settings.tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, ground.kernel, single=single))
         self._mean_influence = lru_cache(maxsize=2)(
@@ -66,6 +70,11 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self._kept())
+
+    def watch_border(self, step: Step) -> None:
+        """Note when contact comes to the border of a free-space domain, in a step that is kept or not."""
+        if self.border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
+            self.border = float(step.shown.time)
 
     def add(self, step: Step, converged: bool, wall_time: float, kept: bool = True) -> None:
         """Take up an accepted step; ``converged``: all of those since the last one that is kept."""
@@ -101,7 +110,7 @@ class Rows:
             **friction_row(step),
         }
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
-        self._store.append({"row": row, "grid": grid, "kept": kept}, _of_their_own(arrays))
+        self._store.append({"row": row, "grid": grid, "kept": kept, "border": self.border}, _of_their_own(arrays))
 
     def _kept(self) -> list[int]:
         """Numbers of the steps that are kept."""

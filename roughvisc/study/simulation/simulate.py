@@ -26,7 +26,7 @@ from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.grid_error import with_grid_error
 from roughvisc.study.simulation.malloc import keeping
-from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, left_out, slope_note
+from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, edge_note, left_out, slope_note
 from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
 from roughvisc.study.simulation.scene import Ground, follows, prepare
@@ -95,7 +95,8 @@ def simulate(
     missing : {"refuse", "absent"}
         Missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
-        In free space, whether contact may reach the border of the grid.
+        In free space, whether contact may reach the border of the grid. Where it is accepted, the attribute ``edge``
+        of the result says so, and ``edge_note`` when contact came to the border, where the surface acts as a punch.
     memory : {"auto", "direct"}
         ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
     grid_error : bool
@@ -232,6 +233,8 @@ def _press(
         "accuracy_note": accuracy_note(scene, dataset),
         "slope_note": _slope_note(ground, settings, dataset),
         "border_note": _border_note(ground, settings, dataset),
+        "edge": "accept" if settings.edge == "accept" else "",
+        "edge_note": _edge_note(rows.border),
         "left_out": left_out(choice, settings, followed, ground.mirrored),
         **_for_the_audit(scene, height, material),
     }
@@ -275,6 +278,7 @@ def _march(
     every = scene.times is None
     kept = set(scene.program.corners if scene.times is None else scene.times)
     for step in march(scene, reached.state) if settings.method == "fast" else march_seed(scene):
+        rows.watch_border(step)
         reached = reached.after(step, ground.growths, spent + time.perf_counter())
         # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
         if step.shown.time in kept or (every and keeps_its_word(step, rows.series_error)):
@@ -313,4 +317,13 @@ def _border_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str
     note = border_note(ground.height, dataset)
     if note:
         log.warning("%s", note)
+    return note
+
+
+def _edge_note(time: float | None) -> str:
+    """What to say of contact at the border of a free-space domain, in the log too."""
+    if time is None:
+        return ""
+    note = edge_note(time)
+    log.warning("%s", note)
     return note

@@ -52,6 +52,7 @@ _NOTES = (
     "octave_note",
     "slope_note",
     "border_note",
+    "edge_note",
     "body_note",
 )
 #: Parameters shown, with the name of each.

@@ -1,5 +1,7 @@
 """What a result says of its own accuracy, in words."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,35 @@ def test_border_note__is_of_periodic_surfaces_that_repeat_with_a_step(caplog):
     assert f"carry {float(max(seam) / ds.pressure[-1].mean()):.2g} times the mean pressure" in note
     for height, boundary in ((ROUGH, "periodic"), (rv.mirror(part), "periodic"), (part, "free")):
         assert "border_note" not in pressed(height, boundary).attrs
+
+
+def ball_pressed(depth, **options):
+    """A ball over a square of 17 x 15 cells; its contact is within it to about the depth of the middle of a side."""
+    ball = rv.sphere(radius=1e-3, size=(17e-6, 15e-6), shape=(17, 15), exact=False)
+    program = rv.Program().approach(depth, over=1.0).approach(1e-10, over=1.0)
+    with_defaults = {"boundary": "free", "times": [0.1, 2.0], "time_step": 0.05} | options
+    return rv.simulate(ball, rv.elastic(1e6), program, progress=False, **with_defaults)
+
+
+def test_edge_note__says_when_contact_came_to_the_border(caplog):
+    """A ball reaches the middle of its nearer side, at 7 um, when its approach is ``a^2 / R``: Hertz."""
+    depth = 4 * (7e-6) ** 2 / 1e-3
+    ds = ball_pressed(depth, edge="accept")
+    assert ds.attrs["edge"] == "accept"
+    assert float(ds.pressure[0, :, [0, -1]].max()) == 0.0  # at the kept times it is not at the border
+    assert float(ds.pressure[-1, :, [0, -1]].max()) == 0.0
+    began = float(re.search(r"found first in the step to ([\d.]+) s", ds.attrs["edge_note"])[1])
+    assert 0.2 < began < 0.35
+    assert "there the surface acts as a punch of its outline" in ds.attrs["edge_note"]
+    assert ds.attrs["edge_note"] in caplog.text
+    caplog.clear()
+    inside = ball_pressed(0.2 * depth, edge="accept")
+    assert inside.attrs["edge"] == "accept"
+    assert "edge_note" not in inside.attrs
+    assert "edge" not in ball_pressed(0.2 * depth).attrs
+    periodic = ball_pressed(0.2 * depth, edge="accept", boundary="periodic")
+    assert (periodic.attrs["edge"], "edge_note" in periodic.attrs) == ("accept", False)
+    assert "punch" not in caplog.text
 
 
 def test_section__is_not_cut_along_the_seam():
