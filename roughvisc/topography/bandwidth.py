@@ -13,7 +13,18 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import KEEP, ORDER
 from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
-from roughvisc.topography.grid import checked, counts, like, noted, number, require_heights, spacing, with_coordinates
+from roughvisc.topography.grid import (
+    checked,
+    counts,
+    like,
+    noted,
+    number,
+    require_heights,
+    resampled_taper,
+    spacing,
+    with_coordinates,
+    with_taper_weights,
+)
 from roughvisc.topography.missing_points import fill
 
 
@@ -211,7 +222,7 @@ def _on_cells(h: xr.DataArray, heights: np.ndarray, filled: np.ndarray | None, d
     axes = []
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, heights.shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
-    grid = with_coordinates(heights, *axes, h.attrs)
+    grid = with_taper_weights(with_coordinates(heights, *axes, h.attrs), resampled_taper(h, heights.shape))
     if filled is not None:
         grid = grid.assign_coords(filled=(("x", "y"), filled, h["filled"].attrs))
     return noted(grid, f"{done}: {h.shape[0]} x {h.shape[1]} to {heights.shape[0]} x {heights.shape[1]} cells")

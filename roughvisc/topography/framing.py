@@ -10,7 +10,17 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.blocks import mean_of, row_blocks
-from roughvisc.topography.grid import checked, like, noted, pair, require_heights, spacing, with_coordinates
+from roughvisc.topography.grid import (
+    checked,
+    like,
+    noted,
+    pair,
+    require_heights,
+    spacing,
+    taper_weights,
+    with_coordinates,
+    with_taper_weights,
+)
 from roughvisc.topography.laying import laid_on
 
 
@@ -70,7 +80,10 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
     axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
-    grid = with_coordinates(heights, *axes, h.attrs)
+    weights = taper_weights(h)
+    for _ in range(turns % 4 if weights is not None else 0):
+        weights = weights[1][::-1], weights[0]
+    grid = with_taper_weights(with_coordinates(heights, *axes, h.attrs), weights)
     if "filled" in h.coords:
         turned = np.rot90(h["filled"].transpose("x", "y").values, turns)
         grid = grid.assign_coords(filled=(("x", "y"), turned, h["filled"].attrs))
@@ -121,7 +134,8 @@ def combine(
     Returns
     -------
     xarray.DataArray
-        Sum of heights on the grid of the first, missing where either is, marked as filled where either was. [m]
+        Sum of heights on the grid of the first, missing where either is, marked as filled where either was. It counts
+        as tapered where both faces are. [m]
 
     Raises
     ------
@@ -159,6 +173,8 @@ def combine(
     both.attrs = {key: value for key, value in h1.attrs.items() if key not in ("recipe", "highest", "missing")}
     if _absent_only(h1) and _absent_only(h2) and np.isnan(both.values).any():
         both.attrs["missing"] = "absent"
+    tapers = taper_weights(h1), taper_weights(h2)
+    both = with_taper_weights(both, None if None in tapers else tuple(map(np.maximum, *tapers)))
     marks = [_filled(h1), _filled(h2)]
     if marks[0].any() or marks[1].any():
         attrs = next(h["filled"].attrs for h in (h1, h2) if "filled" in h.coords)
@@ -212,7 +228,18 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Mean plus the deviation times a raised cosine, which is zero on the border and one inside the margin. [m]
+        Mean plus the deviation times a raised cosine, which is zero on the border and one inside the margin. The
+        coordinates ``taper_x`` and ``taper_y`` hold these weights along each axis. [m]
+
+    Notes
+    -----
+    A taper is no equal of :func:`mirror`, which leaves the roughness as it is. The margin is smooth: the harder it is
+    pressed, the more of it touches. The nominal area of a tapered surface is the integral of the weight, and in the
+    contact fraction of a result each cell counts by its weight. Tried on periodic self-affine surfaces, whose true
+    contact is known without a taper: with margins of up to 10 % of the side that fraction is right within 3 % where
+    the true one is up to 0.2, and 6 % too small where it is 0.4. The contact area over that of the whole grid is 8 %
+    too small at a margin of 3 %, and 17 % at 10 %; there the mean gap is as far off. An audit has a row ``window``:
+    doubtful from a margin of 3 % of the side, broken from 10 %.
     """
     h = checked(h, "taper")
     widths = pair("width", width)
@@ -227,7 +254,12 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
     heights = np.empty_like(h.values)
     for rows in row_blocks(h.shape):
         heights[rows] = mean + (h.values[rows] - mean) * (profiles[0][rows, None] * profiles[1])
-    return noted(like(h, heights), f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
+    before = taper_weights(h)
+    weights = (profiles[0], profiles[1])
+    if before is not None:
+        weights = (profiles[0] * before[0], profiles[1] * before[1])
+    tapered = with_taper_weights(like(h, heights), weights)
+    return noted(tapered, f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
@@ -256,7 +288,10 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     }
     alone = {name: one.variable for name, one in h.coords.items() if not one.dims}
     doubled = xr.DataArray(_with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
-    return noted(doubled, "mirrored along x and y")
+    weights = taper_weights(h)
+    if weights is not None:
+        weights = (np.r_[weights[0], weights[0][::-1]], np.r_[weights[1], weights[1][::-1]])
+    return noted(with_taper_weights(doubled, weights), "mirrored along x and y")
 
 
 def _with_images(values: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
 from roughvisc.topography.blocks import row_blocks
-from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
+from roughvisc.topography.grid import metres_in, taper_weights, unit_of, with_coordinates, with_taper_weights
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
@@ -79,6 +79,7 @@ def open_grid(
         values *= metres  # of which the grid is a view
     grid = with_coordinates(h.values, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
+    grid = with_taper_weights(grid, taper_weights(h))
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
             grid = grid.isel({axis: slice(None, None, -1)})

@@ -10,7 +10,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import averaged
-from roughvisc.topography.grid import number, spacing, with_coordinates
+from roughvisc.topography.grid import number, spacing, taper_weights, with_coordinates, with_taper_weights
 
 #: Part of a cell that rounding may take off an overlap.
 _ROUNDING = 1e-9
@@ -56,6 +56,9 @@ def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tup
     first = h1.isel(kept)
     heights, filled = averaged(h2, *weights)
     second = with_coordinates(heights, first["x"].values, first["y"].values, h2.attrs)
+    tapered = taper_weights(h2)
+    if tapered is not None:
+        second = with_taper_weights(second, (weights[0] @ tapered[0], weights[1] @ tapered[1]))
     return first, second if filled is None else second.assign_coords(filled=(("x", "y"), filled, h2["filled"].attrs))
 
 

@@ -34,8 +34,9 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
     h : xarray.DataArray
         Height over (x, y), NaN where missing. [m]
     path : path
-        ``.nc`` keeps everything: coordinates, attributes and the mask of filled points. ``.x3p`` and ``.sdf`` keep
-        heights in full precision and the spacing; their grids begin at zero. X3P keeps the history as its comment.
+        ``.nc`` keeps everything: coordinates, attributes, the mask of filled points and the weights of a taper.
+        ``.x3p`` and ``.sdf`` keep heights in full precision and the spacing; their grids begin at zero. X3P keeps the
+        history as its comment.
 
     Raises
     ------

@@ -47,6 +47,13 @@ VARIABLES: dict[str, Variable] = {
         "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
         short="height",
     ),
+    "taper_x": Variable(
+        ("x",),
+        "1",
+        "weight of the taper along x",
+        "of a tapered surface: heights less their mean were multiplied by taper_x times taper_y",
+    ),
+    "taper_y": Variable(("y",), "1", "weight of the taper along y", "as taper_x"),
     "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
     # fields
     "pressure": Variable(
@@ -90,7 +97,13 @@ VARIABLES: dict[str, Variable] = {
         ancillary=("approach_error",),
         short="approach",
     ),
-    "nominal_pressure": Variable(_SERIES, "Pa", "nominal pressure", "force over the area of the surface as given"),
+    "nominal_pressure": Variable(
+        _SERIES,
+        "Pa",
+        "nominal pressure",
+        "force over the nominal area: that of the surface as given, absent cells included; of a tapered surface the "
+        "integral of taper_x times taper_y over it",
+    ),
     "work": Variable(
         _SERIES,
         "J",
@@ -139,8 +152,9 @@ VARIABLES: dict[str, Variable] = {
     "contact_fraction": Variable(
         _SERIES,
         "1",
-        "contact area over nominal area",
-        "contact_area over the area of the whole grid, absent cells included",
+        "contact area over the area of the surface",
+        "contact_area over the area of the whole grid, absent cells included; of a tapered surface each cell counts by its "
+        "weight, taper_x times taper_y, in both areas",
         short="contact fraction",
     ),
     "mean_gap": Variable(

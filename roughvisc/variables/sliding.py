@@ -16,7 +16,7 @@ def _over_speed(name: str) -> Variable:
 
 
 SLIDING: dict[str, Variable] = {
-    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled")},
+    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled", "taper_x", "taper_y")},
     **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
     "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
     "reduced_speed": Variable(

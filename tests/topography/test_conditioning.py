@@ -26,10 +26,11 @@ from roughvisc.topography.conditioning import (
     rotate90,
     taper,
 )
-from roughvisc.topography.grid import spacing
+from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
+from roughvisc.topography.writers import save_scan
 
 SCANS = Path(__file__).parents[3] / "shared" / "scans"
 CELL = (2e-6, 3e-6)
@@ -443,6 +444,53 @@ def test_filled__goes_with_its_points_through_later_steps():
     for step in (part, doubled, coarse, rotate90(done), level(done), taper(done, 1e-5), gaussian_filter(done, 2e-5)):
         assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
         assert step.attrs["fill_method"] == "harmonic"
+
+
+def weights_of(h):
+    """Weight of each cell of a tapered surface."""
+    return np.outer(h["taper_x"], h["taper_y"])
+
+
+def test_taper__keeps_its_weights_through_later_steps(tmp_path):
+    """The weights are what the deviations from the mean were multiplied by."""
+    h = rough((20, 16))
+    done = taper(h, (4e-6, 6e-6))
+    mean = float(h.mean())
+    weights = (done - mean) / (h - mean)
+    np.testing.assert_allclose(weights_of(done), weights, rtol=1e-9)
+    part = crop(done, x=(3e-6, 2.5e-5), y=(0, 1e-5))
+    np.testing.assert_allclose(weights_of(part), crop(weights, x=(3e-6, 2.5e-5), y=(0, 1e-5)), rtol=1e-9)
+    for turns in range(-1, 4):
+        np.testing.assert_allclose(
+            weights_of(rotate90(part, turns)), np.rot90(weights_of(part), turns), rtol=1e-12, err_msg=str(turns)
+        )
+    np.testing.assert_allclose(weights_of(mirror(part)), mirror(crop(weights, (3e-6, 2.5e-5), (0, 1e-5))), rtol=1e-9)
+    np.testing.assert_allclose(weights_of(taper(done, 5e-6)), weights_of(done) * weights_of(taper(h, 5e-6)), rtol=1e-12)
+    for fewer in ((10, 8), (33, 31)):
+        coarse = resample(done, fewer)
+        assert nominal_area(coarse) == pytest.approx(nominal_area(done), rel=0.02)
+    for kept in (level(done), invert(done), gaussian_filter(done, 2e-5)):
+        np.testing.assert_array_equal(weights_of(kept), weights_of(done))
+    save_scan(part, tmp_path / "part.nc")
+    np.testing.assert_array_equal(weights_of(open_scan(tmp_path / "part.nc")), weights_of(part))
+
+
+def test_taper__of_both_faces_is_one_of_their_sum():
+    a, b = rough((20, 16)), rough((20, 16), seed=1)
+    assert "taper_x" not in combine(taper(a, 4e-6), b).coords
+    assert "taper_x" not in combine(a, taper(b, 4e-6)).coords
+    both = combine(taper(a, 4e-6), taper(b, 6e-6), flip="x", align="centre")
+    np.testing.assert_allclose(both["taper_x"], taper(a, 4e-6)["taper_x"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("cells", [(2, 3), (10, 8)])
+def test_nominal_area__of_a_tapered_surface_counts_the_margin_by_half(cells):
+    """Two margins of so many cells along each axis, with an integral of half of each; up to half a side."""
+    h = rough((20, 16))
+    widths = tuple(n * d for n, d in zip(cells, CELL, strict=True))
+    area = (20 - cells[0]) * (16 - cells[1]) * CELL[0] * CELL[1]
+    assert nominal_area(taper(h, widths)) == pytest.approx(area, rel=1e-12)
+    assert nominal_area(h) == pytest.approx(20 * 16 * CELL[0] * CELL[1], rel=1e-12)
 
 
 def test_filled__of_either_face_stays_in_the_combination():

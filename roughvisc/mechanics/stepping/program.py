@@ -108,7 +108,8 @@ class Program:
     def pressure(self, value: float | str, *, over: float | str) -> Program:
         """Go to a nominal pressure, linearly: the load over the nominal area of the surface.
 
-        :func:`roughvisc.simulate` takes the whole area of the grid of heights, absent cells included, as it is given.
+        :func:`roughvisc.simulate` takes the whole area of the grid of heights, absent cells included, as it is given;
+        of a tapered surface the integral of the taper's weight.
 
         Parameters
         ----------

@@ -165,8 +165,22 @@ def border(evidence: Evidence, given: Given) -> Finding | None:
         return unknown("border", "The result holds no heights.")
     number = evidence.texture.mismatch
     seam = "Opposite borders meet" if number < LIMITS["border"].doubtful else "The surface repeats with a step"
-    advice = "" if number < LIMITS["border"].doubtful else " Use mirror = true or taper under [surface]."
+    advice = "" if number < LIMITS["border"].doubtful else " Use mirror = true under [surface]."
     return Finding("border", number, f"{seam}: they differ {number:.2g} times as much as neighbouring rows.{advice}")
+
+
+def window(evidence: Evidence, given: Given) -> Finding | None:
+    """What part of the side a taper has changed; None of a surface that was not tapered."""
+    if evidence.texture is None or not evidence.texture.taper > 0:
+        return None
+    number = evidence.texture.taper
+    advice = "" if number < LIMITS["window"].doubtful else " Use mirror = true in place of taper."
+    return Finding(
+        "window",
+        number,
+        f"A taper takes the roughness off a margin of {percent(number)} of the side along each border; what touches "
+        f"there is smooth.{advice}",
+    )
 
 
 def _tabor(evidence: Evidence, radius: float, w: float) -> float:

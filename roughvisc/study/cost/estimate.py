@@ -28,7 +28,7 @@ from roughvisc.study.simulation.scene import Ground, prepare
 from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.settings import Settings
-from roughvisc.topography.grid import axis_step, spacing
+from roughvisc.topography.grid import axis_step, resampled_taper, spacing, with_taper_weights
 from roughvisc.variables import STEPPED
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
@@ -100,7 +100,8 @@ def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
         length = axis_step(height, axis, "height") * count
         coords[axis] = (np.arange(few) + 0.5) * length / few
     kept = {"missing": height.attrs["missing"]} if "missing" in height.attrs else {}
-    return xr.DataArray(height.values[np.ix_(*picks)], dims=("x", "y"), coords=coords, attrs=kept)
+    few = xr.DataArray(height.values[np.ix_(*picks)], dims=("x", "y"), coords=coords, attrs=kept)
+    return with_taper_weights(few, resampled_taper(height, few.shape))
 
 
 def march_of(case: Case, height: xr.DataArray) -> March:

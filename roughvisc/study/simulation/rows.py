@@ -24,6 +24,7 @@ from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.simulation.stated import stated, stated_area
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
+from roughvisc.topography.grid import TAPER
 from roughvisc.variables import RESULT_FORMAT, STATUS_MEANINGS, STEPPED, of_step
 from roughvisc.variables.slides import STEPPED_IN_SLIDES
 
@@ -105,7 +106,7 @@ class Rows:
             "wall_time": wall_time,
             "contact_area": area,
             "contact_area_counted": touching,
-            "contact_fraction": area / self._area(),
+            "contact_fraction": self._ground.contact_fraction(contact, area),
             "mean_gap": mean_gap,
             **friction_row(step),
         }
@@ -137,9 +138,10 @@ class Rows:
         variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
         if "filled" in height.coords:
             variables["filled"] = (("x", "y"), height["filled"].values)
+        taper = {name: height[name].variable for name in TAPER if name in height.coords}
         dataset = xr.Dataset(
             variables,
-            coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values},
+            coords={"time": ("time", stamp), "x": height["x"].values, "y": height["y"].values, **taper},
             attrs={
                 "Conventions": "CF-1.11",
                 "result_format": RESULT_FORMAT,

@@ -29,7 +29,7 @@ from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
 from roughvisc.study.simulation.slides import check_slides, on_cells
 from roughvisc.study.statement.settings import Missing, Settings
-from roughvisc.topography.grid import checked, nominal_area, spacing
+from roughvisc.topography.grid import checked, nominal_area, spacing, taper_weights
 from roughvisc.topography.indenters import grown, highest
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
@@ -75,7 +75,7 @@ class Ground:
         height = _checked(height)
         self.mirrored = mirror and is_mirrored(height.values)
         self._lay(height)
-        #: Area that nominal pressures refer to: of the surface as it was given, absent cells included. [m2]
+        #: Area that nominal pressures refer to: that of the surface as it was given. [m2]
         self.nominal_area = nominal_area(height)
         self._extent = float(_FIRST_EXTENT)
         if follow and not kernel.bulges and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
@@ -100,6 +100,7 @@ class Ground:
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
         self.spacing = spacing(self.height, "height")
+        self._taper = taper_weights(self.domain)
         self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
 
     @property
@@ -111,6 +112,25 @@ class Ground:
     def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
         """The body under the window's grid."""
         return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
+
+    def contact_fraction(self, contact: NDArray[np.bool_], area: float) -> float:
+        """Contact area over that of the surface; on a tapered one both are weighted by the taper.
+
+        Parameters
+        ----------
+        contact : ndarray of bool, of the window's shape
+            Cells in contact.
+        area : float
+            Contact area: those cells, over all of the surface, counted or corrected for the grid. [m2]
+        """
+        dx, dy = self.spacing
+        fraction = area / (dx * dy * self.height.size)
+        if self._taper is None or area == 0:
+            return fraction
+        along_x, along_y = self._taper
+        rows, columns = self.window.cells
+        weighted = along_x[rows] @ contact @ along_y[columns] / (along_x.sum() * along_y.sum())
+        return fraction * float(weighted) * self.domain.size / np.count_nonzero(contact)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""

@@ -76,7 +76,8 @@ def simulate(
         :class:`roughvisc.mechanics.materials.models.Material` asks for.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
-        grid of heights as it is given, absent cells included.
+        grid of heights as it is given, absent cells included; of a tapered surface, over the integral of the taper's
+        weight.
     boundary : {"free", "periodic"}
         ``free`` for an indenter, ``periodic`` for a nominally flat scan.
     tolerance : float

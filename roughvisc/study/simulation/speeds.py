@@ -20,6 +20,7 @@ from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
+from roughvisc.topography.grid import TAPER
 from roughvisc.variables import STATUS_MEANINGS
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ class Speeds:
             "approach": found.approach,
             "contact_area": area,
             "contact_area_counted": counted,
-            "contact_fraction": area / ground.nominal_area,
+            "contact_fraction": ground.contact_fraction(contact, area),
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
@@ -142,6 +143,7 @@ class Speeds:
         if "filled" in height.coords:
             variables["filled"] = (("x", "y"), height["filled"].values)
         coords = {"speed": ("speed", np.array(self._curve.asked)), "x": height["x"].values, "y": height["y"].values}
+        coords |= {name: height[name].variable for name in TAPER if name in height.coords}
         return xr.Dataset(variables, coords=coords)
 
     def _frame(self, name: str, row: int, out: Array) -> Array:

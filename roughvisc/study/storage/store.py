@@ -171,13 +171,17 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 
 
 def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset whose variables name its scalar coordinates, by which CF tells a coordinate from a variable."""
-    labels = " ".join(str(name) for name, one in dataset.coords.items() if not one.dims)
+    """Dataset whose variables name their coordinates beside those of their dimensions.
+
+    By that CF tells a coordinate from a variable.
+    """
+    labels = {str(name): set(one.dims) for name, one in dataset.coords.items() if name not in dataset.dims}
     if not labels:
         return dataset
     named = {name: one.variable.copy(deep=False) for name, one in dataset.data_vars.items()}
     for variable in named.values():
-        variable.attrs = variable.attrs | {"coordinates": labels}
+        own = [name for name, dims in labels.items() if dims <= set(variable.dims)]
+        variable.attrs = variable.attrs | ({"coordinates": " ".join(own)} if own else {})
     return dataset.assign(named)
 
 

@@ -76,7 +76,7 @@ def _history_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
         (
             "Contact area at the end",
             f"{readable(float(last['contact_area']), 'm^2')}, {100 * float(last['contact_fraction']):.3g} % of the "
-            f"grid; {readable(float(last['contact_area_counted']), 'm^2')} counted",
+            f"surface; {readable(float(last['contact_area_counted']), 'm^2')} counted",
         ),
         *_slid(last),
         *_leak_rate(dataset),

@@ -121,8 +121,8 @@ def _borders(found: Inspection) -> tuple[str, str, str]:
             "Borders",
             seen,
             (
-                'for boundary = "periodic" mirror = true (at no more cost), or taper = a margin; without either '
-                "the seam carries load that is not real"
+                'for boundary = "periodic" mirror = true, at no more cost; without it the seam carries load that is '
+                "not real (a taper has no seam, but a smooth margin that changes the contact)"
             ),
         )
     return "Borders", seen, 'boundary = "periodic" as it is: neither mirror nor taper'

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
@@ -26,7 +25,7 @@ from roughvisc.views.figures.axes import (
 )
 from roughvisc.views.figures.histories import leave_room, marker_of
 from roughvisc.views.observables import history
-from roughvisc.views.observables.area_theories import asperity_fraction, persson_fraction
+from roughvisc.views.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.views.observables.derived import material_of
 
 _AREA = "contact_area"
@@ -146,7 +145,7 @@ def _draw_theories(ax: Axes, dataset: xr.Dataset, moduli, top: float, across, up
         return False
     require(dataset, "height")
     slope = rms_slope(dataset["height"], periodic=dataset.attrs.get("boundary") == "periodic")
-    nominal = nominal_area(dataset)
+    nominal = nominal_area_of(dataset)
     for (name, modulus), dash in zip(named.items(), ((4, 2), (1, 1.5), (6, 1, 1, 1)) * len(named), strict=False):
         for label, theory, shade in (("low loads", asperity_fraction, "k"), ("Persson", persson_fraction, "0.55")):
             loads = np.geomspace(1e-3 * top, top, 50)

@@ -111,8 +111,9 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     touching = area > 0
     if not touching.any():
         return
-    ratio = float(np.nanmean(100 * steps["contact_fraction"].values[touching] / area[touching]))
-    if math.isfinite(ratio) and ratio > 0:
+    ratios = 100 * steps["contact_fraction"].values[touching] / area[touching]
+    ratio = float(np.nanmean(ratios))
+    if ratio > 0 and float(np.nanmax(np.abs(ratios - ratio))) < 1e-6 * ratio:  # not so on a tapered surface
         right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
         right.set_ylabel("of nominal [%]")
 

@@ -78,7 +78,7 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         if body in dataset.attrs:
             raise InputError(f"the theories are of a half-space: found a result with the {body} {dataset.attrs[body]}")
     steps, kept = history(dataset), dataset["time"].values
-    area = nominal_area(dataset)
+    area = nominal_area_of(dataset)
     known = material_of(dataset) if material is None else material
     strain = _effective(known, steps["time"].values, steps["force"].values / area, kept)
     falling = np.diff(steps["force"].values) < -1e-9 * float(steps["force"].max())
@@ -89,6 +89,14 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         "asperity_contact_area": ("time", area * asperity_fraction(strain)),
     }
     return describe(xr.Dataset(found, coords={"time": dataset["time"]}))
+
+
+def nominal_area_of(dataset: xr.Dataset) -> float:
+    """Area that the nominal pressure of a result refers to: the force over it, else that of the surface. [m2]"""
+    if "nominal_pressure" in dataset and float(dataset["nominal_pressure"].max()) > 0:
+        at = dataset["nominal_pressure"].argmax(...)
+        return float(dataset["force"].isel(at) / dataset["nominal_pressure"].isel(at))
+    return nominal_area(dataset)
 
 
 def _effective(material: Any, times: np.ndarray, pressure: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -152,8 +152,8 @@ class Cases:
     @property
     def alike_in_size(self) -> bool:
         """Whether all surfaces are of one size, as far as the results tell."""
-        told = [(m["contact_area"], m["contact_fraction"]) for m in self.members if "contact_fraction" in m]
-        sizes = np.array([float(area.max() / part.max()) for area, part in told if float(part.max()) > 0])
+        told = [(m["force"], m["nominal_pressure"]) for m in self.members if "nominal_pressure" in m]
+        sizes = np.array([float(force.max() / mean.max()) for force, mean in told if float(mean.max()) > 0])
         return not sizes.size or bool(np.ptp(sizes) <= 1e-6 * sizes.max())
 
     @property

@@ -308,7 +308,7 @@ def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
     assert list(figures) == ["area", "nominal_pressure", "histories"]
     for name in ("area", "histories"):
         assert figures[name].axes[0].get_ylabel() == "Contact fraction [%]"
-    alike = ds.assign(contact_fraction=ds.contact_area / 1e-5)
+    alike = ds.assign(contact_fraction=ds.contact_area / 1e-5, nominal_pressure=ds.force / 1e-5)
     assert plot.sweep(alike).axes[0].get_ylabel().startswith("Contact area [")
 
 
