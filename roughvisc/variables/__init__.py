@@ -153,8 +153,8 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "1",
         "contact area over the area of the surface",
-        "contact_area over the area of the whole grid, absent cells included; of a tapered surface each cell counts by its "
-        "weight, taper_x times taper_y, in both areas",
+        "contact_area over the area of the whole grid, absent cells included; on a tapered surface each cell counts by "
+        "its weight, taper_x times taper_y, in both areas",
         short="contact fraction",
     ),
     "mean_gap": Variable(

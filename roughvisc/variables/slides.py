@@ -23,11 +23,20 @@ SLIDES: dict[str, Variable] = {
         ancillary=("friction_force_error",),
         short="friction force",
     ),
+    "friction_force_across": Variable(
+        _SERIES,
+        "N",
+        "force across the motion that keeps the profile on its path",
+        "positive to the left of the motion, 90 degrees counter-clockwise from it with x to the right and y upwards: "
+        "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards; "
+        "in a hold by the same slide as friction_force",
+        short="force across the motion",
+    ),
     "slope_friction_force": Variable(
         _SERIES,
         "N",
         "friction force by pressure times slope of the profile",
-        "equal to friction_force but for what the grid leaves open at the edges of contact",
+        "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
     ),
     "friction_coefficient": Variable(
         _SERIES,
@@ -52,4 +61,10 @@ SLIDES: dict[str, Variable] = {
 }
 
 #: What of them is known of every accepted step.
-STEPPED_IN_SLIDES = ("sliding_distance", "friction_force", "friction_coefficient", "friction_work")
+STEPPED_IN_SLIDES = (
+    "sliding_distance",
+    "friction_force",
+    "friction_force_across",
+    "friction_coefficient",
+    "friction_work",
+)

@@ -42,11 +42,19 @@ SLIDING: dict[str, Variable] = {
         ancillary=("friction_residual", "grid_error_friction"),
         short="friction force",
     ),
+    "friction_force_across": Variable(
+        ("speed",),
+        "N",
+        "force across the motion that keeps the profile on its path",
+        "positive to the left of the motion, 90 degrees counter-clockwise from it with x to the right and y upwards: "
+        "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards",
+        short="force across the motion",
+    ),
     "slope_friction_force": Variable(
         ("speed",),
         "N",
         "friction force by pressure times slope of the profile",
-        "equal to friction_force but for what the grid leaves open at the edges of contact",
+        "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
     ),
     "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
     "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),

@@ -42,9 +42,6 @@ class SteadyState:
         [m]
     power_force : float
         Friction force by the power that the material dissipates, over the speed. [N]
-    slope_force : float
-        Friction force by the pressure on the slopes of the profile. It differs from the other by what the grid leaves
-        open at the edges of contact. [N]
     residual : float
         Error of the pressure that the iteration leaves, estimated: its absolute values summed, over the load. [-]
     friction_residual : float
@@ -63,7 +60,6 @@ class SteadyState:
     displacement: Array
     approach: float
     power_force: float
-    slope_force: float
     residual: float
     friction_residual: float
     converged: bool
@@ -106,10 +102,12 @@ class Sliding:
         (nx, ny), (dx, dy) = shape, spacing
         #: Wave numbers along x and along y, of a real transform. [1/m]
         self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
-        odd = self.qx.copy()
+        odd, odd_across = self.qx.copy(), self.qy.copy()  # the shortest wave of an even number of cells has no slope
         if nx % 2 == 0:
             odd[nx // 2] = 0
-        self._derivative = 1j * odd
+        if ny % 2 == 0:
+            odd_across[:, -1] = 0
+        self._derivative, self._derivative_across = 1j * odd, 1j * odd_across
         response = body.transfer(self.qx, self.qy)
         acting = response > 0
         complex_compliance = np.broadcast_to(compliance(-self.qx * speed), response.shape)
@@ -152,9 +150,22 @@ class Sliding:
         """Slope along x of the displacement out of phase. [-]"""
         return self._filtered(pressure, self._skew * self._derivative)
 
-    def slope(self, field: Array) -> Array:
-        """Slope of a field along x, by its Fourier series. [1/m]"""
-        return self._filtered(field, self._derivative)
+    def force_across(self, pressure: Array) -> float:
+        r"""Force towards +y that keeps the profile on its path, :math:`-\int p\, \partial_y u\, \mathrm dA`. [N]
+
+        Parameters
+        ----------
+        pressure : ndarray, shape (nx, ny)
+            Of a steady state. [Pa]
+
+        Notes
+        -----
+        In contact the body has the slope of the profile. As of the friction force along x, the displacement in phase
+        with the pressure adds nothing: its kernel is even, so that the sum over its slope is zero. What is left does
+        not depend on how steeply the pressure ends at the edges of contact.
+        """
+        inclined = self._filtered(pressure, self._skew * self._derivative_across)
+        return -float((pressure * inclined).sum()) * self.cell_area
 
     def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
         return np.asarray(fft.irfft2(fft.rfft2(field) * symbol, s=self.shape, overwrite_x=True))
@@ -214,7 +225,6 @@ def steady_state(
         displacement=displacement,
         approach=float(np.sum(pressure * (gap + displacement)) / pressure.sum()),
         power_force=drag(pressure),
-        slope_force=float((pressure * sliding.slope(gap)).sum()) * cell,
         residual=residual(pressure, found.correction),
         friction_residual=friction_residual(pressure, found.correction),
         converged=found.converged,

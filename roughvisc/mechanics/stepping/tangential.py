@@ -1,9 +1,10 @@
 r"""Tangential force of a contact without shear: that of the pressure on the inclined surface.
 
-A profile that moves along +x is held back by ``-int p du/dx dA``, with the displacement ``u`` of the body, which in
-contact has the slope of the profile. The part of ``u`` that is ``K p`` has no share in that, since ``K`` is even: on
-the grid its sum is zero to rounding, if the slope is that of the Fourier series. So the force does not depend on how
-steeply the pressure ends at the edges of contact, as the sum of pressure times slope of the profile does.
+A profile that moves along +x is driven by ``-int p du/dx dA``, and kept on its path by ``-int p du/dy dA`` towards +y,
+with the displacement ``u`` of the body, which in contact has the slope of the profile. The part ``K p`` of ``u`` adds
+nothing, since ``K`` is even: on the grid its sum is zero to rounding, if the slope is that of the Fourier series. So
+the force does not depend on how steeply the pressure ends at the edges of contact, as the sum of pressure times slope
+of the profile does.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def slope(field: Array, side: float, axis: int) -> Array:
 
 
 def tangential_force(halfspace: HalfSpace, pressure: Array, displacement: Array, slide: Slide) -> float:
-    """Force against the motion of a profile, by the slope of the body under it. [N]
+    """Friction force, against the motion of a profile, by the slope of the body under it. [N]
 
     Parameters
     ----------
@@ -57,11 +58,20 @@ def tangential_force(halfspace: HalfSpace, pressure: Array, displacement: Array,
     slide : Slide
         The motion.
     """
-    inclined = slope(displacement, halfspace.spacing[slide.axis], slide.axis)
-    return -slide.sense * float(np.sum(pressure * inclined)) * halfspace.cell_area
+    return slide.sense * _force_along(halfspace, pressure, displacement, slide.axis)
 
 
-def slope_force(halfspace: HalfSpace, pressure: Array, gap: Array, slide: Slide) -> float:
-    """The same by the slope of the profile, from its undeformed gap [m]. [N]"""
-    inclined = slope(gap, halfspace.spacing[slide.axis], slide.axis)
-    return slide.sense * float(np.sum(pressure * inclined)) * halfspace.cell_area
+def force_across(halfspace: HalfSpace, pressure: Array, displacement: Array, slide: Slide) -> float:
+    """Force to the left of the motion that keeps a profile on its path, of the same fields. [N]
+
+    Left is 90 degrees counter-clockwise from the motion, with x to the right and y upwards: of a motion along x it is
+    y, and of one along y it is -x.
+    """
+    left = slide.sense if slide.axis == 0 else -slide.sense
+    return left * _force_along(halfspace, pressure, displacement, 1 - slide.axis)
+
+
+def _force_along(halfspace: HalfSpace, pressure: Array, displacement: Array, axis: int) -> float:
+    """Component along an axis of the force that holds the profile. [N]"""
+    inclined = slope(displacement, halfspace.spacing[axis], axis)
+    return -float(np.sum(pressure * inclined)) * halfspace.cell_area

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -26,21 +25,39 @@ Array = NDArray[np.float64]
 _ROUNDING = 1e-12
 
 
+#: Direction -> quarter turns of the grid, counter-clockwise, by which the profile comes to move along +x.
+_QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
+
+
 @dataclass(frozen=True)
 class Turn:
-    """How fields turn so that the profile moves along +x, and how they turn back."""
+    """The rotation of fields by which the profile moves along +x. What lies to the left of the motion is then +y.
 
-    there: Callable[[Array], Array]
-    back: Callable[[Array], Array]
-    swapped: bool
+    Attributes
+    ----------
+    quarters : int
+        Quarter turns, counter-clockwise with x to the right and y upwards.
+    """
+
+    quarters: int
 
     @classmethod
     def of(cls, direction: str) -> Turn:
         """That of a direction."""
-        flip = slice(None, None, -1 if direction.startswith("-") else 1)
-        if direction.endswith("x"):
-            return cls(lambda field: field[flip], lambda field: field[flip], False)
-        return cls(lambda field: field.T[flip], lambda field: np.ascontiguousarray(field[flip].T), True)
+        return cls(_QUARTERS[direction])
+
+    @property
+    def swapped(self) -> bool:
+        """Whether x and y change places."""
+        return self.quarters % 2 == 1
+
+    def there(self, field: Array) -> Array:
+        """A field over the cells, rotated."""
+        return np.rot90(field, self.quarters)
+
+    def back(self, field: Array) -> Array:
+        """A rotated field in the frame of the surface."""
+        return np.rot90(field, -self.quarters)
 
 
 @dataclass(frozen=True)
@@ -108,15 +125,16 @@ class Face:
 
     def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
         """Steady state under a force [N], on all cells."""
-        found = steady_state(sliding, self.gap_on(sliding), force, tolerance=tolerance)
+        found = steady_state(sliding, on_rows(self.gap, sliding), force, tolerance=tolerance)
         pressure, displacement = (
             np.array(np.broadcast_to(field, self.gap.shape)) for field in (found.pressure, found.displacement)
         )
         return replace(found, pressure=pressure, displacement=displacement)
 
-    def gap_on(self, sliding: Sliding) -> Array:
-        """The gap on the rows of an operator. [m]"""
-        return np.ascontiguousarray(self.gap[:, : sliding.shape[1]])
+
+def on_rows(field: Array, sliding: Sliding) -> Array:
+    """A field over the cells of a surface, on the rows of an operator."""
+    return np.ascontiguousarray(field[:, : sliding.shape[1]])
 
 
 def _sampled(field: Array, count: int, axis: int) -> Array:

@@ -98,8 +98,8 @@ def friction(
     Notes
     -----
     In the steady state the friction force times the speed is the power that the material dissipates. The force is
-    taken from that power: on the grid it converges much faster than the sum of pressure times slope, which stands
-    beside it as ``slope_friction_force``.
+    taken from that power: on the grid it converges much faster than the sum of pressure times slope. The force across
+    the motion, ``friction_force_across``, is the same sum with the slope across the motion.
 
     References
     ----------

@@ -110,7 +110,7 @@ def edge_note(time: float) -> str:
         End of the first step in which it was there. [s]
     """
     return (
-        f"Contact came to the border of the surface, found first in the step to {time:.3g} s: there the surface acts as "
+        f"Contact reached the border of the surface, first in the step to {time:.3g} s: there the surface acts as "
         'a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "accept").'
     )
 

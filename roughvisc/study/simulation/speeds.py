@@ -14,7 +14,7 @@ from roughvisc.mechanics.materials.frequency import over_frequencies
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
-from roughvisc.study.simulation.faces import Face, Turn, areas
+from roughvisc.study.simulation.faces import Face, Turn, areas, on_rows
 from roughvisc.study.simulation.friction_grid_error import CoarserFaces
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.curve import Curve
@@ -77,7 +77,8 @@ class Speeds:
         sliding = self._face.sliding(speed, law)
         found = self._face.slide(sliding, self._force, tolerance)
         row, fields = self._row(found, speed)
-        theory = persson(sliding, self._face.gap_on(sliding), row["nominal_pressure"])
+        row["friction_force_across"] = sliding.force_across(on_rows(found.pressure, sliding))
+        theory = persson(sliding, on_rows(self._face.gap, sliding), row["nominal_pressure"])
         row["persson_friction_coefficient"] = theory.friction_coefficient
         row["persson_contact_fraction"] = theory.contact_fraction
         if self._smooth is not None:
@@ -106,7 +107,6 @@ class Speeds:
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
-            "slope_friction_force": found.slope_force,
             "dissipated_power": found.power_force * speed,
             "loss_tangent": found.loss_tangent,
             "pressure_residual": found.residual,

@@ -14,6 +14,9 @@ from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.console.tables import NOTES, accuracy_rows, number, readable, two_columns
 from roughvisc.views.figures.leakage import closing_times
 
+#: Part of the friction force from which on a summary tells the force across the motion.
+_ACROSS = 0.05
+
 
 def result_table(dataset: xr.Dataset) -> Group:
     """Summary of a result: what came out, how accurate it is, what it cost."""
@@ -40,6 +43,7 @@ def _curve_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
             f"{friction[1]:.3g} at {readable(float(peak['speed']), 'm/s')}, the largest; "
             f"{friction[0]:.2g} and {friction[2]:.2g} at the ends",
         ),
+        *_across(peak, "there"),
         (
             "Contact area",
             f"{100 * fraction[1]:.3g} % of the grid there; {100 * fraction[0]:.3g} % and "
@@ -121,7 +125,19 @@ def _slid(last: xr.Dataset) -> list[tuple[str, str]]:
             "Friction at the end",
             f"coefficient {float(last['friction_coefficient']):.4g}, force {force}, stated error {error}",
         ),
+        *_across(last, "at the end"),
     ]
+
+
+def _across(row: xr.Dataset, where: str) -> list[tuple[str, str]]:
+    """The force across the motion where it is a sizeable part of the friction force; of old results it is not known."""
+    if "friction_force_across" not in row:
+        return []
+    across, along = (float(row[name]) for name in ("friction_force_across", "friction_force"))
+    if not abs(across) > _ACROSS * abs(along):
+        return []
+    side = "left" if across > 0 else "right"
+    return [("Force across the motion", f"{readable(abs(across), 'N')} towards the {side} {where}")]
 
 
 def _leak_rate(dataset: xr.Dataset) -> list[tuple[str, str]]:

@@ -19,7 +19,7 @@ from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.slide import Slide
-from roughvisc.mechanics.stepping.tangential import slope, slope_force, tangential_force
+from roughvisc.mechanics.stepping.tangential import force_across, slope, tangential_force
 
 PERIOD, TIME, AMPLITUDE = 1e-3, 1e-3, 1e-6
 WAVE = 2 * math.pi / PERIOD
@@ -171,7 +171,25 @@ def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
     assert dissipated == pytest.approx(got * speed, rel=0.01)
     work = (after.state.slid.work - before.state.slid.work) / PERIOD
     assert work == pytest.approx(exact.power_force, rel=2e-3)
-    assert slope_force(found.halfspace, after.shown.pressure, found.gap, Slide(1.0)) == pytest.approx(got, rel=5e-3)
+    by_slopes = float(np.sum(after.shown.pressure * slope(found.gap, PERIOD / 128, 0))) * found.halfspace.cell_area
+    assert by_slopes == pytest.approx(got, rel=5e-3)
+
+
+@pytest.mark.parametrize(("direction", "across"), [("x", 2.5), ("-x", 2.5), ("y", -0.4), ("-y", -0.4)])
+def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_direction(direction, across):
+    """At every instant: the profile is pushed along the wave's normal, q_y / q_x = 2.5, and left of y lies -x."""
+    nx, ny = 15, 21
+    x, y = (2 * np.pi * k * (np.arange(n) + 0.5) / n for n, k in ((nx, 1), (ny, 2)))
+    halfspace = HalfSpace((nx, ny), (PERIOD / nx, 0.8 * PERIOD / ny), "periodic")
+    height = AMPLITUDE * np.cos(x[:, None] + y)
+    program = rv.Program().load(0.05, over=0).slide(0.6 * PERIOD, speed=0.1, direction=direction).hold(TIME)
+    found = Scene(halfspace, height.max() - height, rubber(), Modes(rubber()), program, times=None, tolerance=1e-3)
+    for step in march(found):
+        if step.shown.time > 0:
+            assert (step.shown.pressure > 0).all()
+            slide = found.motions[segment_number(step.state)]
+            sideways = force_across(halfspace, step.shown.pressure, step.displacement, slide)
+            assert sideways == pytest.approx(across * force(found, step), rel=1e-9)
 
 
 def test_work_of_the_friction_force__is_what_the_body_takes_up():
