@@ -107,6 +107,11 @@ class Face:
         return Face(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
 
     @property
+    def period(self) -> float:
+        """Of the surface along the motion. [m]"""
+        return self.gap.shape[0] * self.spacing[0]
+
+    @property
     def waves(self) -> Array:
         """Wave numbers along the motion. [1/m]"""
         return np.asarray(2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]))

@@ -160,9 +160,10 @@ def rub(
         "slope_note": slope_note(ground.height, "periodic", np.inf),
         "border_note": border_note(ground.height, xr.Dataset()),
         "octave_note": octave_note(dataset),
+        "wake_note": rows.wake_note(),
         **rows.told,
     }
-    for name in ("slope_note", "border_note"):
+    for name in ("slope_note", "border_note", "wake_note"):
         if notes[name]:
             log.warning("%s", notes[name])
     dataset.attrs = {

@@ -144,26 +144,26 @@ def body_note(
         more = kernel.relief * compliance * force / approach
         if more < settings.tolerance:
             return (
-                f"A half-space would have done: its approach is at most {_percent(more)} larger, which is less than "
+                f"A half-space would have done: its approach is at most {percent(more)} larger, which is less than "
                 "the tolerance."
             )
-        larger = "much" if more > 1 else f"up to {_percent(more)}"  # the bound says little where it is wide
+        larger = "much" if more > 1 else f"up to {percent(more)}"  # the bound says little where it is wide
         return f"The base matters: on a half-space the approach would be {larger} larger."
     longest = max(size)
     lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
-    note = f"The base holds back {_percent(lost)} of the longest wave, of {longest:.3g} m" + (
+    note = f"The base holds back {percent(lost)} of the longest wave, of {longest:.3g} m" + (
         ": a half-space would have done." if lost < settings.tolerance else "."
     )
     if kernel.uniform_displacement > 0:
         share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
         note += (
             " The approach holds the compression of the sheet itself, mean pressure times compliance times "
-            f"{kernel.uniform_displacement:.3g} m: up to {_percent(min(share, 1.0))} of it."
+            f"{kernel.uniform_displacement:.3g} m: up to {percent(min(share, 1.0))} of it."
         )
     return note
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     """A share to two digits, as 100 and not 1e+02."""
     return f"{float(f'{100 * share:.2g}'):g} %"
 

@@ -31,6 +31,7 @@ from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
 from roughvisc.study.simulation.scene import Ground, follows, prepare
 from roughvisc.study.simulation.slides import slide_note
+from roughvisc.study.simulation.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
 from roughvisc.study.statement.body import body, not_one_body
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.study.storage.checkpoint import Keeper, Reached
@@ -236,6 +237,7 @@ def _press(
         "border_note": _border_note(ground, settings, dataset),
         "edge": "accept" if settings.edge == "accept" else "",
         "edge_note": _edge_note(rows.border),
+        "wake_note": _wake_note(ground, scene, dataset),
         "left_out": left_out(choice, settings, followed, ground.mirrored),
         **_for_the_audit(scene, height, material),
     }
@@ -309,6 +311,29 @@ def _body_note(ground: Ground, scene: Scene, settings: Settings, dataset: xr.Dat
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     largest = (float(dataset[name].max()) for name in ("force", "approach"))
     return body_note(settings.kernel, settings, (nx * dx, ny * dy), scene.final, *largest)
+
+
+def _wake_note(ground: Ground, scene: Scene, dataset: xr.Dataset) -> str:
+    """What to say of a contact that stands alone and slides into the wake of the one before, in the log too."""
+    segments = [(one, one.slide) for one in scene.program.segments if one.slide is not None]
+    if not segments:
+        return ""
+    notes, alone = [], surface_stands_alone(ground.height)
+    for axis, side in enumerate(ground.spacing):
+        period = ground.height.shape[axis] * side
+        strokes = [(slide.distance, slide.distance / one.duration) for one, slide in segments if slide.axis == axis]
+        if sum(distance for distance, _ in strokes) < period / 2:  # it does not come as far as the next wake
+            continue
+        single = alone
+        if single is None and "pressure" in dataset:
+            single = contact_stands_alone(dataset["pressure"][-1].values, axis)
+        if single:
+            left = {speed: creep_left(scene.compliance(period / speed), scene.final) for _, speed in strokes}
+            notes.append(wake_note(left, period))
+    note = " ".join(filter(None, notes))
+    if note:
+        log.warning("%s", note)
+    return note
 
 
 def _border_note(ground: Ground, settings: Settings, dataset: xr.Dataset) -> str:

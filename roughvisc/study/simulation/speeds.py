@@ -17,6 +17,7 @@ from roughvisc.mechanics.sliding.steady import SteadyState
 from roughvisc.study.simulation.faces import Face, Turn, areas, on_rows
 from roughvisc.study.simulation.friction_grid_error import CoarserFaces
 from roughvisc.study.simulation.scene import Ground
+from roughvisc.study.simulation.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
@@ -63,6 +64,7 @@ class Speeds:
         self._face = Face.of(ground, self._turn)
         #: Attributes of the result that say what was computed beside the curve.
         self.told: dict[str, str] = {}
+        self._alone = surface_stands_alone(ground.height)
         self._smooth: Face | None = None
         if curve.last_octave:
             self._smooth, shortest = self._face.smooth()
@@ -86,7 +88,7 @@ class Speeds:
         if self._coarser is not None:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
         row["wall_time"] = clock()
-        self._store.append({"number": number, "row": row}, fields)
+        self._store.append({"number": number, "row": row, "creep_left": self._creep_left(found, speed, law)}, fields)
 
     def _row(self, found: SteadyState, speed: float) -> tuple[dict[str, Any], dict[str, Array]]:
         """Numbers and fields of a state, in the frame of the profile."""
@@ -117,6 +119,17 @@ class Speeds:
         }
         fields = {"pressure": np.ascontiguousarray(pressure), "gap": gap}
         return row, {name: fields[name] for name in self._settings.fields}
+
+    def _creep_left(self, found: SteadyState, speed: float, law: Material) -> float:
+        """Part of the creep that has not recovered where the next contact comes; 0 unless the contact stands alone."""
+        if not (contact_stands_alone(found.pressure, 0) if self._alone is None else self._alone):
+            return 0.0
+        return creep_left(*(float(law.contact_compliance(t)) for t in (self._face.period / speed, np.inf)))
+
+    def wake_note(self) -> str:
+        """What to say of a contact that runs into the wake of the one before, at all speeds; empty if none does."""
+        left = {self._curve.asked[plain["number"]]: plain["creep_left"] for plain in self._store.plain}
+        return wake_note(left, self._face.period)
 
     def _added(self, row: dict[str, Any], found: SteadyState, without: SteadyState) -> dict[str, float]:
         """What the shortest octave of waves adds, relative to what there is with it."""

@@ -50,6 +50,7 @@ _NOTES = (
     "slide_note",
     "accuracy_note",
     "octave_note",
+    "wake_note",
     "slope_note",
     "border_note",
     "edge_note",

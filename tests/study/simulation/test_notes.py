@@ -95,7 +95,7 @@ def test_edge_note__says_when_contact_came_to_the_border(caplog):
     assert ds.attrs["edge"] == "accept"
     assert float(ds.pressure[0, :, [0, -1]].max()) == 0.0  # at the kept times it is not at the border
     assert float(ds.pressure[-1, :, [0, -1]].max()) == 0.0
-    began = float(re.search(r"found first in the step to ([\d.]+) s", ds.attrs["edge_note"])[1])
+    began = float(re.search(r"first in the step to ([\d.]+) s", ds.attrs["edge_note"])[1])
     assert 0.2 < began < 0.35
     assert "there the surface acts as a punch of its outline" in ds.attrs["edge_note"]
     assert ds.attrs["edge_note"] in caplog.text
