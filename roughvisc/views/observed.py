@@ -8,9 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import dask
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.study.execution.cluster import default_client, has_other_versions
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.index import index_of, save_index
@@ -35,7 +37,7 @@ def observe(
 
     ``roughvisc run`` ends with it; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the same
     arguments. What a file holds already, asked with the same values, is not derived again. Frames are tasks of Dask: on
-    the default client if there is one, else in threads.
+    the default client if there is one and all its workers have this version of roughvisc, else in threads.
 
     Parameters
     ----------
@@ -60,12 +62,15 @@ def observe(
     distinct = {case.key: case for case in cases if case.settings.observe is not None}
     folder = result_folder(cases[0], out).absolute()
     added = []
-    for number, case in enumerate(distinct.values()):
-        if progress is not None:
-            progress(number, len(distinct))
-        path = result_path(folder, case.key)
-        if path.exists() and _add(case, path):
-            added.append(path)
+    client = default_client() if distinct else None
+    here = {"scheduler": "threads"} if client is not None and has_other_versions(client) else {}
+    with dask.config.set(here):
+        for number, case in enumerate(distinct.values()):
+            if progress is not None:
+                progress(number, len(distinct))
+            path = result_path(folder, case.key)
+            if path.exists() and _add(case, path):
+                added.append(path)
     if added and len(cases) > 1:
         index = index_of(folder)
         save_index(folder, index)

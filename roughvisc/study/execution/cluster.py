@@ -12,12 +12,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError
+from roughvisc.study.statement.identity import program_version
 
 if TYPE_CHECKING:
     from distributed import Client
 
 #: What a worker imports anyway, xarray's look for other kinds of arrays included.
 _PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
+
+#: What a process executes to say which version of roughvisc it has: a text, as it may have no such function.
+SOURCE = """
+def version():
+    try:
+        from roughvisc.study.statement.identity import program_version
+        return program_version()
+    except ImportError:
+        pass
+    try:
+        return "roughvisc " + __import__("roughvisc").__version__
+    except ImportError:
+        return "no roughvisc"
+"""
+#: The version of a process, for :func:`eval` with the name ``source``.
+VERSION = "exec(source, names := {}) or names['version']()"
 
 #: Signals that the process of a sweep answers for its workers too.
 _OURS = (signal.SIGINT, signal.SIGTERM)
@@ -100,6 +117,12 @@ def default_client() -> Client | None:
     with suppress(ValueError):
         return distributed.default_client()
     return None
+
+
+def has_other_versions(client: Client) -> bool:
+    """Whether a worker of a client has another version of roughvisc, or none."""
+    found = client.run(eval, VERSION, {"source": SOURCE}, on_error="return")
+    return any(version != program_version() for version in found.values())
 
 
 def _quick_start() -> dict[str, str]:

@@ -1,4 +1,8 @@
-"""Cases on the workers of a Dask client: one future each, submitted anew where its worker was lost."""
+"""Cases on the workers of a Dask client: one future each, submitted anew where its worker was lost.
+
+Only workers with the version of this process compute. A worker cannot be sent anything of roughvisc before its version
+is known: where it cannot unpickle what it gets, it closes. So the task is a text that looks at the version first.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,8 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,13 +21,15 @@ from typing import Any
 from distributed import CancelledError, Client, KilledWorker, as_completed
 
 from roughvisc import errors
-from roughvisc.errors import DiskFullError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book
-from roughvisc.study.execution.task import Outcome, Progress, Report, on_worker, stop_sweep
+from roughvisc.study.execution.cluster import SOURCE, VERSION
+from roughvisc.study.execution.task import Outcome, Progress, Report, stop_sweep
 from roughvisc.study.execution.watch import Silence, watcher
 from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.identity import program_version
 
 log = logging.getLogger("roughvisc")
 
@@ -38,6 +45,11 @@ _LINGERING = 90.0
 _PATIENCE = 120.0
 #: Without any worker for so long, the user is told; and so often it is looked. [s]
 _ALONE_AFTER, _LOOK_EVERY = 30.0, 5.0
+#: The task of a worker, for :func:`eval`: the case's outcome, or the worker's address and version if that is another.
+_TASK = (
+    f"__import__('roughvisc.study.execution.task', fromlist=['']).on_worker(*arguments) if ({VERSION}) == version"
+    f" else (__import__('distributed').get_worker().address, {VERSION})"
+)
 
 
 @dataclass
@@ -82,7 +94,17 @@ class _Course:
 
 @dataclass
 class _Dispatch:
-    """Cases on their way to their ends."""
+    """Cases on their way to their ends.
+
+    Attributes
+    ----------
+    waiting : deque of str
+        Keys of the cases that are to be submitted.
+    refused : dict
+        Address of each worker with another version -> that version.
+    named : set of str
+        Those of them that the user was told of.
+    """
 
     client: Client
     book: Book
@@ -92,14 +114,62 @@ class _Dispatch:
     finished: Any
     courses: dict[str, _Course]
     futures: dict[Any, str] = field(default_factory=dict)
+    waiting: deque[str] = field(default_factory=deque)
+    refused: dict[str, str] = field(default_factory=dict)
+    named: set[str] = field(default_factory=set)
 
-    def submit(self, key: str) -> None:
+    def feed(self) -> None:
+        """Submit the cases that wait.
+
+        Where workers with another version must be left out, no more cases are submitted than the others have threads:
+        a worker that comes later then gets cases, too.
+        """
+        if not self.refused:
+            while self.waiting:
+                self.submit(self.waiting.popleft())
+        elif self.waiting:
+            matching = {address: n for address, n in self.client.nthreads().items() if address not in self.refused}
+            for _ in range(min(len(self.waiting), sum(matching.values()) - len(self.futures))):
+                self.submit(self.waiting.popleft(), matching)
+
+    def submit(self, key: str, workers: Collection[str] | None = None) -> None:
+        """Submit a case to any worker, or to one of some."""
         course = self.courses[key]
         course.submissions += 1
-        name = f"{self.name}-{key}-{course.submissions}"
-        future = self.client.submit(on_worker, self.texts[key], key, *self.arguments, key=name, pure=False)
+        names = {"source": SOURCE, "version": program_version(), "arguments": (self.texts[key], key, *self.arguments)}
+        name, where = f"{self.name}-{key}-{course.submissions}", list(workers or ()) or None
+        future = self.client.submit(eval, _TASK, names, key=name, pure=False, workers=where)
         self.futures[future] = key
         self.finished.add(future)
+
+    def resubmit_stranded(self) -> None:
+        """Have cases wait again that were submitted to workers of which none is left."""
+        processing = {key for keys in self.client.processing().values() for key in keys}
+        stranded = [one for one in self.futures if one.key not in processing and one.status == "pending"]
+        for future in stranded:
+            self.waiting.append(self.futures.pop(future))
+        self.client.cancel(stranded)
+
+    def matching(self, workers: Iterable[str]) -> set[str]:
+        """Those of some workers that are not known to have another version."""
+        return {address for address in workers if address not in self.refused}
+
+    def name_refused(self) -> None:
+        """Say of each worker that is left out that it is, once."""
+        if others := self.refused.keys() - self.named:
+            self.named |= others
+            self.book.tell(f"{self.other_versions(others)}: no case runs there, the other workers are used")
+
+    def have_begun(self) -> bool:
+        """Whether a worker has begun with a case, so that one with this version is known."""
+        return any(course.begun for course in self.courses.values())
+
+    def other_versions(self, workers: Iterable[str]) -> str:
+        """What is wrong with some workers that were refused."""
+        found = [(address, self.refused[address]) for address in sorted(workers)]
+        named = [f"worker {address} has {version}" for address, version in found[:3]]
+        more = [f"{len(found) - 3} more workers have other versions, too"] if len(found) > 3 else []
+        return f"{', '.join(named + more)}, while this process has {program_version()}"
 
     def heard(self, event: tuple[float, Report]) -> None:
         report = event[1]
@@ -109,13 +179,20 @@ class _Dispatch:
     def take(self, going_on: bool) -> None:
         """Take up what has ended; submit anew, if the sweep goes on, what a lost worker has left behind."""
         for future, result in self.finished.next_batch(block=False):
-            key = self.futures.pop(future)
+            key = self.futures.pop(future, None)
+            if key is None:  # it was stranded, and waits again
+                continue
+            if future.status == "finished" and isinstance(result, tuple):
+                worker, version = result
+                self.refused[worker] = version
+                self.waiting.append(key)
+                continue
             outcome = _outcome(key, result, self.courses[key])
             if outcome.kind != "interrupted":
                 self.book.ended(outcome)
             elif going_on:
                 log.info("%s: goes on on another worker", key)
-                self.submit(key)
+                self.waiting.append(key)
 
 
 def distribute(
@@ -140,6 +217,8 @@ def distribute(
 
     Raises
     ------
+    InputError
+        If all workers have another version of roughvisc.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt, SystemExit
@@ -153,8 +232,7 @@ def distribute(
     client.subscribe_topic(name, cases.heard)
     try:
         book.begin(link)
-        for key in texts:
-            cases.submit(key)
+        cases.waiting.extend(texts)
         try:
             _go_on(cases)
         except (KeyboardInterrupt, SystemExit, DiskFullError):  # dask-jobqueue makes a Ctrl-C a SystemExit
@@ -201,34 +279,58 @@ class _Heard(Silence):
 
 
 def _go_on(cases: _Dispatch) -> None:
-    """Take up what ends, until nothing is left; say it if no worker is."""
+    """Take up what ends, until nothing is left; say it if no worker is, or some have another version."""
     looked = seen = time.monotonic()
     said = False
-    while cases.futures:
+    while cases.futures or cases.waiting:
+        cases.feed()
         cases.take(going_on=True)
         cases.book.watch.tick()
+        if cases.have_begun() or not (cases.futures or cases.waiting):
+            cases.name_refused()
         time.sleep(0.1)
-        if time.monotonic() - looked < _LOOK_EVERY:
+        due = time.monotonic() - looked >= _LOOK_EVERY
+        if not due and not (cases.refused and cases.waiting):
+            continue
+        there = _workers(cases.client)
+        if there and not cases.matching(there) and not cases.have_begun():
+            _end_without_workers(cases, there)
+        if not due:
             continue
         looked = time.monotonic()
-        if _workers(cases.client):
+        if cases.matching(there):
             seen, said = looked, False
+            if cases.refused:
+                cases.resubmit_stranded()
+        elif looked - seen >= _ALONE_AFTER and there:
+            _end_without_workers(cases, there)
         elif looked - seen >= _ALONE_AFTER and not said:
             said = True
             cases.book.tell(
-                f"the cluster has had no worker for {looked - seen:.0f} s ({len(cases.futures)} cases to go): start "
+                f"the cluster has had no worker for {looked - seen:.0f} s "
+                f"({len(cases.futures) + len(cases.waiting)} cases to go): start "
                 "workers (dask worker), or see whether their jobs still queue (squeue); the cases go on as soon as "
                 "one is there. Ctrl-C ends the sweep: what was computed is kept, and the same command goes on"
             )
+
+
+def _end_without_workers(cases: _Dispatch, workers: Collection[str]) -> None:
+    """End a sweep whose workers all have another version."""
+    cases.client.cancel(list(cases.futures))
+    raise InputError(
+        f"{cases.other_versions(workers)}: expected workers with the same version; what is finished is kept"
+    )
 
 
 def _stop(cases: _Dispatch) -> None:
     """Have the running cases stop at the end of their step, and wait for those whose workers are there."""
     client = cases.client
 
+    workers = list(cases.matching(_workers(client)))
+
     def tell() -> None:
         with suppress(OSError, RuntimeError, ValueError):  # a worker that does not answer holds up nothing
-            client.run(stop_sweep, cases.name, on_error="ignore")
+            client.run(stop_sweep, cases.name, workers=workers, on_error="ignore")
 
     threading.Thread(target=tell, daemon=True).start()
     until = time.monotonic() + _PATIENCE
@@ -245,7 +347,7 @@ def _stop(cases: _Dispatch) -> None:
 
 def _workers(client: Client) -> set[str]:
     """Addresses of the workers that the scheduler knows."""
-    return set(client.scheduler_info()["workers"])
+    return set(client.nthreads())
 
 
 def _outcome(key: str, result: Any, course: _Course) -> Outcome:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,17 @@ def identity(settings: Study) -> tuple[str, str]:
     stated["surface"] = surface
     stated["numerics"] = NUMERICS_REVISION
     return _digest(stated)[:16], surface[0]
+
+
+def program_version() -> str:
+    """This version of roughvisc, and of the numbers that it gives.
+
+    Examples
+    --------
+    >>> program_version()  # doctest: +SKIP
+    'roughvisc 0.1.dev493+g9bdb14a83 (numerics 15)'
+    """
+    return f"roughvisc {metadata.version('roughvisc')} (numerics {NUMERICS_REVISION})"
 
 
 def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:

@@ -16,14 +16,15 @@ from distributed import Client, KilledWorker, LocalCluster
 from support import LOADS, LONG, assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.errors import EdgeContactError, InUseError, RoughviscError
+from roughvisc.errors import EdgeContactError, InputError, InUseError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution import dispatch
-from roughvisc.study.execution.cluster import connect
+from roughvisc.study.execution.cluster import connect, has_other_versions
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.task import Outcome
 from roughvisc.study.execution.watch import Silence, Watch
 from roughvisc.study.statement.case import vary
+from roughvisc.study.statement.identity import program_version
 from roughvisc.study.storage.failures import record_path
 
 pytestmark = pytest.mark.filterwarnings(
@@ -137,6 +138,67 @@ def test_other_transforms__on_a_worker_are_named_where_bits_are_asked_for(study,
 
 
 # ----------------------------------------------------------------------------------------------------------------
+# workers with another version of roughvisc
+
+
+@contextmanager
+def foreign_worker(client, folder):
+    """A worker process with a package of the same name that states another version and holds nothing else."""
+    (folder / "other" / "roughvisc").mkdir(parents=True)
+    (folder / "other" / "roughvisc" / "__init__.py").write_text('__version__ = "0.0.7"\n')
+    command = [sys.executable, "-m", "dask", "worker", client.scheduler.address, "--nthreads", "1"]
+    process = subprocess.Popen(
+        [*command, "--no-nanny", "--no-dashboard"],
+        cwd=folder / "other",
+        stdout=-3,
+        stderr=-3,
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+def test_other_version__of_all_workers_ends_the_sweep_and_of_some_leaves_them_out(study, tmp_path):
+    cases, version = study(), program_version()
+    with bare_cluster() as client, foreign_worker(client, tmp_path) as process:
+        with pytest.raises(InputError) as caught:  # it joins when the sweep waits already
+            run_cases(cases, tmp_path / "out", watch=Silence(), client=client)
+        ((foreign, _),) = client.nthreads().items()
+        beginning = f"worker {foreign} has roughvisc 0.0.7, while this process has {version}: expected "
+        assert str(caught.value).startswith(beginning)
+        assert not list((tmp_path / "out").glob("*.failed.json"))
+
+        client.cluster.scale(1)
+        client.wait_for_workers(2, timeout=60)
+        assert has_other_versions(client)
+        outcomes = run_cases(cases, tmp_path / "out", watch=(ear := Ear()), client=client)
+        assert [one.kind for one in outcomes.values()] == ["done"] * 4
+        (message,) = ear.messages
+        assert message.startswith(f"worker {foreign} has roughvisc 0.0.7, while this process has {version}: no ")
+        assert process.poll() is None, "it was sent nothing that it cannot load"
+
+
+def test_other_version__cases_of_lost_workers_go_to_those_that_match(study, tmp_path, monkeypatch):
+    """A worker leaves while its cases wait for it alone, and another one comes."""
+    monkeypatch.setattr(dispatch, "_LOOK_EVERY", 0.1)
+    submit, cases = dispatch._Dispatch.submit, study()[:2]
+
+    def nowhere_at_first(self, key, workers=None):
+        lost = self.courses[key].submissions == 0
+        self.refused |= {"tcp://10.0.0.9:1": "0.0.7"}
+        submit(self, key, ["tcp://10.0.0.8:1"] if lost else workers)
+
+    monkeypatch.setattr(dispatch._Dispatch, "submit", nowhere_at_first)
+    with bare_cluster() as client:
+        client.cluster.scale(1)
+        outcomes = run_cases(cases, tmp_path / "out", watch=Ear(), client=client)
+        assert [one.kind for one in outcomes.values()] == ["done"] * 2
+        assert not has_other_versions(client)
+
+
+# ----------------------------------------------------------------------------------------------------------------
 # the client that the user has made the default
 
 
@@ -144,9 +206,9 @@ def test_default_client__computes_cases_and_sweeps(study, tmp_path, monkeypatch)
     cases, reached, submitted = study(), [], []
     submit = dispatch._Dispatch.submit
 
-    def noted(self, key):
+    def noted(self, key, workers=None):
         submitted.append(key)
-        submit(self, key)
+        submit(self, key, workers)
 
     monkeypatch.setattr(dispatch._Dispatch, "submit", noted)
     first, second, third, fourth = (case.key for case in cases)
@@ -206,7 +268,8 @@ def kill_working(client, times):
         while len(killer.victims) < times and time.monotonic() < until:
             busy = [worker for worker, keys in client.processing().items() if keys]
             for worker in busy[:1]:
-                pid = client.run(os.getpid, workers=[worker], on_error="ignore").get(worker)
+                begun = "__import__('roughvisc.study.execution.task') and __import__('os').getpid()"
+                pid = client.run(eval, begun, workers=[worker], on_error="ignore").get(worker)
                 time.sleep(0.3)
                 if pid and pid not in killer.victims and client.processing().get(worker):
                     os.kill(pid, signal.SIGKILL)
