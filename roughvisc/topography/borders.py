@@ -1,4 +1,4 @@
-"""Opposite borders of a surface that is to repeat: whether they meet."""
+"""Surfaces that repeat: whether one was made to, and whether its opposite borders meet."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.topography.blocks import deviation_of, row_blocks
+from roughvisc.topography.grid import spacing
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
 JUMP = 2.0
@@ -57,6 +58,28 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
         of_rms.append(across / rms if rms > 0 else 0.0)
         of_neighbours.append(across / beside if beside > 0 else 0.0)
     return BorderMismatch((of_rms[0], of_rms[1]), (of_neighbours[0], of_neighbours[1]))
+
+
+def period_of(h: xr.DataArray) -> list[float]:
+    """Sides of a grid, as the attribute ``period`` of one that is a period of a surface gives them. [m]"""
+    return [n * d for n, d in zip(h.shape, spacing(h), strict=True)]
+
+
+def is_periodic(h: xr.DataArray) -> bool:
+    """Whether a surface was made to repeat, and the grid still is one period of it.
+
+    Attributes stay through selection and arithmetic. Therefore the attribute ``period`` is believed only where it gives
+    the sides of the grid, and the step at the borders is at most four times what neighbouring rows differ by.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+    """
+    period = np.asarray(h.attrs.get("period", ()))
+    if period.shape != (2,) or not np.allclose(period, period_of(h), rtol=1e-6, atol=0):
+        return False
+    return max(border_mismatch(h).of_neighbours) <= 2 * JUMP
 
 
 def _differences(values: np.ndarray, axis: int) -> Iterator[np.ndarray]:

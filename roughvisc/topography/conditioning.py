@@ -4,9 +4,10 @@ Every function takes a grid and gives a new one; what was done stands in the att
 NaN, and stay so until :func:`fill`. The same steps are methods of the accessor ``h.roughvisc``.
 """
 
-from roughvisc.topography.bandwidth import band_limit, gaussian_filter, level, resample
+from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90, taper
 from roughvisc.topography.missing_points import fill, mask_outliers
+from roughvisc.topography.resampling import band_limit, resample
 
 __all__ = [
     "level",

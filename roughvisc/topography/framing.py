@@ -10,6 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.blocks import mean_of, row_blocks
+from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
     like,
@@ -45,6 +46,7 @@ def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, 
         If limits are no pair, or fewer than two cells lie within in a direction.
     """
     h = checked(h, "crop")
+    whole = h.shape
     for axis, limits in (("x", x), ("y", y)):
         if limits is None:
             continue
@@ -57,7 +59,8 @@ def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, 
             held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
             raise InputError(f"crop: {axis} is {limits!r}: expected limits that hold two cells at least of {held} m")
         h = h.isel({axis: inside})
-    return noted(h, f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {x or 'all'}, y {y or 'all'} m")
+    line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {x or 'all'}, y {y or 'all'} m"
+    return noted(h, line, **({} if h.shape == whole else {"period": None}))
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
@@ -87,7 +90,8 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     if "filled" in h.coords:
         turned = np.rot90(h["filled"].transpose("x", "y").values, turns)
         grid = grid.assign_coords(filled=(("x", "y"), turned, h["filled"].attrs))
-    return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise")
+    kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
+    return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
 
 
 def invert(h: xr.DataArray) -> xr.DataArray:
@@ -127,7 +131,8 @@ def combine(
     align : {"grid", "centre"}, default "grid"
         "grid": the two are on one grid. "centre": the second face, turned over, is laid with its centre on that of the
         first; the sum is on those cells of the first that the second covers wholly. Over them the second is
-        averaged by area where its cells are smaller, and linear between its cell centres where they are larger.
+        averaged by area where its cells are smaller. Where they are larger it is interpolated between its cell centres,
+        by a cubic spline, or linearly if points of it are missing.
     offset : pair of float
         How far the second's centre lies from that of the first, along x and y; with `align` "centre". [m]
 
@@ -153,6 +158,7 @@ def combine(
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
+    repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
     if flip not in (None, "x", "y"):
         raise InputError(f"combine: flip is {flip!r}: expected 'x', 'y' or None")
     if align not in ("grid", "centre"):
@@ -163,14 +169,16 @@ def combine(
     h2 = h2 if flip is None else _reversed(h2, flip)
     line += f", reversed along {flip}" if flip else ""
     if align == "centre":
-        h1, h2 = laid_on(h1, h2, offset)
+        h1, h2, way = laid_on(h1, h2, offset)
         apart = ", ".join(f"{float(d):.6g}" for d in offset)
         line += f", its centre ({apart}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
+        line += f", {way}"
     elif tuple(offset) != (0.0, 0.0):
         raise InputError(f"combine: offset is {offset!r} with align='grid': expected align='centre'")
     _refuse_another_grid(h1, h2)
     both = like(h1, h1.values + h2.values)
-    both.attrs = {key: value for key, value in h1.attrs.items() if key not in ("recipe", "highest", "missing")}
+    lost = {"recipe", "highest", "missing"} | (set() if repeats else {"period"})
+    both.attrs = {key: value for key, value in h1.attrs.items() if key not in lost}
     if _absent_only(h1) and _absent_only(h2) and np.isnan(both.values).any():
         both.attrs["missing"] = "absent"
     tapers = taper_weights(h1), taper_weights(h2)
@@ -259,7 +267,8 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
     if before is not None:
         weights = (profiles[0] * before[0], profiles[1] * before[1])
     tapered = with_taper_weights(like(h, heights), weights)
-    return noted(tapered, f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m")
+    line = f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m"
+    return noted(tapered, line, period=period_of(h))
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
@@ -291,7 +300,8 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     weights = taper_weights(h)
     if weights is not None:
         weights = (np.r_[weights[0], weights[0][::-1]], np.r_[weights[1], weights[1][::-1]])
-    return noted(with_taper_weights(doubled, weights), "mirrored along x and y")
+    doubled = with_taper_weights(doubled, weights)
+    return noted(doubled, "mirrored along x and y", period=period_of(doubled))
 
 
 def _with_images(values: np.ndarray) -> np.ndarray:

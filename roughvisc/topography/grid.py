@@ -279,12 +279,13 @@ def cell_edges(centres: Any) -> np.ndarray:
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
-    """The same grid with one more line in its history, and further attributes."""
+    """The same grid with one more line in its history, and further attributes; those given as None are dropped."""
     history = h.attrs.get("history")
     h = h.copy(deep=False)
     if "filled" in h.coords:
         attrs["filled_points"] = int(h["filled"].sum())
-    h.attrs = {**h.attrs, **attrs, "history": f"{history}\n{line}" if history else line}
+    stated = {**h.attrs, **attrs, "history": f"{history}\n{line}" if history else line}
+    h.attrs = {name: value for name, value in stated.items() if value is not None}
     return h
 
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.bandwidth import averaged
 from roughvisc.topography.grid import number, spacing, taper_weights, with_coordinates, with_taper_weights
+from roughvisc.topography.resampling import Cells, lay_on_cells, marked
 
-#: Part of a cell that rounding may take off an overlap.
+#: Part of a cell by which rounding may move a border.
 _ROUNDING = 1e-9
 
 
-def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tuple[xr.DataArray, xr.DataArray]:
+def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tuple[xr.DataArray, xr.DataArray, str]:
     """Both faces on those cells of the first that the second covers wholly, laid centre on centre.
 
     Parameters
@@ -30,7 +29,9 @@ def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tup
     -------
     first, second : xarray.DataArray
         On the coordinates of the first. The second is averaged by area where its cells are not larger than those of the
-        first, and linear between its cell centres where they are. [m]
+        first, and by cubic spline between its cell centres where they are (linear, if points of it are missing). [m]
+    way : str
+        Which of these it was.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tup
     if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
         raise InputError(f"combine: offset is {offset!r}: expected a pair of lengths, along x and along y [m]")
     apart = [number("offset", d, "m", low=-np.inf) for d in offset]
-    kept, weights = {}, []
+    kept, cells = {}, []
     for axis, d1, d2, by in zip(("x", "y"), spacing(h1), spacing(h2), apart, strict=True):
         n1, n2 = h1.sizes[axis], h2.sizes[axis]
         lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
@@ -52,44 +53,14 @@ def laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any = (0.0, 0.0)) -> tup
                 f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected two cells at least"
             )
         kept[axis] = covered
-        weights.append(_weights(lower[covered], side, n2))
+        cells.append(Cells(lower[covered], side, n2))
     first = h1.isel(kept)
-    heights, filled = averaged(h2, *weights)
+    heights, way = lay_on_cells(h2, *cells)
+    filled = marked(h2, *cells)
     second = with_coordinates(heights, first["x"].values, first["y"].values, h2.attrs)
     tapered = taper_weights(h2)
     if tapered is not None:
-        second = with_taper_weights(second, (weights[0] @ tapered[0], weights[1] @ tapered[1]))
-    return first, second if filled is None else second.assign_coords(filled=(("x", "y"), filled, h2["filled"].attrs))
-
-
-def _weights(lower: np.ndarray, side: float, count: int) -> scipy.sparse.csr_array:
-    """Rows that sum to one: weights of the second's cells in each cell of the first.
-
-    Parameters
-    ----------
-    lower : ndarray
-        Lower borders of the first's cells, in cells of the second from its border.
-    side : float
-        Their side, likewise.
-    count : int
-        Cells of the second.
-    """
-    rows, columns, entries = [], [], []
-    here = np.arange(lower.size)
-    if side < 1 - _ROUNDING:
-        at = np.clip(lower + side / 2 - 0.5, 0, count - 1)
-        first = np.minimum(at.astype(int), max(count - 2, 0))
-        rows, columns, entries = [here, here], [first, np.minimum(first + 1, count - 1)], [1 - at + first, at - first]
-    else:
-        begin = np.floor(lower + _ROUNDING).astype(int)
-        for step in range(int(np.ceil(side)) + 2):
-            cell = begin + step
-            share = np.minimum(lower + side, cell + 1) - np.maximum(lower, cell)
-            used = (share > _ROUNDING) & (cell >= 0) & (cell < count)
-            rows.append(here[used])
-            columns.append(cell[used])
-            entries.append(share[used])
-    shares = scipy.sparse.csr_array(
-        (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=(lower.size, count)
-    )
-    return scipy.sparse.diags_array(1 / shares.sum(axis=1)) @ shares
+        second = with_taper_weights(second, (cells[0].weights() @ tapered[0], cells[1].weights() @ tapered[1]))
+    if filled is not None:
+        second = second.assign_coords(filled=(("x", "y"), filled, h2["filled"].attrs))
+    return first, second, way

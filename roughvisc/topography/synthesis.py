@@ -59,7 +59,8 @@ def wavy(amplitude: float, wavelength: float, size: Any, shape: Any, waves: int 
     ]
     heights = amplitude * along[0][:, None] * (along[1] if waves == 2 else np.ones(shape[1]))
     parameters = {"amplitude": amplitude, "wavelength": wavelength, "waves": int(waves)}
-    return labelled(heights, cell_of(size, shape), recipe_of("wavy", parameters, size, shape))
+    attrs = recipe_of("wavy", parameters, size, shape) | {"period": list(size)}
+    return labelled(heights, cell_of(size, shape), attrs)
 
 
 def self_affine(
@@ -145,7 +146,8 @@ def self_affine(
     heights *= target / math.sqrt(slope2 if rms_height is None else variance)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "seed": _plain_seed(seed)}
-    return labelled(heights, cell_of(size, shape), recipe_of("self_affine", parameters, size, shape))
+    attrs = recipe_of("self_affine", parameters, size, shape) | {"period": list(size)}
+    return labelled(heights, cell_of(size, shape), attrs)
 
 
 def _plain_seed(seed: Any) -> int | None:

@@ -18,10 +18,15 @@ PRESSURES = (0.003, 0.02)  # over the contact modulus
 
 def filtered(h, shape):
     """Means after a Gaussian filter of two of the new cells."""
-    return rv.resample(rv.gaussian_filter(h, 4 / h.shape[0], periodic=True), shape)
+    return means(rv.gaussian_filter(h, 4 / h.shape[0], periodic=True), shape)
 
 
-WAYS = {"band_limit": rv.band_limit, "resample": rv.resample, "gaussian_filter, resample": filtered}
+def means(h, shape):
+    """Means over the new cells."""
+    return rv.resample(h, shape, periodic=False)
+
+
+WAYS = {"waves": rv.resample, "means": means, "gaussian_filter, means": filtered}
 
 
 def contact(h, pressure):

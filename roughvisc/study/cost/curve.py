@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.study.cost.estimate import March, coarse
+from roughvisc.study.simulation.coarser import on_fewer_cells
 from roughvisc.study.simulation.footprint import PROCESS, curve_bytes
 from roughvisc.study.simulation.friction import rub
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
-from roughvisc.topography.bandwidth import resample
 
 #: Sides of the coarse grids, in cells, and by what factors a curve may grow dearer from a grid to one twice as fine.
 _COARSE, _GROWS = (24, 48), (1.0, 1.5)
@@ -74,7 +74,7 @@ def _convolutions(case: Case, height: xr.DataArray, side: int) -> tuple[float, t
 
 
 def _coarser(height: xr.DataArray, side: int, shape: tuple[int, ...]) -> xr.DataArray:
-    """The surface on fewer cells: means of what is measured; missing points, which are refused, stay missing."""
+    """The surface on fewer cells, with the waves that they hold; missing points, which are refused, stay missing."""
     if not np.isfinite(height.values).all():
         return coarse(height, side)
-    return resample(height, (shape[0], shape[1]))
+    return on_fewer_cells(height, (shape[0], shape[1]), "periodic")

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
@@ -44,12 +45,11 @@ from roughvisc.study.simulation.available import Available, memory_available
 from roughvisc.study.simulation.coarser import coarser
 from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.refusal import PART, too_large
-from roughvisc.study.simulation.scene import Ground, follows, is_absent, memory_wanted
+from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.parameters import labels_of, parameters_of
-from roughvisc.topography.bandwidth import band_limit, resample
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 
@@ -137,7 +137,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
     """Surfaces that differ by their seed alone cost the same; under a kernel that bulges they have no windows."""
     surface = {key: value for key, value in stated["surface"].items() if key != "seed"}
-    return f"{json.dumps(surface, sort_keys=True)} {case.kernel()!r}"
+    return f"{json.dumps(surface, sort_keys=True)} {case.kernel()!r} {case.settings.solve.boundary}"
 
 
 def _marches(
@@ -176,20 +176,26 @@ def _spread(count: int) -> list[int]:
 def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
-        missing = case.settings.surface.missing
-        ground = Ground(height, missing, follow=True, mirror=True, kernel=case.kernel())
+        boundary = case.settings.solve.boundary
+        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
     except InputError as error:
         return _Surface(None, False, str(error))
     return _Surface(
-        height, ground.can_grow(), "", windows(ground), ground.mirrored, rms_slope(height), _half_slope(height, missing)
+        height,
+        ground.can_grow(),
+        "",
+        windows(ground),
+        ground.mirrored,
+        rms_slope(height),
+        _half_slope(height, boundary),
     )
 
 
-def _half_slope(height: xr.DataArray, missing: str = Settings.missing) -> float:
+def _half_slope(height: xr.DataArray, boundary: Boundary = Settings.boundary) -> float:
     """Root mean square slope on cells twice as long; missing where there are too few cells."""
     if min(height.shape) < _HALVED:
         return math.nan
-    return rms_slope(coarser(height, 2.0, resample if is_absent(height, missing) else band_limit))
+    return rms_slope(coarser(height, 2.0, boundary))
 
 
 def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:

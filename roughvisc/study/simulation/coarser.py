@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.topography.bandwidth import resample
+from roughvisc.mechanics.halfspace.operator import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import remade
+from roughvisc.topography.resampling import band_limit, resample
 
 Array = NDArray[np.float64]
 
@@ -33,16 +33,30 @@ def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> t
     return counts[0], counts[1]
 
 
-def coarser(
-    height: xr.DataArray, factor: float, by: Callable[[xr.DataArray, tuple[int, int]], xr.DataArray] = resample
-) -> xr.DataArray:
-    """A surface on cells about so many times longer: an indenter made anew, anything else by means over blocks. [m]
+def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataArray:
+    """A surface on cells about so many times longer. [m]
 
-    ``by`` may say what else gives a height on another number of cells.
+    An indenter is made anew. Any other surface keeps the waves that the cells can hold, by :func:`on_fewer_cells`.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Of the surface. [m]
+    factor : float
+        How many times longer the cells are.
+    boundary : {"free", "periodic"}
+        Of the run: with "periodic" every surface repeats.
     """
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
-    return by(height, coarser_shape(shape, factor, False)) if few is None else few
+    return on_fewer_cells(height, coarser_shape(shape, factor, False), boundary) if few is None else few
+
+
+def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Boundary) -> xr.DataArray:
+    """A surface with the waves that a coarser grid can hold; by means over its cells where points are missing. [m]"""
+    if not np.isfinite(height.values).all():
+        return resample(height, shape)
+    return band_limit(height, shape, periodic=True if boundary == "periodic" else None)
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:

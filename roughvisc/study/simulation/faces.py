@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact.neighbours import staircase
@@ -17,6 +16,7 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.study.simulation.coarser import coarser_shape
 from roughvisc.study.simulation.scene import Ground
+from roughvisc.topography.resampling import resample_periodic
 from roughvisc.topography.spectrum import without_last_octave
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ class Face:
         if shape == self.gap.shape:
             return None
         sides = [side * many / few for side, many, few in zip(self.spacing, self.gap.shape, shape, strict=True)]
-        gap = _sampled(_sampled(self.gap, shape[0], 0), shape[1], 1)
+        gap = resample_periodic(self.gap, shape, first_kept=True)
         return Face(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
 
     @property
@@ -140,15 +140,6 @@ class Face:
 def on_rows(field: Array, sliding: Sliding) -> Array:
     """A field over the cells of a surface, on the rows of an operator."""
     return np.ascontiguousarray(field[:, : sliding.shape[1]])
-
-
-def _sampled(field: Array, count: int, axis: int) -> Array:
-    """The waves of a field along an axis on fewer cells, those that are too short for these left out."""
-    before = field.shape[axis]
-    spectrum = np.moveaxis(fft.rfft(field, axis=axis), axis, 0)[: count // 2 + 1].copy()
-    if count % 2 == 0 and count < before:
-        spectrum[-1] *= 2  # of both signs, which such cells do not tell apart
-    return np.asarray(fft.irfft(np.moveaxis(spectrum, 0, axis), n=count, axis=axis) * (count / before))
 
 
 def areas(contact: NDArray[np.bool_], spacing: tuple[float, float]) -> tuple[float, float]:

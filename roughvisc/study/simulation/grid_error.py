@@ -57,11 +57,12 @@ def with_grid_error(
     ``grid_error`` is the larger one of the errors of the pressure (L1, over the largest force, so that the error of
     the force is in it) and of the approach (over the largest), ``grid_error_area`` that of the contact area. All
     runs have an error in time within the tolerance, so that these are no estimates much below it. Missing where
-    there is no coarser solution; where there is one but no third grid, the safety factor is larger.
+    there is no coarser solution; where there is one but no third grid, the safety factor is larger. The coarser grids
+    have all waves that they can hold: see :func:`~roughvisc.study.simulation.coarser.coarser`.
     """
     times = [float(t) for t in dataset["time"].values]
     try:
-        few = coarser(height, 2.0)
+        few = coarser(height, 2.0, dataset.attrs["boundary"])
         if few.size == height.size:
             raise RoughviscError(f"{height.shape[0]} x {height.shape[1]} cells are the fewest that there can be")
         second = press_again(few, times)
@@ -71,7 +72,7 @@ def with_grid_error(
         return _with_errors(dataset, nothing, nothing)
     third = None
     try:
-        fewest = coarser(height, 4.0)
+        fewest = coarser(height, 4.0, dataset.attrs["boundary"])
         third = press_again(fewest, times) if fewest.size < few.size else None
     except RoughviscError as error:
         log.info("grid error from two grids: the third solve failed: %s", error)

@@ -125,11 +125,11 @@ def test_grid_error__takes_no_grid_for_another(monkeypatch):
     three = pressed((33, 31))
     sound, asked = grid_error.coarser, []
 
-    def refused(height, factor):
+    def refused(height, factor, boundary):
         asked.append(factor)
         if factor > 2:
             raise rv.InputError("no third grid")
-        return sound(height, factor)
+        return sound(height, factor, boundary)
 
     monkeypatch.setattr(grid_error, "coarser", refused)
     two = pressed((33, 31))
@@ -201,14 +201,29 @@ def test_direct_memory__is_refused_where_it_would_ring():
         rv.simulate(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, memory="direct", progress=False)
 
 
-def test_coarser__makes_an_indenter_anew_and_averages_anything_else():
+def test_coarser__makes_an_indenter_anew_and_averages_where_points_are_missing():
     ball = rv.sphere(RADIUS, SIZE, (31, 24))
-    few = coarser(ball, 2)
+    few = coarser(ball, 2, "free")
     assert few.shape == (17, 12)
     assert grown(few) is not None
-    rough = rv.self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2)
-    means = rough.values.reshape(15, 2, 12, 2).mean((1, 3))
-    assert coarser(rough, 2).values == pytest.approx(means, abs=1e-12 * float(abs(rough).max()))
+    holed = rv.self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2)
+    holed[:2, :2] = np.nan
+    means = holed.values.reshape(15, 2, 12, 2).mean((1, 3))
+    for boundary in ("free", "periodic"):
+        found = coarser(holed, 2, boundary).values
+        assert found == pytest.approx(means, abs=1e-12 * float(abs(holed).max()), nan_ok=True)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_coarser__keeps_the_cosines_of_a_scan_or_its_waves_under_periodic_boundaries(boundary):
+    """Closed forms: one half wave along x has no step at mirror images, one whole wave none at the next period."""
+    number = {"free": 0.5, "periodic": 1.0}[boundary]
+
+    def wave(cells):
+        x = (np.arange(cells) + 0.5) / cells
+        return rv.from_array(1e-6 * np.cos(2 * np.pi * number * x)[:, None] * np.ones(cells), 1e-3 / cells)
+
+    xr.testing.assert_allclose(coarser(wave(30), 2, boundary), wave(15), rtol=1e-12, atol=1e-18)
 
 
 def test_block_means__conserve_the_force_on_any_grid():

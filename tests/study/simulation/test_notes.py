@@ -104,7 +104,7 @@ def test_edge_note__says_when_contact_came_to_the_border(caplog):
     assert inside.attrs["edge"] == "accept"
     assert "edge_note" not in inside.attrs
     assert "edge" not in ball_pressed(0.2 * depth).attrs
-    periodic = ball_pressed(0.2 * depth, edge="accept", boundary="periodic")
+    periodic = ball_pressed(0.05 * depth, edge="accept", boundary="periodic")
     assert (periodic.attrs["edge"], "edge_note" in periodic.attrs) == ("accept", False)
     assert "punch" not in caplog.text
 

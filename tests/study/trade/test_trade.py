@@ -303,7 +303,7 @@ def test_scan__shows_what_coarsening_makes_of_the_surface(tmp_path):
     assert share.values == pytest.approx(1, abs=0.1), "at this tolerance the grid makes the whole error"
     assert "the grid is data" in ds.attrs["recommendation"]
     few = changed(case, (30, 26), Setting(coarsening=2.0)).height()
-    x, y = (_cosines_at(old, new) for old, new in ((30, 15), (26, 13)))
+    x, y = (_waves_at(old, new) for old, new in ((30, 15), (26, 13)))
     expected = x @ case.height().values @ y.T
     assert few.values == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
@@ -317,12 +317,13 @@ def test_card_of_a_punch__is_made_coarser_by_means(tmp_path):
     assert np.isfinite(ds.run_time).all()
 
 
-def _cosines_at(old, new):
-    """Values at the centres of fewer cells, from values at more, by the cosines that fewer cells hold."""
-    waves = np.pi * np.arange(new)
-    fine, few = (np.cos(np.outer((np.arange(n) + 0.5) / n, waves)) for n in (old, new))
-    weights = np.where(waves == 0, 1.0, 2.0) / old
-    return few @ (weights[:, None] * fine.T)
+def _waves_at(old, new):
+    """Values at the centres of fewer cells, from values at more, by the waves that fewer cells hold."""
+    number = np.arange(new) - (new - 1) // 2
+    fine, few = (
+        np.exp(2j * np.pi * np.outer((np.arange(n) + 0.5) / n, number[2 * abs(number) < new])) for n in (old, new)
+    )
+    return (few @ fine.conj().T).real / old
 
 
 def test_ladder__suits_the_scene(tmp_path):

@@ -1,0 +1,197 @@
+"""Surfaces on other grids: against waves, polynomials and contacts that are known on any grid."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import examples, shapes
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.simulation.coarser import coarser
+from roughvisc.study.simulation.mirror import is_mirrored
+from roughvisc.topography.borders import border_mismatch, is_periodic
+
+SIZE = (1e-3, 0.8e-3)
+#: Waves of a surface: numbers over the sides, amplitude [m] and phase; none shorter than a seventh of a side.
+WAVES = [
+    (*number, 4e-6 / (number[0] ** 2 + number[1] ** 2), phase)
+    for number, phase in zip(
+        [(1, 0), (0, 1), (2, 1), (-1, 2), (3, -2), (1, 4), (5, 1), (-4, 3), (6, -6), (2, 7)],
+        np.random.default_rng(0).uniform(0, 2 * np.pi, 10),
+        strict=True,
+    )
+]
+
+
+def sum_of_waves(shape, waves=WAVES):
+    """Heights at the cell centres, from the waves themselves. [m]"""
+    x, y = ((np.arange(n) + 0.5) / n for n in shape)
+    phase = [2 * np.pi * (i * x[:, None] + j * y) + at for i, j, _, at in waves]
+    heights = sum(a * np.cos(p) for (_, _, a, _), p in zip(waves, phase, strict=True))
+    return rv.from_array(heights, [side / n for side, n in zip(SIZE, shape, strict=True)])
+
+
+@pytest.mark.parametrize("way", [rv.resample, rv.band_limit])
+@examples(60)
+@given(
+    old=shapes(3, 24),
+    new=shapes(2, 30),
+    number=st.tuples(st.integers(-12, 12), st.integers(-12, 12)),
+    phase=st.floats(0, 6.3),
+)
+def test_resample__keeps_the_waves_that_both_grids_hold_at_their_place_and_no_others(way, old, new, number, phase):
+    if not all(2 * abs(k) < n for k, n in zip(number, old, strict=True)):
+        return  # another wave on the old grid
+    held = all(2 * abs(k) < m or m == n for k, m, n in zip(number, new, old, strict=True))
+    waves = [(0, 0, 3e-6, 0.0), (*number, 2e-6, phase)]
+    found = way(sum_of_waves(old, waves), new, periodic=True)
+    expected = sum_of_waves(new, waves[: 1 + held])
+    xr.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-18)
+    assert found.attrs["history"].endswith("cells, by Fourier interpolation")
+
+
+def test_resample__a_wave_of_two_cells_is_a_sine_on_a_finer_grid_and_none_on_a_coarser_one():
+    two = rv.from_array(1e-6 * np.outer((-1.0) ** np.arange(6), np.ones(5)), 1e-6)
+    fine = rv.resample(two, (15, 5), periodic=True)
+    np.testing.assert_allclose(fine, np.outer(1e-6 * np.sin(np.pi * fine.x / 1e-6), np.ones(5)), atol=1e-20)
+    np.testing.assert_allclose(
+        rv.resample(sum_of_waves((13, 5), [(2, 0, 1e-6, 0.4)]), (4, 5), periodic=True), 0, atol=1e-20
+    )
+
+
+def test_resample__a_mirrored_surface_stays_its_own_mirror_image():
+    half = rv.self_affine(SIZE, (22, 17), hurst=0.8, rms_slope=0.1, seed=4)
+    for shape in ((60, 44), (20, 26)):
+        found = rv.resample(rv.mirror(half), shape)
+        assert is_mirrored(found.values)
+        quarter = rv.band_limit(half, [n // 2 for n in shape], periodic=False)  # cosines: the mirror images are in them
+        np.testing.assert_allclose(found, rv.mirror(quarter), rtol=0, atol=1e-12 * float(abs(half).max()))
+
+
+def test_resample__no_step_at_the_seam_of_its_own_making():
+    """The waves themselves say how much opposite borders differ; beside a spline, which does not know of the seam."""
+    few, fine = sum_of_waves((18, 17)), sum_of_waves((54, 85))
+    across = [border_mismatch(h).of_neighbours for h in (fine, rv.resample(few, fine.shape, periodic=True))]
+    np.testing.assert_allclose(*across, rtol=1e-9)
+    assert border_mismatch(rv.resample(few, fine.shape, periodic=False)).jumps
+
+
+RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
+
+
+def test_resample__friction_of_a_refined_surface_is_that_of_the_same_waves_on_the_finer_grid():
+    few, fine = rv.resample(sum_of_waves((18, 16)), (36, 40), periodic=True), sum_of_waves((36, 40))
+    asked = {"pressure": 4e4, "speeds": 0.3, "tolerance": 1e-4, "progress": False}
+    found, exact = (rv.friction(h, RUBBER, **asked) for h in (few, fine))
+    for name in ("friction_coefficient", "contact_area_corrected"):
+        np.testing.assert_allclose(found[name], exact[name], rtol=1e-4)  # the tolerance
+
+
+def test_resample__leak_under_a_refined_surface_is_that_under_the_same_waves_on_the_finer_grid():
+    few, fine = rv.resample(sum_of_waves((18, 16)), (36, 40), periodic=True), sum_of_waves((36, 40))
+    program = rv.Program().pressure(1e4, over=0)
+    leaks = []
+    for h in (few, fine):
+        ds = rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", progress=False, tolerance=1e-6)
+        leaks.append(rv.observables.leakage(ds, viscosity=1e-3, pressure_drop=1e5).leak_rate.values)
+    assert leaks[0] == pytest.approx(leaks[1], rel=1e-6)
+    assert leaks[0] > 0
+
+
+def test_coarser__changes_the_area_less_than_block_means_do():
+    """The surfaces that `grid_error` presses under periodic boundaries; what it states holds the error of the area."""
+    asked = {"boundary": "periodic", "progress": False, "fields": ("pressure",)}
+    fine = rv.self_affine(SIZE, (60, 48), hurst=0.8, rms_slope=0.1, rolloff=4e-4, shortcut=SIZE[0] / 15, seed=0)
+    half = coarser(
+        rv.from_array(fine.values, [side / n for side, n in zip(SIZE, fine.shape, strict=True)]), 2, "periodic"
+    )
+    means = half.copy(data=fine.values.reshape(30, 2, 24, 2).mean((1, 3)))
+    finest = rv.resample(fine, (180, 144))
+    changes = []
+    for pressure in (1e4, 2e4, 4e4, 8e4):
+        program = rv.Program().pressure(pressure, over=0)
+        grids = [rv.simulate(h, rv.elastic(1e6), program, **asked) for h in (half, means, finest)]
+        found = rv.simulate(fine, rv.elastic(1e6), program, grid_error=True, **asked)
+        areas = [float(ds.contact_area_corrected[-1]) for ds in (found, *grids)]
+        changes.append([abs(area / areas[0] - 1) for area in areas[1:]])
+        assert float(found.grid_error_area[-1]) > abs(1 - areas[0] / areas[3])
+    waves, blocks, _ = np.mean(changes, axis=0)
+    assert waves < 0.7 * blocks
+
+
+def test_resample__other_surfaces_finer_are_the_cubic_through_the_centres_held_beyond_them():
+    x, y = ((np.arange(n) + 0.5) for n in (9, 7))
+
+    def cubic(x, y):
+        return 1e-6 * np.outer(1 + 2 * x - 0.3 * x**2 + 0.02 * x**3, 2 - y + 0.1 * y**3)
+
+    h = rv.from_array(cubic(x, y), 1.0)
+    fine = rv.resample(h, (20, 31))
+    assert fine.attrs["history"].endswith("9 x 7 to 20 x 31 cells, by cubic spline")
+    expected = cubic(np.clip(fine.x, 0.5, 8.5), np.clip(fine.y, 0.5, 6.5))
+    np.testing.assert_allclose(fine, expected, rtol=1e-10, atol=1e-18)
+    np.testing.assert_allclose(rv.resample(h, h.shape), h, rtol=1e-14)
+
+
+@pytest.mark.parametrize("cells", [2, 3])
+def test_resample__few_centres_finer_are_the_polynomial_through_them(cells):
+    x = np.arange(cells) + 0.5
+    h = rv.from_array(1e-6 * np.outer(1 + 2 * x ** (cells - 1), np.ones(4)), 1.0)
+    fine = rv.resample(h, (4 * cells, 4))
+    at = np.clip(fine.x, 0.5, cells - 0.5)
+    np.testing.assert_allclose(fine, np.outer(1e-6 * (1 + 2 * at ** (cells - 1)), np.ones(4)), rtol=1e-12)
+
+
+def test_resample__each_axis_goes_its_own_way_and_says_so():
+    values = np.random.default_rng(2).normal(0, 1e-6, (12, 5))
+    found = rv.resample(rv.from_array(values, 1e-6), (4, 15))
+    assert found.attrs["history"].endswith("by means over cells along x, by cubic spline along y")
+    np.testing.assert_allclose(found[:, 1::3], values.reshape(4, 3, 5).mean(1), rtol=1e-12)
+
+
+def test_resample__missing_points_stay_missing_beside_straight_lines():
+    values = np.random.default_rng(3).normal(0, 1e-6, (9, 8))
+    values[6:, 6:] = np.nan
+    h = rv.from_array(values, 1e-6)
+    fine = rv.resample(h, (27, 24))
+    assert fine.attrs["history"].endswith("9 x 8 to 27 x 24 cells, linearly")
+    np.testing.assert_allclose(fine[1::3, 1::3], h, rtol=1e-12)
+    np.testing.assert_allclose(fine[2, 1], (2 * h[0, 0] + h[1, 0]) / 3, rtol=1e-12)
+    marked = rv.resample(rv.fill(h.where(h.x > 3e-6)), (5, 8))
+    np.testing.assert_array_equal(marked["filled"].any("y"), [True, True, False, True, True])
+    for refused, said in ((True, "6 points are missing: expected none"), ("x", "periodic is 'x': expected True")):
+        with pytest.raises(InputError, match=said):
+            rv.resample(h, 5, periodic=refused)
+
+
+MADE = {
+    "self_affine": rv.self_affine(SIZE, (21, 16), hurst=0.9, rms_slope=0.1, seed=1),
+    "wavy": rv.wavy(1e-6, 1e-4, SIZE, (50, 48)),
+    "mirror": rv.mirror(sum_of_waves((13, 9)).isel(x=slice(7))),
+    "taper": rv.taper(sum_of_waves((31, 26)) + 0.1 * sum_of_waves((31, 26)).x, 1.2e-4),
+}
+
+
+@pytest.mark.parametrize("h", MADE.values(), ids=MADE)
+def test_is_periodic__of_what_was_made_to_repeat_as_long_as_it_does(h, tmp_path):
+    h.to_netcdf(tmp_path / "h.nc")
+    turned = rv.rotate90(h)
+    for same in (h, 2 * h, rv.invert(h), turned, rv.combine(h, h), rv.level(h, 0), rv.resample(h, (40, 33))):
+        assert is_periodic(same)
+    assert is_periodic(xr.load_dataarray(tmp_path / "h.nc"))
+    assert turned.attrs["period"] == pytest.approx(h.attrs["period"][::-1])
+    limits = (float(h.x[1]), float(h.x[-1]))
+    others = [rv.crop(h, x=limits), h.isel(x=slice(1, None)), rv.level(h), rv.gaussian_filter(h, 3.1e-4)]
+    others += [h + 0.1 * h.x, rv.combine(h, sum_of_waves(h.shape).assign_coords(x=h.x, y=h.y))]
+    assert not any(is_periodic(other) for other in others)
+    assert "Fourier" in rv.resample(h, (40, 33)).attrs["history"]
+    assert "spline" in rv.resample(others[1], (90, 90)).attrs["history"]
+
+
+def test_is_periodic__is_not_said_of_a_scan_unless_the_user_does():
+    scan = sum_of_waves((21, 16))
+    assert not is_periodic(scan)
+    assert is_periodic(rv.resample(scan, (30, 31), periodic=True))
+    assert not is_periodic(rv.resample(MADE["self_affine"], (30, 31), periodic=False))
