@@ -133,6 +133,96 @@ def test_self_affine__phases_are_random_and_the_seed_decides():
     assert abs(np.exp(1j * phases).mean()) < 0.25
 
 
+def waves_of(h):
+    """Waves of a periodic grid by their whole numbers (k_x, k_y >= 0), about the corner of the domain. [m]
+
+    Row and column of the transform are found one by one, and half a cell is taken off the place of the centres.
+    """
+    h_q, found = np.fft.fft2(h.values) / h.size, {}
+    for k_x in range(-(h.shape[0] - 1) // 2 + 1, (h.shape[0] + 1) // 2):
+        for k_y in range((h.shape[1] + 1) // 2):
+            found[k_x, k_y] = h_q[k_x, k_y] * np.exp(-1j * np.pi * (k_x / h.shape[0] + k_y / h.shape[1]))
+    return found
+
+
+SPECTRA = {
+    "isotropic": {"hurst": 0.7, "rolloff": 1e-3, "rms_slope": 0.1},
+    "gaussian, along x": {"hurst": 0.4, "rms_height": 1e-6, "anisotropy": 2.0, "amplitudes": "gaussian"},
+}
+
+
+@pytest.mark.parametrize("spectrum", SPECTRA.values(), ids=SPECTRA)
+@examples(12)
+@given(coarse=shapes(14, 27), fine=shapes(14, 41), seed=st.integers(0, 2**32))
+def test_self_affine__a_seed_is_one_surface_on_every_grid_that_holds_its_waves(spectrum, coarse, fine, seed):
+    cut = {"shortcut": 6e-4, "seed": seed, **spectrum}
+    few, many = (waves_of(self_affine(SIZE, shape, **cut)) for shape in (coarse, fine))
+    largest = max(map(abs, few.values()))
+    held = few.keys() & many.keys()
+    assert max(abs(few[k] - many[k]) for k in held) < 1e-12 * largest
+    assert all(abs(both[k]) < 1e-12 * largest for both in (few, many) for k in both.keys() - held)
+    # three cells for one: the one in the middle is at the same place
+    h, third = (self_affine(SIZE, shape, **cut) for shape in (coarse, [3 * n for n in coarse]))
+    np.testing.assert_allclose(third[1::3, 1::3], h, rtol=0, atol=1e-11 * float(abs(h).max()))
+
+
+@pytest.mark.parametrize("amplitudes", ["fixed", "gaussian"])
+def test_self_affine__without_a_cut_off_a_finer_grid_adds_waves_and_keeps_the_others_but_for_one_factor(amplitudes):
+    made = {"hurst": 0.8, "rms_slope": 0.1, "amplitudes": amplitudes, "seed": 4}
+    few, many = (waves_of(self_affine(SIZE, shape, **made)) for shape in ((24, 17), (45, 38)))
+    ratios = np.array([many[k] / few[k] for k in few if abs(few[k]) > 1e-12])
+    assert len(ratios) > 90
+    np.testing.assert_allclose(ratios, ratios[0].real, rtol=1e-9)
+    assert 0.5 < ratios[0].real < 0.95
+    assert sum(abs(many[k]) > 1e-12 for k in many) > 2 * len(ratios)
+
+
+def test_self_affine__takes_as_much_of_a_generator_on_every_grid():
+    drawn = []
+    for shape in ((9, 8), (24, 31)):
+        generator = np.random.default_rng(3)
+        self_affine(1.0, shape, hurst=0.8, rms_slope=0.1, amplitudes="gaussian", seed=generator)
+        drawn.append(generator.random())
+    assert drawn[0] == drawn[1]
+
+
+def test_self_affine__gaussian_amplitudes_scatter_as_those_of_a_random_field():
+    """Moments of an exponential distribution for the power of each wave; the variance of the mean square follows."""
+    made = {"hurst": 0.8, "rms_height": 2e-6, "rolloff": 8e-4, "shortcut": 4e-4}
+    fixed = [self_affine(SIZE, (19, 16), **made, seed=seed) for seed in range(200)]
+    random = [self_affine(SIZE, (19, 16), **made, amplitudes="gaussian", seed=seed) for seed in range(200)]
+    np.testing.assert_allclose([float((h**2).mean()) for h in fixed], 4e-12, rtol=1e-10)
+    power = np.abs(np.fft.rfft2(fixed[0].values)) ** 2
+    here = power > 1e-9 * power.max()
+    ratio = np.array([np.abs(np.fft.rfft2(h.values))[here] ** 2 / power[here] for h in random])
+    assert ratio.mean() == pytest.approx(1, abs=5 / np.sqrt(ratio.size))
+    assert (ratio**2).mean() == pytest.approx(2, abs=5 * np.sqrt(20 / ratio.size))
+    # a wave and its conjugate are one random number: of variance w each, the mean square has the variance sum w^2
+    shares = power * np.where(np.arange(power.shape[1]) == 0, 1.0, 2.0) / 19**2 / 16**2
+    shares[0], shares[1:, 0] = np.where(np.arange(power.shape[1]) == 0, 0, shares[0]), 2 * shares[1:, 0]
+    shares[10:, 0] = 0
+    squares = np.array([float((h**2).mean()) for h in random])
+    assert squares.mean() == pytest.approx(4e-12, rel=5 * np.sqrt((shares**2).sum()) / shares.sum() / np.sqrt(200))
+    assert squares.std() == pytest.approx(np.sqrt((shares**2).sum()), rel=0.2)
+    phases = [np.angle(np.fft.rfft2(h.values)[here]) for h in (fixed[7], random[7])]
+    np.testing.assert_allclose(np.exp(1j * phases[0]), np.exp(1j * phases[1]), atol=1e-9)
+
+
+def test_self_affine__a_recipe_that_no_longer_gives_the_heights_makes_no_other_surface():
+    """A file written when seeds meant other surfaces holds a surface like any other."""
+    import roughvisc as rv
+    from roughvisc.study.simulation.coarser import coarser
+    from roughvisc.topography.indenters import remade
+    from roughvisc.topography.synthesis import is_analytic
+
+    made = self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=1)
+    former = made.copy(data=self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2).values)
+    assert remade(former, (15, 12)) is None
+    assert grown(former) is None
+    assert not is_analytic(former)
+    xr.testing.assert_equal(coarser(former, 2, "periodic"), rv.resample(former, (15, 12), periodic=True))
+
+
 def test_self_affine__anisotropy_stretches_the_texture_along_x():
     h = self_affine(1.0, (96, 85), hurst=0.8, rms_height=1.0, rolloff=0.2, anisotropy=4.0, seed=2)
     q_x, q_y, h_q = spectral(h)
@@ -225,6 +315,7 @@ def test_grown__accepts_what_leaves_the_profile_alone():
         (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rolloff=0.1, seed=0), ("rolloff is 0.1",)),
         (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=2.0, seed=0), ("no wave",)),
         (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, seed="x"), ("seed is 'x'",)),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, amplitudes="x", seed=0), ("amplitudes is 'x'", "gauss")),
     ],
 )
 def test_recipe__refuses_with_parameter_found_and_expected(call, fragments):

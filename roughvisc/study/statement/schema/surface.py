@@ -37,6 +37,7 @@ _KINDS = {
     "exact": Flag,
     "waves": whole(1, 2),
     "hurst": measured("1", above=0, most=1),
+    "amplitudes": choice("fixed", "gaussian"),
     "seed": whole(0),
 }
 
