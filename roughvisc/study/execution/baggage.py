@@ -11,6 +11,7 @@ from typing import Any
 
 from roughvisc.errors import ChangedError, InputError
 from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.store import whole_file
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
@@ -58,6 +59,8 @@ def _copy(path: Path, folder: Path) -> Path:
     there = folder / hashlib.sha256(whole.encode()).hexdigest()[:16]
     for place, digest in digests.items():
         copy = there / place
+        for above in (folder, *(one for one in reversed(copy.parents) if folder in one.parents)):
+            refuse_link(above, "a folder of copied inputs")
         if not copy.is_file() or sha256(copy) != digest:
             with whole_file(copy) as temporary:
                 shutil.copyfile(root / place, temporary)

@@ -8,9 +8,9 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
-from roughvisc.errors import DiskFullError, InputError, RoughviscError
+from roughvisc.errors import DiskFullError, FolderError, InputError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book, Watcher
@@ -23,6 +23,7 @@ from roughvisc.study.simulation.available import cores
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of
+from roughvisc.study.storage.links import open_unlinked, refuse_link
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.tidy import tidy
 
@@ -139,7 +140,7 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong.
+        If a setting is wrong, or a link stands in the folder where a run writes.
     DiskFullError
         If the disk is full; the cases that are left are not begun.
     RoughviscError
@@ -155,6 +156,11 @@ def run_cases(
     distinct = {case.key: case for case in cases}
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
+    refuse_link(folder / LOG, "the log of a sweep")
+    refuse_link(folder / INPUTS, "the folder of copied inputs")
+    for key in distinct:
+        for kind in ("lock", "unfinished"):
+            refuse_link(folder / f".{key}.{kind}", f"what an unfinished run has left ({kind})")
     with _log_file(folder):
         tidy(folder)
         index = index_of(folder)
@@ -268,7 +274,17 @@ def _log_file(folder: Path) -> Iterator[None]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log that stops nothing where it cannot be written."""
+    """A log that stops nothing where it cannot be written, and follows no link."""
+
+    def _open(self) -> TextIO:
+        def opener(path: str, flags: int) -> int:
+            return open_unlinked(path, flags, "the log of a sweep")
+
+        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=opener)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError, FolderError):  # it cannot be opened
+            super().emit(record)
 
     def handleError(self, record: logging.LogRecord) -> None:
         pass

@@ -26,6 +26,7 @@ from roughvisc.mechanics.stepping.scene import Instant, State, Step
 from roughvisc.mechanics.stepping.slide import Slid
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
 from roughvisc.study.storage.store import whole_file
 from roughvisc.variables import RESULT_FORMAT
@@ -173,6 +174,11 @@ class Keeper:
         Asked after every accepted step.
     same_bits : bool
         Do not go on from what other transforms have computed.
+
+    Raises
+    ------
+    FolderError
+        If the folder or a file in it is a link.
     """
 
     def __init__(
@@ -186,13 +192,16 @@ class Keeper:
         stop: Callable[[], bool] | None = None,
         same_bits: bool = False,
     ) -> None:
+        refuse_link(folder, "the folder of an unfinished run")
+        self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
+        for path in self._paths:
+            refuse_link(path, "a checkpoint of a run")
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows", check)
         #: How far the run has come: no state of an earlier step is held.
         self.latest = Reached()
         self._folder = folder
         self._key = key
-        self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
         self._same_bits = same_bits
         self._pending, self._last_save = 0, time.monotonic()

@@ -18,7 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from roughvisc.errors import InputError, InUseError
+from roughvisc.errors import InUseError
+from roughvisc.study.storage.links import open_unlinked
 
 try:
     import fcntl
@@ -74,7 +75,7 @@ class Lock:
     def _beat(self) -> None:
         while not self._released.wait(BEAT):
             try:
-                os.utime(self._path)
+                os.utime(self._descriptor if os.utime in os.supports_fd else self._path)
             except OSError:  # taken over, or the folder is gone: check() says so
                 return
 
@@ -94,7 +95,7 @@ def held(path: Path, patience: float = _PATIENCE) -> Iterator[Lock]:
     ------
     InUseError
         If another run holds it.
-    InputError
+    FolderError
         If a link stands in its place: what that leads to is not touched.
     """
     descriptor = _opened(path, patience)
@@ -114,9 +115,7 @@ def _opened(path: Path, patience: float) -> int:
     """Descriptor of the lock's file, locked."""
     until = time.monotonic() + patience
     while True:
-        if path.is_symlink():
-            raise InputError(f"{path}: is a link: expected the lock of a run, or no file; remove it")
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        descriptor = open_unlinked(path, os.O_RDWR, "the lock of a run")
         try:
             alone = _locked(descriptor)
             if os.path.exists(path) and os.path.samestat(os.fstat(descriptor), os.lstat(path)):

@@ -18,6 +18,8 @@ from typing import IO, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.study.storage.links import open_unlinked
+
 Array = NDArray[Any]
 #: Writes the field of a row to an array of zeros, and gives that.
 Frame = Callable[[int, Array], Array]
@@ -178,7 +180,7 @@ class RowFile:
         self._begins = [0]  # of the rows in the file, and where the next is to begin
         self._waiting: list[Mapping[str, Array]] = []
         self._weight = 0  # of those that wait [bytes]
-        self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
+        self._stream = os.fdopen(open_unlinked(path, os.O_RDWR, "rows of a run"), "r+b", buffering=0)
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Take up a row, whose arrays are not changed any more."""

@@ -25,7 +25,8 @@ def tidy(folder: str | Path, *, everything: bool = False) -> list[Path]:
     Parameters
     ----------
     folder : path
-        Of results. A case that a run is at work on is left alone.
+        Of results. A case that a run is at work on is left alone. Of a link the link itself is removed at most, never
+        what it leads to.
     everything : bool
         Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were set aside,
         and records of failures.
@@ -70,7 +71,9 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> lis
         return [path for path in [lock] if _removed(path)]
     finished = everything or (result.exists() and not flaw(result))
     needed = [
-        path for path in paths if path.suffix == ".unfinished" and any(path.glob("checkpoint.*")) and not finished
+        path
+        for path in paths
+        if path.suffix == ".unfinished" and not path.is_symlink() and any(path.glob("checkpoint.*")) and not finished
     ]
     if needed == paths:
         return []

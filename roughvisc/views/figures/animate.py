@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,7 +100,7 @@ def animate(
     path = Path(path)
     _check(frames, rate)
     writer = _writer(path, rate)
-    unfinished = path.with_name(f".{path.stem}.part{path.suffix}")
+    unfinished = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     film = animation(dataset, field=field, frames=frames, rate=rate)
     try:
         film.save(str(unfinished), writer, dpi=dpi)

@@ -21,6 +21,7 @@ from support import BALL, LONG, assert_same, numbers
 import roughvisc as rv
 from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
 from roughvisc.study.execution import run as run_module
+from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
@@ -238,9 +239,14 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
 
 
-def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "sweep.log").symlink_to("/dev/full")
+@pytest.mark.parametrize("opened", [True, False])
+def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, monkeypatch, capfd, opened):
+    if opened:
+        monkeypatch.setattr(
+            sweep_module._LogFile, "_open", lambda self: os.fdopen(os.open("/dev/full", os.O_WRONLY), "a")
+        )
+    else:
+        (tmp_path / "out" / "sweep.log").mkdir(parents=True)
     assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
     assert capfd.readouterr().err == ""
 
