@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,8 @@ _ABSENT, _MARKED = 0, 1
 _ERRORS = {"stated_error": "stated", "time_error": "time steps", "residual": "solver (estimate)"}
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
+#: The chart of errors, and kept times up to which they are marked in it.
+_ERROR_CHART, _DOTS = "Relative error", 60
 _CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
 _SECTION = (1000.0, 240.0)
 
@@ -184,6 +187,12 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
     return "".join(parts)
 
 
+def _dots(x: np.ndarray, y: np.ndarray) -> str:
+    """The points alone, as lines of no length."""
+    known = np.isfinite(x) & np.isfinite(y)
+    return "".join(f"M{across:.4g} {up:.4g}h0" for across, up in zip(x[known], y[known], strict=True))
+
+
 def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
     """Profile, and at each frame the deformed surface and the contact, on the line that carries most."""
     if "height" not in dataset or not ("gap" in dataset or "displacement" in dataset):
@@ -233,30 +242,40 @@ def _runs(x: np.ndarray, y: np.ndarray, touching: np.ndarray) -> str:
 
 
 def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
-    """Histories of every step as lines in a unit of their own, and where each frame lies on them."""
+    """Histories as lines in a unit of their own, and where each frame lies on them; errors are those of kept times.
+
+    The tolerance is asked of the error that is stated at kept times, and is drawn beside that alone: a step between
+    them may be less accurate.
+    """
     charts, steps = [], history(dataset)
+    axis = TimeAxis.of(steps["time"])
+    across, ticks = _across(axis, steps["time"].values)
+    time = {"time": axis.unit.label("Time"), "xticks": ticks}
     places = np.searchsorted(steps["time"].values, dataset["time"].values[chosen], side="right") - 1
     for name in ("force", "approach", "contact_area"):
         if name in steps:
             label = VARIABLES[name].label
             values = steps[name].values.astype(float)
             unit = unit_for(values, VARIABLES[name].units)
-            charts.append(_chart(steps, unit.label(label), {label: unit(values)}, places.tolist()))
+            x = across(steps["time"].values)
+            charts.append(time | _chart(x, unit.label(label), {label: unit(values)}, places.tolist()))
     errors = {
-        label: steps[name].values.astype(float)
+        label: dataset[name].values.astype(float)
         for name, label in _ERRORS.items()
-        if name in steps and np.nanmax(steps[name].values, initial=0.0) > 0
+        if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
     }
     if errors:
-        tolerance = dataset.attrs.get("tolerance")
-        charts.append(_chart(steps, "Relative error", errors, places.tolist(), tolerance))
+        x, tolerance = across(dataset["time"].values), dataset.attrs.get("tolerance")
+        chart = _chart(x, _ERROR_CHART, errors, chosen, tolerance)
+        charts.append(chart | {"time": axis.unit.label("Kept time"), "xticks": ticks})
     return charts
 
 
-def _chart(dataset, label: str, lines: dict[str, np.ndarray], chosen: list[int], tolerance=None) -> dict[str, Any]:
-    axis = TimeAxis.of(dataset["time"])
-    across, time_ticks = _across(axis, dataset["time"].values)
-    logarithmic = tolerance is not None or label == "Relative error"
+def _chart(
+    x: np.ndarray, label: str, lines: dict[str, np.ndarray], chosen: list[int], tolerance=None
+) -> dict[str, Any]:
+    logarithmic = label == _ERROR_CHART
+    dotted = logarithmic and len(x) <= _DOTS
     stacked = np.concatenate(list(lines.values()))
     if logarithmic:
         faintest = _FAINTEST * np.nanmax(stacked)
@@ -267,16 +286,16 @@ def _chart(dataset, label: str, lines: dict[str, np.ndarray], chosen: list[int],
         stacked = np.append(stacked, float(tolerance))
     up, ticks = _up(stacked, logarithmic)
     with np.errstate(invalid="ignore", divide="ignore"):
-        paths = [{"label": name, "d": _path(across, up(values))} for name, values in lines.items()]
-        first = up(next(iter(lines.values())))
+        heights = {name: up(values) for name, values in lines.items()}
+    first = next(iter(heights.values()))
     return {
         "label": label,
-        "time": axis.unit.label("Time"),
-        "lines": paths,
+        "lines": [
+            {"label": name, "d": _path(x, y), "dots": _dots(x, y) if dotted else ""} for name, y in heights.items()
+        ],
         "tolerance": float(up(np.array([float(tolerance)]))[0]) if tolerance is not None else None,
-        "xticks": time_ticks,
         "yticks": ticks,
-        "marks": [[_pixel(across[frame]), _pixel(first[frame])] for frame in chosen],
+        "marks": [[_pixel(x[frame]), _pixel(first[frame])] for frame in chosen],
     }
 
 
@@ -284,23 +303,30 @@ def _pixel(value: float) -> float | None:
     return round(float(value), 1) if np.isfinite(value) else None
 
 
-def _across(axis: TimeAxis, times: np.ndarray) -> tuple[np.ndarray, list[list[Any]]]:
-    """Places of times along the chart, and its ticks."""
+def _across(axis: TimeAxis, times: np.ndarray) -> tuple[Callable[[np.ndarray], np.ndarray], list[list[Any]]]:
+    """Function from times to places along the chart, which these times fill, and its ticks."""
     shown = axis.unit(times)
+    floor = axis.first / 3 if times[0] <= 0 else axis.first  # zero has its place at the left end
+
+    def scaled(some: np.ndarray) -> np.ndarray:
+        return np.log10(np.maximum(some, floor)) if axis.logarithmic else some
+
+    place = scaled(shown)
     if axis.logarithmic:
-        floor = axis.first / 3 if times[0] <= 0 else axis.first  # zero has its place at the left end
-        place = np.log10(np.maximum(shown, floor))
         decades = np.arange(np.ceil(np.log10(axis.first) - 1e-9), np.floor(place[-1] + 1e-9) + 1)
         decades = decades[:: max(1, len(decades) // 4)]
         ticks = [(d, f"{10**d:g}") for d in decades]
         if times[0] <= 0:
             ticks.insert(0, (place[0], "0"))
     else:
-        place = shown
         inside = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(shown[0], shown[-1])
         ticks = [(t, f"{t:g}") for t in inside if shown[0] - 1e-9 <= t <= shown[-1] + 1e-9]
     span = (place[-1] - place[0]) or 1.0
-    return _CHART[0] * (place - place[0]) / span, [[_pixel(_CHART[0] * (t - place[0]) / span), s] for t, s in ticks]
+
+    def along(some: Any) -> Any:
+        return _CHART[0] * (some - place[0]) / span
+
+    return lambda some: along(scaled(axis.unit(some))), [[_pixel(along(t)), s] for t, s in ticks]
 
 
 def _up(values: np.ndarray, logarithmic: bool):

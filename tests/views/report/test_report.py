@@ -4,6 +4,7 @@ import base64
 import html
 import io
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -20,6 +21,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import write_result
+from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import frames_of
 from roughvisc.views.report.page import _MAPS, report
 from roughvisc.views.sweep_figures.case_text import study_text
@@ -103,6 +105,40 @@ def test_page__says_what_was_run_and_how_accurate_it_is(page):
     assert "Too far: Load 9 N" in text
     assert '<th title="program.0.load">Load</th>' in text
     assert [view["title"] for view in views(text)] == ["Load 1 mN", "Load 2 mN", "Load 10 mN"], "what tells them apart"
+
+
+def errors_drawn(chart):
+    """What the first line of the chart of errors shows, told by its logarithmic ticks, and the tolerance so."""
+    (high, first), (low, last) = chart["yticks"][0], chart["yticks"][-1]
+    decades = math.log10(float(last) / float(first)) / (low - high)
+
+    def read(pixel):
+        return float(first) * 10 ** (decades * (float(pixel) - high))
+
+    points = re.findall(r"M[-\d.e+]+ ([-\d.e+]+)h0", chart["lines"][0]["dots"])
+    return np.array([read(pixel) for pixel in points]), read(chart["tolerance"])
+
+
+@pytest.mark.parametrize("within", [True, False])
+def test_charts__draw_the_errors_that_the_table_holds_against_the_tolerance(within):
+    """Steps between the kept times are beyond the tolerance; kept times only where the table says so."""
+    ds = made.hertz_creep((11, 9), frames=5)
+    ds["stated_error"][:] = [0.0, 1e-4, 2e-3, 5e-4, 3e-3]
+    tolerance = 4e-3 if within else 1e-3
+    ds.attrs["tolerance"] = tolerance
+    steps = np.linspace(0, float(ds.time[-1]), 17)
+    ds["step_time"], ds["step_time_error"] = ("step", steps), ("step", np.full(17, 0.3))
+    for name in ("force", "approach", "contact_area_corrected"):
+        ds[f"step_{name}"] = "step", np.interp(steps, ds.time, ds[name])
+    (chart,) = [one for one in frames_of(ds, 10**5)["charts"] if one["label"] == "Relative error"]
+    assert chart["time"].startswith("Kept time")
+    assert chart["lines"][0]["label"] == "stated"
+    drawn, line = errors_drawn(chart)
+    assert line == pytest.approx(tolerance, rel=0.02)
+    np.testing.assert_allclose(drawn, [1e-4, 2e-3, 5e-4, 3e-3], rtol=0.02)
+    row = table_row(ds, None, 0)
+    assert float(row["stated_error"]) == pytest.approx(drawn.max(), rel=0.02)
+    assert row["missed"] == (drawn.max() > line) == (not within)
 
 
 def test_page__shows_the_surface_before_and_after_conditioning(page):
