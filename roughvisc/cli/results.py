@@ -79,6 +79,8 @@ def report(results: Path, output: Path | None) -> None:
 @click.option("--base", help="What it lies on: bonded or slipping. [default: bonded]")
 @click.option("--density", metavar="RHO", help='Of the body: "1100 kg/m^3".')
 @click.option("--linear-strain", metavar="STRAIN", help='Up to which the material is linear: 0.05, or "5 %".')
+@click.option("--heat-conductivity", metavar="K", help='Of the body: "0.2 W/m/K".')
+@click.option("--volumetric-heat-capacity", metavar="C", help='Of the body: "1.8 MJ/m^3/K".')
 @click.option(
     "--study", type=click.Path(path_type=Path), help="Study whose [audit] counts, in place of the result's own."
 )

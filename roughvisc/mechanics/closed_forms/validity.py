@@ -1,4 +1,7 @@
-"""How far frictionless, quasi-static contact with a half-space goes: what sticking, waves and a base would change."""
+"""How far isothermal, frictionless, quasi-static contact with a half-space goes.
+
+What a base, sticking, waves and the heat of friction would change.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,12 @@ import math
 from collections.abc import Sequence
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.closed_forms.indenters import Paraboloid, positive
+from roughvisc.mechanics.closed_forms.sheet import OnSheet
 from roughvisc.mechanics.halfspace.sheet import Sheet
+
+#: Contact radii in thicknesses up to which the equation of a sheet is solved to its precision.
+_WIDEST = 10.0
 
 
 def half_space_excess(sheet: Sheet, compliance: float, force: float, approach: float) -> float:
@@ -48,6 +55,43 @@ def half_space_excess(sheet: Sheet, compliance: float, force: float, approach: f
     """
     first = sheet.relief * compliance * force / approach
     return first / (1 + first)
+
+
+def half_space_shortfall(sheet: Sheet, compliance: float, force: float, approach: float) -> float:
+    r"""Part of the force that is missing on a half-space at a given approach, in place of the sheet that there is.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        What is there.
+    compliance : float
+        Contact compliance, ``1 / E*``. [1/Pa]
+    force, approach : float
+        Of the contact on a half-space of the same material, which is taken for that of a paraboloid. [N], [m]
+
+    Returns
+    -------
+    float
+        :math:`1 - F / F_{sheet}` at the same approach; 1 where the sheet is thinner than a tenth of the contact radius.
+        [-]
+
+    Notes
+    -----
+    The paraboloid that has this force at this approach has the contact radius :math:`a = 3 C F / 4 \delta` and the
+    radius of curvature :math:`a^2 / \delta`. On the sheet it is solved by the Fredholm equation of
+    :class:`~roughvisc.closed_forms.OnSheet`.
+
+    Examples
+    --------
+    >>> ball = Paraboloid(1.0)
+    >>> round(half_space_shortfall(Sheet(0.1), 1.0, float(ball.scaled_force(0.01)), float(ball.reduced(0.01))), 4)
+    0.1143
+    """
+    radius = 3 * compliance * force / (4 * approach)
+    if radius > _WIDEST * sheet.thickness:
+        return 1.0
+    on_sheet = OnSheet(Paraboloid(radius**2 / approach), sheet)
+    return 1 - compliance * force / float(on_sheet.scaled_force(on_sheet.radius_at_approach(approach)))
 
 
 def dundurs_coupling(compliances: Sequence[float], poissons: Sequence[float]) -> float:
@@ -146,3 +190,110 @@ def radiation_lag(radius: float, shear_modulus: float, density: float) -> float:
     positive("shear_modulus", shear_modulus, "Pa")
     positive("density", density, "kg/m3")
     return 3.4 / 4 * radius * math.sqrt(density / shear_modulus)
+
+
+def moving_load_excess(speed: float, shear_modulus: float, density: float, poisson: float) -> float:
+    r"""Part by which waves add to the displacement under a load that moves along a half-space.
+
+    Parameters
+    ----------
+    speed : float
+        ``V`` of the load. [m/s]
+    shear_modulus : float
+        ``G`` of the half-space. [Pa]
+    density : float
+        :math:`\rho` of the half-space. [kg/m3]
+    poisson : float
+        Poisson's ratio :math:`\nu`. [-]
+
+    Returns
+    -------
+    float
+        Displacement under a moving normal line load over that of one at rest, less one; infinite from the speed of
+        Rayleigh waves on. [-]
+
+    Notes
+    -----
+    With :math:`m = V / c_2`, :math:`c_2^2 = G / \rho`, :math:`\kappa^2 = (1 - 2\nu) / (2 - 2\nu)`,
+    :math:`\alpha_1^2 = 1 - \kappa^2 m^2` and :math:`\alpha_2^2 = 1 - m^2` a steady pressure of any shape displaces the
+    surface :math:`m^2 \alpha_1 / ((1 - \nu) R)` times as far as at rest, with Rayleigh's function
+    :math:`R = 4 \alpha_1 \alpha_2 - (1 + \alpha_2^2)^2` [1]_. The form coded has :math:`R` multiplied by its
+    conjugate, which leaves nothing to cancel at low speed. To leading order the excess is :math:`3 m^2 / 4` for
+    :math:`\nu = 1/2`.
+
+    References
+    ----------
+    .. [1] J. Cole, J. Huth, J. Appl. Mech. 25 (1958) 433.
+
+    Examples
+    --------
+    >>> round(moving_load_excess(3.0, 1e6, 1000.0, 0.5), 5), moving_load_excess(31.0, 1e6, 1000.0, 0.5)
+    (0.00681, inf)
+    """
+    positive("speed", speed, "m/s")
+    positive("shear_modulus", shear_modulus, "Pa")
+    positive("density", density, "kg/m3")
+    square, ratio = density * speed**2 / shear_modulus, (1 - 2 * poisson) / (2 - 2 * poisson)
+    if not square < 1:
+        return math.inf
+    # R (4 alpha_1 alpha_2 + (1 + alpha_2^2)^2) / m^2
+    cubic = 16 * (1 - ratio) + (16 * ratio - 24) * square + 8 * square**2 - square**3
+    if not cubic > 0:
+        return math.inf
+    first, second = math.sqrt(1 - ratio * square), math.sqrt(1 - square)
+    return first * (4 * first * second + (2 - square) ** 2) / ((1 - poisson) * cubic) - 1
+
+
+def flash_temperature(
+    heat_flux: float, radius: float, speed: float, heat_conductivity: float, volumetric_heat_capacity: float
+) -> float:
+    r"""Mean rise of temperature of a round spot that slides on a half-space and heats it evenly.
+
+    Parameters
+    ----------
+    heat_flux : float
+        ``q``, into the half-space. [W/m2]
+    radius : float
+        ``a`` of the spot. [m]
+    speed : float
+        ``V`` of the spot along the half-space. [m/s]
+    heat_conductivity : float
+        ``k`` of the half-space. [W/(m K)]
+    volumetric_heat_capacity : float
+        :math:`\rho c` of the half-space. [J/(m3 K)]
+
+    Returns
+    -------
+    float
+        Mean over the spot, in the steady state, above the temperature far away. [K]
+
+    Notes
+    -----
+    A slow spot has :math:`8 q a / 3 \pi k`, and a fast one, whose heat has no time to flow sideways,
+    :math:`0.974\,(q a / k) / \sqrt P` with :math:`P = V a \rho c / k` [1]_ [2]_. The factor is that of
+    :math:`2 q \sqrt{t / \pi k \rho c}`, with the time ``t`` since the leading edge, averaged over the circle. In
+    between the inverse squares of both are added [3]_: at most 4 % below the exact value, about ``P`` = 2.
+
+    References
+    ----------
+    .. [1] J. C. Jaeger, Proc. R. Soc. N.S.W. 76 (1942) 203.
+    .. [2] J. F. Archard, Wear 2 (1959) 438.
+    .. [3] X. Tian, F. E. Kennedy, J. Tribol. 116 (1994) 167.
+
+    Examples
+    --------
+    >>> rubber = {"heat_conductivity": 0.2, "volumetric_heat_capacity": 1.8e6}
+    >>> [round(flash_temperature(1e5, 1e-5, speed, **rubber), 2) for speed in (1e-6, 1.0)]
+    [4.24, 0.51]
+    """
+    if not 0 <= heat_flux < math.inf:
+        raise InputError(f"heat_flux is {heat_flux!r}: expected a number >= 0 [W/m2]")
+    positive("radius", radius, "m")
+    positive("speed", speed, "m/s")
+    positive("heat_conductivity", heat_conductivity, "W/(m K)")
+    positive("volumetric_heat_capacity", volumetric_heat_capacity, "J/(m3 K)")
+    peclet = speed * radius * volumetric_heat_capacity / heat_conductivity
+    # int (1 - t^2)^(3/4) dt over (-1, 1) is B(1/2, 7/4)
+    beta = math.sqrt(math.pi) * math.gamma(7 / 4) / math.gamma(9 / 4)
+    slow, fast = 8 / (3 * math.pi), 2 / math.sqrt(math.pi) * 2 / 3 * 2**1.5 * beta / math.pi
+    return heat_flux * radius / heat_conductivity / math.sqrt(1 / slow**2 + peclet / fast**2)

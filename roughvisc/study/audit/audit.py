@@ -29,6 +29,7 @@ _VERDICTS = (
     of_surface.slope,
     of_surface.strain,
     of_body.inertia,
+    of_body.heating,
     of_body.coupling,
     of_surface.resolution,
     of_surface.border,
@@ -111,6 +112,8 @@ def audit(
     base: Base | None = None,
     density: float | str | None = None,
     linear_strain: float | None = None,
+    heat_conductivity: float | str | None = None,
+    volumetric_heat_capacity: float | str | None = None,
 ) -> Audit:
     """What the model leaves out, and whether that matters in a scene.
 
@@ -130,6 +133,10 @@ def audit(
         Of the body. [kg/m3]
     linear_strain : float, optional
         Strain up to which the material is linear. [-]
+    heat_conductivity : float or str, optional
+        Of the body. [W/(m K)]
+    volumetric_heat_capacity : float or str, optional
+        Of the body: density times specific heat. [J/(m3 K)]
 
     Returns
     -------
@@ -165,6 +172,8 @@ def audit(
         base=base,
         density=density,
         linear_strain=linear_strain,
+        heat_conductivity=heat_conductivity,
+        volumetric_heat_capacity=volumetric_heat_capacity,
     )
     if base is not None and thickness is None:
         raise InputError(f"base is {base!r} without a thickness: expected both, or neither")

@@ -1,13 +1,21 @@
-"""Verdicts on the body: yielding, thickness, inertia, sideways displacement."""
+"""Verdicts on the body: yielding, thickness, inertia, heat, sideways displacement."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
-from scipy.optimize import bisect
+from scipy.optimize import bisect, brentq
 
-from roughvisc.mechanics.closed_forms.validity import dundurs_coupling, half_space_excess, radiation_lag
+from roughvisc.mechanics.closed_forms.validity import (
+    dundurs_coupling,
+    flash_temperature,
+    half_space_excess,
+    half_space_shortfall,
+    moving_load_excess,
+    radiation_lag,
+)
 from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.study.audit.evidence import Evidence
 from roughvisc.study.audit.finding import Finding, percent, told, unknown
@@ -20,8 +28,11 @@ _SOFTEST = 0.5
 _WITHOUT_LOAD = (
     'Known by load, approach and material; with periodic boundaries keep the pressure, fields = ["pressure"].'
 )
-#: Of osmium: no solid is denser. [kg/m3]
-_DENSEST = 22_600.0
+#: Exponent of the force over the approach up to which a contact is taken for a flat one, whose force is proportional to
+#: the approach; it is 3/2 of a sphere and 2 of a cone.
+_FLAT = 1.25
+#: Of a silica aerogel, and of osmium: hardly any solid is less dense, and none is denser. [kg/m3]
+_LEAST_DENSE, _DENSEST = 1.0, 22_600.0
 
 
 def yielding(evidence: Evidence, given: Given) -> Finding:
@@ -40,7 +51,7 @@ def yielding(evidence: Evidence, given: Given) -> Finding:
 
 
 def thickness(evidence: Evidence, given: Given) -> Finding:
-    """By how much the approach is too large on a half-space, in place of the sheet that there is."""
+    """By how much approach or force are off on a half-space, in place of the sheet that there is."""
     if evidence.sheet is not None:
         return _modelled(evidence.sheet, given)
     if len(evidence.bodies) != 1:
@@ -51,11 +62,14 @@ def thickness(evidence: Evidence, given: Given) -> Finding:
     if given.thickness is None:
         return unknown("thickness", f"Give thickness{_enough(evidence, Sheet(1.0, poisson))}.")
     sheet = Sheet(given.thickness, poisson, given.base or BASE)
-    number = _excess(evidence, sheet)
-    if math.isnan(number):
+    excess, shortfall = _excess(evidence, sheet), _shortfall(evidence, sheet)
+    if math.isnan(excess):
         return unknown("thickness", _WITHOUT_LOAD if evidence.ran else "Known after the run, by the pressure.")
-    words = f"a {sheet.base} sheet of {told(sheet.thickness, 'm', 3)}"
-    return Finding("thickness", number, f"On {words} the approach would be {percent(number)} smaller at the same load.")
+    sentence = f"On a {sheet.base} sheet of {told(sheet.thickness, 'm', 3)} the approach would be {percent(excess)}"
+    sentence += " smaller at the same load"
+    if shortfall > excess:
+        sentence += f"; at the same approach the force here is {percent(shortfall)} too small"
+    return Finding("thickness", max(excess, shortfall), f"{sentence}.")
 
 
 def _modelled(sheet: Sheet, given: Given) -> Finding:
@@ -78,37 +92,113 @@ def _excess(evidence: Evidence, sheet: Sheet) -> float:
     return first / (1 + first)
 
 
+def _shortfall(evidence: Evidence, sheet: Sheet) -> float:
+    """Of the force; 0 where the force is proportional to the approach, and with periodic boundaries."""
+    force, approach, late = evidence.force, evidence.approach, evidence.late
+    if evidence.boundary != "free" or not (force > 0 and approach > 0 and late > 0):
+        return 0.0
+    # the stiffness of a round contact is that of a flat punch of its radius, 2 a / C
+    if not 2 * evidence.half_width * approach / (late * force) > _FLAT:
+        return 0.0
+    return half_space_shortfall(sheet, late, force, approach)
+
+
+def _off(evidence: Evidence, sheet: Sheet) -> float:
+    """The larger of both; NaN where it is not known."""
+    excess = _excess(evidence, sheet)
+    return excess if math.isnan(excess) else max(excess, _shortfall(evidence, sheet))
+
+
 def _enough(evidence: Evidence, sheet: Sheet) -> str:
     """From which thickness on a half-space would do, the sheet bonded."""
     low, high = (factor * max(evidence.size) for factor in (1e-3, 1e3))
-    if not math.isfinite(high) or math.isnan(_excess(evidence, sheet)):
+    if not math.isfinite(high) or math.isnan(_off(evidence, sheet)):
         return ""
 
-    def beyond(thickness: float) -> float:
-        return _excess(evidence, replace(sheet, thickness=thickness)) - LIMITS["thickness"].doubtful
+    def beyond(log: float, off: Callable[[Evidence, Sheet], float] = _off) -> float:
+        return off(evidence, replace(sheet, thickness=math.exp(log))) - LIMITS["thickness"].doubtful
 
-    if beyond(low) <= 0:
+    if beyond(math.log(low)) <= 0:
         return f": from {told(low, 'm')} on a half-space does, if not before"
-    return f": from {told(bisect(beyond, low, high, rtol=1e-3), 'm')} on a half-space does, even if bonded"
+    least = math.log(low)
+    if beyond(least, _excess) > 0:
+        least = brentq(beyond, least, math.log(high), args=(_excess,), xtol=1e-3)
+    if beyond(least) > 1e-3:  # of the force it takes more, by less than four times
+        least = brentq(beyond, least, least + math.log(4), xtol=1e-2)
+    return f": from {told(math.exp(least), 'm')} on a half-space does, even if bonded"
 
 
 def inertia(evidence: Evidence, given: Given) -> Finding:
-    """The lag by waves over the time scale of the program."""
-    width, scale = evidence.half_width, evidence.time_scale
+    """What waves change: by their lag over the time scale of the program, and by the speed of slides against theirs."""
+    width, scale, limit = evidence.half_width, evidence.time_scale, LIMITS["inertia"].doubtful
     if math.isnan(evidence.late) or math.isnan(scale):
         return unknown("inertia", "The result does not say its material and program.")
     if not width > 0 or not evidence.late > 0:
         return unknown("inertia", "The width of the contact is not known, or nothing has crept.")
+    if math.isnan(evidence.speed):
+        return unknown("inertia", "The speed of the slides is not known: audit the result with all of its steps.")
     bodies = [(one.late, one.poisson) for one in evidence.bodies] or [(evidence.late, _SOFTEST)]
-    shear = min((1 - poisson) / (2 * late) for late, poisson in bodies if late > 0)
-    known = given.density is not None
-    lag = radiation_lag(width, shear, given.density if known else _DENSEST)
-    if not known and lag / scale >= LIMITS["inertia"].doubtful:
-        most = _DENSEST * (LIMITS["inertia"].doubtful * scale / lag) ** 2
-        return unknown("inertia", f"Give density: up to {float(f'{most:.2g}'):g} kg/m^3 the motion is slow.")
-    of = "Waves lag" if known else f"Of any solid (up to {_DENSEST:g} kg/m^3) waves lag"
+    solids = [((1 - poisson) / (2 * late), poisson) for late, poisson in bodies if late > 0]
+    shear = min(modulus for modulus, _ in solids)
+
+    def lag_and_excess(density: float) -> tuple[float, float]:
+        lag = radiation_lag(width, shear, density) / scale
+        if not evidence.speed:
+            return lag, 0.0
+        return lag, max(moving_load_excess(evidence.speed, modulus, density, poisson) for modulus, poisson in solids)
+
+    any_solid, density = "", given.density
+    if density is None:
+        fast = [max(lag_and_excess(one)) >= limit for one in (_LEAST_DENSE, _DENSEST)]
+        if fast == [False, True]:
+            ends = (math.log(one) for one in (_LEAST_DENSE, _DENSEST))
+            most = math.exp(bisect(lambda log: max(lag_and_excess(math.exp(log))) - limit, *ends, xtol=1e-4))
+            return unknown("inertia", f"Give density: up to {float(f'{most:.2g}'):g} kg/m^3 the motion is slow.")
+        density = _LEAST_DENSE if fast[0] else _DENSEST
+        any_solid = f"of any solid ({'from' if fast[0] else 'up to'} {density:g} kg/m^3{' on' if fast[0] else ''}) "
+    lag, excess = lag_and_excess(density)
+    number = max(lag, excess)
+    if excess > lag:
+        waves = f"{any_solid}shear waves go at {told(math.sqrt(shear / density), 'm/s')}"
+        more = "faster than waves along the surface"
+        if math.isfinite(excess):
+            more = f"which adds {percent(excess)} to what a load displaces"
+        return Finding(
+            "inertia", number, f"{waves[0].upper()}{waves[1:]}, and it slides at {told(evidence.speed, 'm/s')}, {more}."
+        )
     takes = f"the program changes within {told(scale, 's')}" if math.isfinite(scale) else "nothing changes"
-    return Finding("inertia", lag / scale, f"{of} by {told(lag, 's')} over {told(2 * width, 'm')}; {takes}.")
+    of = f"{any_solid}waves lag"
+    return Finding(
+        "inertia", number, f"{of[0].upper()}{of[1:]} by {told(lag * scale, 's')} over {told(2 * width, 'm')}; {takes}."
+    )
+
+
+def heating(evidence: Evidence, given: Given) -> Finding | None:
+    """Rise of temperature of the spots by friction, in a slide; None where nothing slides."""
+    contact, speed, power = evidence.contact, evidence.speed, evidence.friction_power
+    if speed == 0:
+        return None
+    if not evidence.ran:
+        return unknown("heating", "Known after the run, by the friction.")
+    if math.isnan(power):
+        return unknown("heating", "The speed of the slides is not known: audit the result with all of its steps.")
+    if contact is None or not evidence.area > 0:
+        return unknown("heating", 'Keep the pressure, fields = ["pressure"], for the spots that friction heats.')
+    radius = math.sqrt(evidence.area / (math.pi * contact.spots))
+    spots = "one spot" if contact.spots == 1 else f"{contact.spots} spots"
+    about = f"{told(max(power, 0.0), 'W')} of friction heat {spots} of radius {told(radius, 'm')}"
+    flux, conductivity, capacity = (
+        max(power, 0.0) / evidence.area,
+        given.heat_conductivity,
+        given.volumetric_heat_capacity,
+    )
+    if conductivity is None or capacity is None:
+        missing = " and ".join(
+            name for name in ("heat_conductivity", "volumetric_heat_capacity") if getattr(given, name) is None
+        )
+        return unknown("heating", f"Give {missing}: {about}.")
+    rise = flash_temperature(flux, radius, speed, conductivity, capacity)
+    return Finding("heating", rise, f"{about[0].upper()}{about[1:]} by {told(rise, 'K')} above the surface around.")
 
 
 def coupling(evidence: Evidence, given: Given) -> Finding:

@@ -19,6 +19,7 @@ from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.body import BASE, not_one_body
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
+from roughvisc.variables import of_step
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class Evidence:
         What was pressed, if no half-space.
     time_scale : float
         Shortest time in which what is prescribed changes. [s]
+    speed, friction_power : float
+        The largest of all slides; the speed is zero where nothing slides. [m/s], [W]
     force, approach, area : float
         Where the force is largest, at the last such time. [N], [m], [m2]
     fraction : float
@@ -70,6 +73,8 @@ class Evidence:
     bodies: tuple[Body, ...] = ()
     sheet: Sheet | None = None
     time_scale: float = math.nan
+    speed: float = 0.0
+    friction_power: float = math.nan
     force: float = math.nan
     approach: float = math.nan
     area: float = math.nan
@@ -110,6 +115,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         height = dataset["height"].load()
         texture = texture_of(height, attrs["boundary"], str(attrs.get("recipe", "")))
         size, slope = texture.size, loaded_slope(height, attrs["boundary"], float(dataset["approach"].max()))
+    speed, friction_power = _sliding(dataset)
     thickness = float(attrs.get("thickness", math.inf))
     poisson = attrs.get("poisson", 0.5)
     return Evidence(
@@ -122,6 +128,8 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         bodies=_bodies(attrs, case),
         sheet=None if thickness == math.inf else Sheet(thickness, float(poisson), attrs.get("base", BASE)),
         time_scale=float(attrs.get("time_scale", math.nan)),
+        speed=speed,
+        friction_power=friction_power,
         force=float(row["force"]),
         approach=float(row["approach"]),
         area=area,
@@ -167,6 +175,7 @@ def of_case(
         bodies=bodies_of(case),
         sheet=kernel if isinstance(kernel, Sheet) else None,
         time_scale=program.time_scale,
+        speed=max((one.slide.distance / one.duration for one in program.segments if one.slide), default=0.0),
         force=force,
         approach=approach,
         area=fraction * math.prod(texture.size),
@@ -174,6 +183,21 @@ def of_case(
         ran=False,
         given=_stated(case),
     )
+
+
+def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
+    """Largest speed and friction power of the accepted steps [m/s], [W]; zero and NaN where nothing slides."""
+    if "sliding_distance" not in dataset:
+        return 0.0, math.nan
+    names = ["time", "sliding_distance", "friction_force"]
+    if "step_sliding_distance" in dataset:
+        names = [of_step(name) for name in names]
+    time, distance, force = (dataset[name].values for name in names)
+    lasts = np.diff(time) > 0
+    if not lasts.any():
+        return math.nan, math.nan
+    speeds = np.diff(distance)[lasts] / np.diff(time)[lasts]
+    return float(speeds.max()), float(np.max(force[1:][lasts] * speeds))
 
 
 def bodies_of(case: Case) -> tuple[Body, ...]:

@@ -24,16 +24,19 @@ class Finding:
         What it is judged by; NaN where it is not known.
     sentence : str
         What the number says here, or what to give so that it is known.
+    judged_by : str
+        Entry of that table which the number belongs to; that of the name unless given.
     """
 
     name: str
     number: float
     sentence: str
+    judged_by: str = ""
 
     @property
     def limit(self) -> Limit:
         """What it is judged by."""
-        return LIMITS[self.name]
+        return LIMITS[self.judged_by or self.name]
 
     @property
     def verdict(self) -> str:

@@ -25,6 +25,8 @@ class Given:
     base: Any = None
     density: Any = None
     linear_strain: Any = None
+    heat_conductivity: Any = None
+    volumetric_heat_capacity: Any = None
 
     def __post_init__(self) -> None:
         for name, (unit, bounds) in BOUNDS.items():

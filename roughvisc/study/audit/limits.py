@@ -47,6 +47,10 @@ class Limit:
         return BROKEN if number >= self.broken else DOUBTFUL if number >= self.doubtful else HOLDS
 
 
+#: Of a number that is exact on the limit: what has just so many cells is on its better side.
+_JUST = 1 + 1e-9
+#: The entry by which waves are judged whose shortest one is stated.
+STATED = "resolution (stated)"
 #: name -> limits, in the order of an audit. Unless a threshold has a meaning of its own, an effect of some 10 % makes
 #: an assumption doubtful, and one of the size of what is computed breaks it.
 LIMITS: dict[str, Limit] = {
@@ -78,11 +82,13 @@ LIMITS: dict[str, Limit] = {
     ),
     "thickness": Limit(
         "The body is deeper than the contact is wide.",
-        "part by which the approach on a half-space is too large, estimated",
+        "part by which a half-space is off, estimated: too large an approach at the same load or, in free space, too "
+        "small a force at the same approach, whichever is more",
         0.1,
         0.5,
-        "10 % too large; twice the true one",
-        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8; closed_forms.half_space_excess",
+        "10 % off; the approach twice the true one, or the force half of it",
+        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8; closed_forms.half_space_excess and "
+        "half_space_shortfall",
     ),
     "slope": Limit(
         "Slopes are small.",
@@ -102,11 +108,22 @@ LIMITS: dict[str, Limit] = {
     ),
     "inertia": Limit(
         "The motion is slow.",
-        "lag by radiated waves over the shortest time scale of the program",
+        "lag by radiated waves over the shortest time scale of the program or, in a slide, part by which waves add to "
+        "the displacement under a load that moves so fast, whichever is more",
         0.1,
         1.0,
-        "force 10 % off its quasi-static value; as much as it",
-        "J. Lysmer, F. E. Richart, J. Soil Mech. Found. Div. ASCE 92 (1966) 65",
+        "force, or displacement, 10 % off its quasi-static value; as much as it",
+        "J. Lysmer, F. E. Richart, J. Soil Mech. Found. Div. ASCE 92 (1966) 65; J. Cole, J. Huth, J. Appl. Mech. 25 "
+        "(1958) 433",
+    ),
+    "heating": Limit(
+        "Friction does not heat the spots.",
+        "rise of temperature of the spots in a slide, their mean [K], if the body takes up all of the heat",
+        1.0,
+        10.0,
+        "retardation times of a rubber a fifth shorter; six times shorter (universal WLF constants)",
+        "J. C. Jaeger, Proc. R. Soc. N.S.W. 76 (1942) 203; J. F. Archard, Wear 2 (1959) 438; M. L. Williams, R. F. "
+        "Landel, J. D. Ferry, J. Am. Chem. Soc. 77 (1955) 3701",
     ),
     "coupling": Limit(
         "Pressure displaces nothing sideways.",
@@ -124,6 +141,14 @@ LIMITS: dict[str, Limit] = {
         0.5,
         "10 % of the area; half of it, and the next octave as much again",
         "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840",
+    ),
+    STATED: Limit(
+        "The grid holds all waves that there are, of a surface whose generator states the shortest.",
+        "cell over the shortest wave",
+        _JUST / 8,
+        _JUST / 4,
+        "fewer than 8 cells a wave, a crest drawn straight between its cells is 8 % too low; fewer than 4, 29 %",
+        "arithmetic: 1 - cos(pi / n) of n cells a wave",
     ),
     "border": Limit(
         "The surface repeats without a step.",

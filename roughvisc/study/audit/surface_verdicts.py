@@ -15,7 +15,7 @@ from roughvisc.mechanics.closed_forms.adhesion import (
 from roughvisc.study.audit.evidence import Evidence
 from roughvisc.study.audit.finding import Finding, percent, told, unknown
 from roughvisc.study.audit.given import Given
-from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STIFF
+from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STATED, STIFF
 
 #: Contact fraction from which on spots have grown together.
 _MERGED = 0.5
@@ -136,10 +136,20 @@ def strain(evidence: Evidence, given: Given) -> Finding:
 
 
 def resolution(evidence: Evidence, given: Given) -> Finding:
-    """What the last octave of waves adds to the rms slope."""
+    """Cells in the shortest wave that a generator states; of others what the last octave adds to the rms slope."""
     texture = evidence.texture
     if texture is None:
         return unknown("resolution", "The result holds no heights.")
+    if texture.stated is not None:
+        wave, cells = texture.stated.wavelength, texture.stated.cells
+        number = 1 / cells
+        few = "" if number < LIMITS[STATED].doubtful else ". Take finer cells, or longer waves"
+        return Finding(
+            "resolution",
+            number,
+            f"Stated by the generator: the shortest wave is {told(wave, 'm')} long, and has {cells:.3g} cells{few}.",
+            STATED,
+        )
     if texture.analytic:
         return Finding("resolution", 0.0, "The profile is analytic: it has no shorter waves.")
     if texture.smooth:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,6 +16,25 @@ from roughvisc.topography.grid import spacing, taper_weights
 from roughvisc.topography.parameters import parameters, rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.topography.synthesis import is_analytic
+
+#: Part of the mean square slope beyond the shortest wave of a recipe, up to which it is the recipe's surface.
+_SHORTER = 1e-6
+
+
+@dataclass(frozen=True)
+class Stated:
+    """The shortest wave that a recipe states, along the axis on which it has the fewest cells.
+
+    Attributes
+    ----------
+    wavelength : float
+        [m]
+    cells : float
+        Of the grid, in one such wave.
+    """
+
+    wavelength: float
+    cells: float
 
 
 @dataclass(frozen=True)
@@ -37,6 +59,8 @@ class Texture:
         Difference of opposite borders over that of neighbouring rows, along the worse axis. [-]
     taper : float
         Margin of a taper over the side, along the worse axis; zero of a surface that was not tapered. [-]
+    stated : Stated or None
+        The shortest wave by the recipe, if it has waves and there are no shorter ones.
     """
 
     size: tuple[float, float]
@@ -48,6 +72,7 @@ class Texture:
     shortest: float
     mismatch: float
     taper: float = 0.0
+    stated: Stated | None = None
 
     @property
     def smooth(self) -> bool:
@@ -76,9 +101,11 @@ def texture_of(height: xr.DataArray, boundary: str, recipe: str = "") -> Texture
     if not height.isnull().any() and np.ptp(height.values) > 0:
         z = height.values - height.values.mean()
         whole = _spectral(z if periodic else hann(z), cells)
+    analytic = bool(recipe) and is_analytic(height.assign_attrs(recipe=recipe))
     return Texture(
         size=size,
-        analytic=bool(recipe) and is_analytic(height.assign_attrs(recipe=recipe)),
+        analytic=analytic,
+        stated=_stated(recipe, height, cells, analytic),
         slope=float(measures["rms_slope"]),
         laplacian=2 * float(measures["rms_curvature"]),
         mismatch=max(border_mismatch(height).of_neighbours),
@@ -110,6 +137,38 @@ def loaded_slope(height: xr.DataArray, boundary: str, approach: float) -> float:
     periodic = boundary == "periodic"
     above = float(height.attrs.get("highest", height.max())) - float(height.max())
     return rms_slope(height, periodic, math.inf if periodic or math.isnan(approach) else approach - above)
+
+
+def _stated(recipe: str, height: xr.DataArray, cells: tuple[float, float], analytic: bool) -> Stated | None:
+    """The shortest wave by a recipe; None if that states none, or the heights hold shorter ones and are others now."""
+    try:
+        made = json.loads(recipe or "{}")
+        waves = _shortest_along(made["name"], made["parameters"])
+    except (KeyError, TypeError, ValueError):
+        return None
+    if waves is None or height.isnull().any() or not (analytic or _without_shorter(height.values, cells, waves)):
+        return None
+    fewest = min(zip(waves, cells, strict=True), key=lambda along: along[0] / along[1])
+    return Stated(fewest[0], fewest[0] / fewest[1])
+
+
+def _shortest_along(name: str, parameters: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Shortest wavelength along x and along y that a recipe states; None of a form without waves. [m]"""
+    if name == "wavy":
+        wave = float(parameters["wavelength"])
+        return (wave, wave if parameters["waves"] == 2 else math.inf)
+    if name == "self_affine":
+        wave, stretch = float(parameters["shortcut"]), math.sqrt(parameters["anisotropy"])
+        return (wave * stretch, wave / stretch)
+    return None
+
+
+def _without_shorter(z: np.ndarray, cells: tuple[float, float], waves: tuple[float, float]) -> bool:
+    """Whether heights that repeat have next to nothing beyond the ellipse of these wavelengths."""
+    q_x, q_y, power, count = modes(z - z.mean(), cells, "forward")
+    squares = count * (q_x**2 + q_y**2) * power
+    beyond = np.hypot(q_x * waves[0], q_y * waves[1]) > 2 * np.pi * (1 + 1e-9)
+    return bool(squares[beyond].sum() <= _SHORTER * squares.sum())
 
 
 def _spectral(z: np.ndarray, cells: tuple[float, float]) -> dict[str, float]:

@@ -13,7 +13,7 @@ import roughvisc as rv
 from roughvisc import closed_forms as cf
 from roughvisc.errors import InputError
 from roughvisc.study.audit.finding import Finding
-from roughvisc.study.audit.limits import LIMITS, VERDICTS
+from roughvisc.study.audit.limits import LIMITS, STATED, VERDICTS
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result
@@ -145,9 +145,21 @@ def test_thickness__predicts_what_the_sheet_makes_of_a_sphere(poisson, base, wid
         rv.simulate(heights, material, program, **QUICK, **more)
         for more in ({}, {"thickness": a / width, "base": base})
     )
-    true = 1 - float(sheet.approach[-1] / half_space.approach[-1])
+    there = rv.simulate(
+        heights,
+        material,
+        rv.Program().approach(float(half_space.approach[-1]), over=1.0),
+        **QUICK,
+        thickness=a / width,
+        base=base,
+    )
+    deeper = 1 - float(sheet.approach[-1] / half_space.approach[-1])
+    weaker = 1 - float(half_space.force[-1] / there.force[-1])
+    assert weaker > deeper
     found = rv.audit(half_space, thickness=a / width, base=base)["thickness"]
-    assert 0.5 * true < found.number < 2 * true
+    assert found.number == pytest.approx(weaker, rel=0.05)
+    told = [float(one) for one in re.findall(r"([\d.]+) % (?:smaller|too small)", found.sentence)]
+    assert told == pytest.approx([100 * deeper, 100 * weaker], rel=0.25)
     assert rv.audit(sheet)["thickness"].verdict == "holds"
     assert "Modelled" in rv.audit(sheet)["thickness"].sentence
 
@@ -162,6 +174,32 @@ def test_thickness__predicts_what_the_sheet_makes_of_a_rough_surface(thickness):
     )
     true = 1 - float(sheet.approach[-1] / half_space.approach[-1])  # incompressible: no compression of its own
     assert 0.5 * true < rv.audit(half_space, thickness=thickness)["thickness"].number < 2 * true
+
+
+def test_thickness__counts_the_force():
+    """At a/h = 0.94 approach alone would be doubtful, and more than half of the force is missing."""
+    a = 2e-4
+    half_space = rv.simulate(
+        rv.sphere(RADIUS, 5.2e-4, (27, 26)),
+        rv.elastic(1e6, 0.3),
+        rv.Program().approach(a**2 / RADIUS, over=1.0),
+        **QUICK,
+    )
+    found = rv.audit(half_space, thickness=a / 0.94, base="slipping")["thickness"]
+    assert cf.half_space_excess(cf.Sheet(a / 0.94, 0.3, "slipping"), 0.35e-6, *_last(half_space)) < 0.5
+    assert (found.verdict, "too small" in found.sentence) == ("broken", True)
+
+
+def _last(dataset):
+    return float(dataset.force[-1]), float(dataset.approach[-1])
+
+
+def test_thickness__of_a_flat_punch_is_by_its_approach():
+    """Its force is proportional to the approach, so that both are off by the same part."""
+    punch = rv.simulate(rv.flat_punch(2e-4, 5e-4, 27), RUBBER, rv.Program().load(1e-3, over=1.0), **QUICK)
+    found = rv.audit(punch, thickness=1e-3)["thickness"]
+    assert found.number == pytest.approx(cf.half_space_excess(cf.Sheet(1e-3), 1 / MODULUS, *_last(punch)), rel=1e-12)
+    assert "force" not in found.sentence
 
 
 def test_thickness__that_would_be_enough_is_where_the_verdict_flips(ball, rough):
@@ -238,7 +276,8 @@ def test_coupling__is_dundurs_constant_of_one_body_or_two():
 
 
 def test_resolution__is_what_the_last_octave_adds(rough, ball):
-    found = rv.audit(rough)["resolution"]
+    """Of heights that no recipe states."""
+    found = rv.audit(rough.assign_attrs(recipe=""))["resolution"]
     coarse = rough.height.values
     q = 2 * np.pi * np.hypot(np.fft.fftfreq(40, 2.5e-5)[:, None], np.fft.fftfreq(36, 2.5e-5))
     squares = q**2 * np.abs(np.fft.fft2(coarse)) ** 2
@@ -259,11 +298,143 @@ def test_resolution__of_a_ball_that_was_measured_is_that_of_its_form(ball):
 
 
 def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
-    without_taper = [name for name in LIMITS if name != "window"]
-    assert [one.name for one in rv.audit(rough)] == without_taper
-    assert [one.name for one in rv.audit(ball)] == [one for one in without_taper if one not in ("stickiness", "border")]
+    pressed = [name for name in LIMITS if name not in ("heating", "window", STATED)]
+    assert [one.name for one in rv.audit(rough)] == pressed
+    assert [one.name for one in rv.audit(ball)] == [name for name in pressed if name not in ("stickiness", "border")]
     with pytest.raises(KeyError, match="'border': expected one of adhesion, yielding"):
         rv.audit(ball)["border"]
+
+
+def pressed(heights, boundary="periodic"):
+    program = rv.Program().approach(1e-7, over=1.0)
+    return rv.simulate(
+        heights, RUBBER, program, boundary=boundary, progress=False, tolerance=0.1, times=1, edge="accept"
+    )
+
+
+def generated(shortcut, shape=(48, 40), **settings):
+    """On cells of 10 um."""
+    size = (shape[0] * 1e-5, shape[1] * 1e-5)
+    return rv.self_affine(size, shape, hurst=0.8, rms_slope=0.1, shortcut=shortcut, seed=3, **settings)
+
+
+@pytest.mark.parametrize(
+    ("cells", "verdict"),
+    [(None, "broken"), (3.9, "broken"), (4, "doubtful"), (7.9, "doubtful"), (8, "holds"), (12, "holds")],
+)
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_resolution__of_a_generated_surface_is_by_cells_in_its_shortest_wave(cells, verdict, boundary):
+    found = rv.audit(pressed(generated(cells and cells * 1e-5), boundary))["resolution"]
+    assert found.verdict == verdict
+    assert found.number == pytest.approx(1 / (cells or 2), rel=1e-12)
+    assert found.sentence.startswith(f"Stated by the generator: the shortest wave is {(cells or 2) * 10:g} µm long")
+    assert ("finer cells" in found.sentence) == (verdict != "holds")
+
+
+def test_resolution__of_a_texture_is_along_the_axis_of_its_shortest_waves():
+    """Four times longer along x: waves of 12 cells on average are of 24 along x and 6 along y."""
+    found = rv.audit(pressed(generated(1.2e-4, anisotropy=4.0)))["resolution"]
+    assert found.number == pytest.approx(1 / 6, rel=1e-12)
+
+
+@pytest.mark.parametrize(("waves", "number"), [(1, 1 / 5), (2, 1 / 3)])
+def test_resolution__of_a_regular_wave_is_by_its_cells(waves, number):
+    """Five cells a wave along x, three along y, where the first of both does not change."""
+    wave = rv.wavy(1e-6, 1e-4, (3e-4, 2e-4), (15, 6), waves=waves)
+    assert rv.audit(pressed(wave))["resolution"].number == pytest.approx(number, rel=1e-12)
+
+
+def test_resolution__of_heights_that_are_no_longer_the_recipe_s_is_by_the_last_octave():
+    """Finer by interpolation it is still the recipe's surface; with noise, or cut, it is not."""
+    surface = generated(8e-5)
+    noise = 1e-7 * np.random.default_rng(1).standard_normal(surface.shape)
+    for other in (surface.copy(data=surface.values + noise), surface.isel(x=slice(0, 31))):
+        assert "recipe" in other.attrs
+        found = rv.audit(pressed(other))["resolution"]
+        assert "add" in found.sentence
+        assert found.judged_by == ""
+    copied = surface.copy(data=3.0 * np.roll(surface.values, 5, axis=0))
+    assert rv.audit(pressed(copied))["resolution"].number == pytest.approx(1 / 8, rel=1e-12)
+
+
+def test_limits__of_stated_waves_are_what_a_straight_line_between_cells_leaves():
+    limit = LIMITS[STATED]
+    lost = [f"{100 * (1 - math.cos(math.pi * one)):.0f} %" for one in (limit.doubtful, limit.broken)]
+    assert [one in limit.meaning for one in lost] == [True, True]
+
+
+def test_limits__of_heating_are_those_of_retardation_times():
+    """By the universal constants of Williams, Landel and Ferry."""
+    times = [rv.wlf_shift(300.0 + LIMITS["heating"].doubtful * k, 300.0, c1=8.86, c2=101.6) for k in (1, 10)]
+    assert 1 - times[0] == pytest.approx(0.2, abs=0.03)
+    assert 1 / times[1] == pytest.approx(6, rel=0.05)
+    assert LIMITS["heating"].broken == 10 * LIMITS["heating"].doubtful
+
+
+SPEED, RUBBING = 0.5, {"heat_conductivity": 0.2, "volumetric_heat_capacity": "1.8 MJ/m^3/K"}
+
+
+def rubbed(speed, **settings):
+    """A wave that slides by a period."""
+    wave = rv.wavy(2e-6, 1e-3, (1e-3, 5e-4), (24, 11), waves=1)
+    program = rv.Program().pressure(1e5, over=0).hold(0.1).slide(1e-3, speed=speed).hold(0.1)
+    asked = {"fields": ("pressure",), "times": [0.1, 0.1 + 1e-3 / speed], **settings}
+    return rv.simulate(wave, SLIPPERY, program, boundary="periodic", tolerance=1e-2, progress=False, **asked)
+
+
+SLIPPERY = rv.zener(1e6, 0.3e6, 0.3e3)
+#: After endless creep. [Pa]
+SHEAR = 1 / (1 / 1e6 + 1 / 0.3e6)
+
+
+def test_inertia__of_a_slide_is_by_its_speed_over_that_of_waves():
+    density = 1100.0
+    wave = math.sqrt(SHEAR / density)
+    verdicts = [rv.audit(rubbed(part * wave), density=density)["inertia"].verdict for part in (0.1, 0.5, 0.85, 1.0)]
+    assert verdicts == ["holds", "doubtful", "broken", "broken"]
+    fast = rv.audit(rubbed(1e3))["inertia"]
+    assert fast.verdict == "broken", "of any solid"
+    assert "slides at 1 km/s, faster than waves along the surface" in fast.sentence
+    half = rv.audit(rubbed(0.5 * wave), density=density)["inertia"]
+    assert half.number == pytest.approx(cf.moving_load_excess(0.5, 1.0, 1.0, 0.5), rel=1e-2)
+    unsure = rv.audit(rubbed(0.5 * wave))["inertia"]
+    assert unsure.verdict == "not known"
+    most = float(re.search(r"up to ([\d.]+) kg", unsure.sentence)[1])
+    for part, verdict in ((0.9, "holds"), (1.1, "doubtful")):
+        assert rv.audit(rubbed(0.5 * wave), density=part * most)["inertia"].verdict == verdict
+
+
+def test_heating__is_that_of_the_friction_power_in_the_spots():
+    """A wave in full contact: one spot of the whole surface, and the power is force times speed."""
+    ds = rubbed(SPEED, fields=("pressure",))
+    force, area = float(rv.observables.history(ds).friction_force.max()), float(ds.contact_area_corrected[-1])
+    found = rv.audit(ds, **RUBBING)["heating"]
+    rise = cf.flash_temperature(force * SPEED / area, math.sqrt(area / math.pi), SPEED, 0.2, 1.8e6)
+    assert found.number == pytest.approx(rise, rel=1e-9)
+    assert "one spot" in found.sentence.lower()
+    capable = rv.audit(ds, heat_conductivity=1e-6, volumetric_heat_capacity=1.0)["heating"]
+    assert capable.verdict == "broken"
+
+
+def test_heating__that_is_not_known_says_what_to_give():
+    ds = rubbed(SPEED)
+    found = rv.audit(ds, heat_conductivity=0.2)["heating"]
+    assert found.verdict == "not known"
+    assert "Give volumetric_heat_capacity: " in found.sentence
+    assert "Give heat_conductivity and volumetric_heat_capacity: " in rv.audit(ds)["heating"].sentence
+    assert 'fields = ["pressure"]' in rv.audit(ds.drop_vars("pressure"), **RUBBING)["heating"].sentence
+
+
+def test_slide_of_a_case__is_audited_before_it_runs(tmp_path):
+    path = tmp_path / "study.toml"
+    audited = '[audit]\ndensity = "1100 kg/m^3"\nheat_conductivity = 0.2\nvolumetric_heat_capacity = "1.8 MJ/m^3/K"\n'
+    slide = '[[program]]\npressure = 1e4\nover = 0\n[[program]]\nslide = "1 mm"\nspeed = "1 km/s"\n'
+    surface = '[surface]\ngenerate = "wavy"\namplitude = 1e-6\nwavelength = 1e-3\nsize = 1e-3\nshape = [24, 11]\n'
+    material = '[material]\nmodel = "zener"\nshear_modulus = 1e6\nkelvin_modulus = 3e5\nkelvin_viscosity = 300\n'
+    path.write_text(surface + material + slide + '[solve]\nboundary = "periodic"\n' + audited)
+    found = rv.audit(read_study(path))
+    assert found["inertia"].verdict == "broken"
+    assert (found["heating"].verdict, found["heating"].sentence[:20]) == ("not known", "Known after the run,")
 
 
 def test_border__says_what_the_note_of_the_result_says(rough):
@@ -318,6 +489,8 @@ def test_audit__of_absent_points_and_a_flat_punch():
         ({"yield_strength": 0}, "yield_strength: found 0: expected"),
         ({"density": "light"}, "density: found 'light', which is no quantity"),
         ({"linear_strain": math.nan}, "linear_strain: found nan"),
+        ({"heat_conductivity": "0.2 W"}, "heat_conductivity: found '0.2 W', which is in watt"),
+        ({"volumetric_heat_capacity": 0}, "volumetric_heat_capacity: found 0: expected"),
         ({"base": "bonded"}, "base is 'bonded' without a thickness: expected both, or neither"),
         ({"thickness": 1e-3, "base": "glued"}, "base is 'glued': expected 'bonded' or 'slipping'"),
     ],

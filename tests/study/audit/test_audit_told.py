@@ -9,7 +9,7 @@ from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 from roughvisc.views.report import page as page_module
 
-AUDITED = BALL + '[audit]\nwork_of_adhesion = "50 mJ/m^2"\nthickness = "0.2 mm"\n'
+AUDITED = BALL + '[audit]\nwork_of_adhesion = "50 mJ/m^2"\nthickness = "0.6 mm"\n'
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 
 
@@ -28,7 +28,7 @@ def test_audit__of_a_folder_tells_of_every_result(invoke, folder):
     assert (status, err) == (0, "")
     assert out.count("assumption") == 2
     assert out.count("broken") == 2
-    assert out.count("bonded sheet of 200 µm") == 2
+    assert out.count("bonded sheet of 600 µm") == 2
     assert max(map(len, out.splitlines())) <= 80
 
 

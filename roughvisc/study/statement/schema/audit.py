@@ -17,6 +17,8 @@ BOUNDS: dict[str, tuple[str, dict[str, float]]] = {
     "thickness": ("m", {"above": 0}),
     "density": ("kg/m^3", {"above": 0}),
     "linear_strain": ("1", {"above": 0}),
+    "heat_conductivity": ("W/m/K", {"above": 0}),
+    "volumetric_heat_capacity": ("J/m^3/K", {"above": 0}),
 }
 _KINDS: dict[str, Any] = {
     **{key: measured(unit, **bounds) for key, (unit, bounds) in BOUNDS.items()},
