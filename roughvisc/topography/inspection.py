@@ -10,16 +10,17 @@ import numpy as np
 import scipy.ndimage
 import xarray as xr
 
-from roughvisc.topography.blocks import BLOCK, count_of, deviation_of, extremes_of, row_blocks
+from roughvisc.topography.blocks import BLOCK, count_of, deviation_of, extremes_of
 from roughvisc.topography.borders import BorderMismatch, border_mismatch
 from roughvisc.topography.cards import condition
 from roughvisc.topography.conditioning import crop, fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
+from roughvisc.topography.missing_points import in_large_holes
 from roughvisc.topography.parameters import parameters
-from roughvisc.topography.spectrum import psd
+from roughvisc.topography.spectrum import MOST_MISSING, psd, unmeasured
 
-#: Share of the surface in large holes from which a part without them is proposed; window that tells large from small.
-_HOLES, _WINDOW = 0.01, 9
+#: Share of the surface in large holes from which a part without them is proposed.
+_HOLES = 0.01
 #: Beyond this share of the points, what looks like spikes may be the surface itself.
 MOST_SPIKES = 0.02
 #: Share of the mean square height that a curved form has from which it is called one.
@@ -30,13 +31,16 @@ _WHITE, _ABOVE = -1.5, 2.0
 #: A floor this far below the root mean square height is rounding; one that has no more of the mean square slope than
 #: this is left in.
 _ROUNDING, _HARMLESS = 1e-6, 0.02
+#: A floor that grows by this factor where as many points again are hidden is that of the bridges over them: twofold
+#: or more if it is, by up to 1.2 if it is noise.
+_OF_GAPS = 1.5
 #: Waves of fewer cells than this are not resolved in contact.
 RESOLVED = 8
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Short-wave end of the spectrum of a scan.
+    """Short-wave end of the spectrum of a scan, by the points that were measured.
 
     Attributes
     ----------
@@ -214,12 +218,7 @@ def _without_holes(h: xr.DataArray) -> tuple[dict[str, tuple[float, float]], flo
     """Limits of the largest rectangle without large holes [m], empty if there are none, and the share in them."""
     if count_of(h.values) == h.size:
         return {}, 0.0
-    void, reach = np.empty(h.shape, dtype=bool), _WINDOW // 2
-    for rows in row_blocks(h.shape):  # each with the rows that its windows reach
-        first = max(rows.start - reach, 0)
-        missing = np.isnan(h.values[first : rows.stop + reach]).astype(float)
-        mean = scipy.ndimage.uniform_filter(missing, _WINDOW, mode="nearest")
-        void[rows] = mean[rows.start - first : rows.stop - first] > 0.5
+    void = in_large_holes(np.isnan(h.values))
     share = float(void.mean())
     if share < _HOLES:
         return {}, share
@@ -253,17 +252,14 @@ def _largest_rectangle(present: np.ndarray) -> tuple[tuple[int, int], tuple[int,
 
 
 def _noise(h: xr.DataArray) -> Noise | None:
-    """Short-wave end of the spectrum; None where the surface is flat, small, or has missing points."""
-    values, sides = h.values, spacing(h)
-    if min(h.shape) < 16 or count_of(values) < h.size:
+    """Short-wave end of the spectrum by the measured points; None where these are few, or the surface is flat."""
+    values, sides, gaps = h.values, spacing(h), unmeasured(h)
+    if min(h.shape) < 16 or np.count_nonzero(gaps) > MOST_MISSING * h.size:
         return None
     rms = deviation_of(values)
     if not rms > 1e-12 * max(1e-300, *map(abs, extremes_of(values))):
         return None
-    spectrum = psd(h, "hann")
-    q, density, modes = (spectrum[name].values for name in ("wavevector", "psd", "modes"))
-    seen = q <= np.pi / max(sides)
-    q, density, modes = q[seen], density[seen], modes[seen]
+    q, density, modes = _short_waves(h)
     octave = q > q[-1] / 2
     tail = float(np.median(density[octave]))
     power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
@@ -271,6 +267,7 @@ def _noise(h: xr.DataArray) -> Noise | None:
     below = np.flatnonzero(smooth < _ABOVE * tail)
     strength = float(np.sqrt(tail / (sides[0] * sides[1])))
     floor = bool(power > _WHITE and below.size and below[0] > 0 and strength > _ROUNDING * rms)
+    floor = floor and not _grows_with_gaps(h, gaps, tail)
     shortest = float(2 * np.pi / q[below[0] - 1]) if floor else 2 * max(sides)
     slopes = density * modes * q**2
 
@@ -280,3 +277,22 @@ def _noise(h: xr.DataArray) -> Noise | None:
     if not floor:
         strength = float(np.sqrt(np.median(density[q > 0.8 * q[-1]]) / (sides[0] * sides[1])))
     return Noise(strength, floor, shortest, share(RESOLVED * max(sides)), share(shortest) if floor else 0.0)
+
+
+def _short_waves(h: xr.DataArray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Wavevector [rad/m], density [m4] and number of waves of the rings that are seen whole, by the measured points."""
+    spectrum = psd(h, "hann", bridge=True)
+    seen = spectrum["wavevector"].values <= np.pi / max(spacing(h))
+    q, density, modes = (spectrum[name].values[seen] for name in ("wavevector", "psd", "modes"))
+    return q, density, modes
+
+
+def _grows_with_gaps(h: xr.DataArray, gaps: np.ndarray, tail: float) -> bool:
+    """Whether a floor [m4] is what bridges make of the gaps, and not noise: with as many gaps again it is larger."""
+    if not gaps.any():
+        return False
+    hidden = np.roll(gaps, [n // 2 for n in gaps.shape], (0, 1))
+    if np.count_nonzero(gaps | hidden) > MOST_MISSING * h.size:
+        return False
+    q, density, _ = _short_waves(h.where(~hidden))
+    return float(np.median(density[q > q[-1] / 2])) > _OF_GAPS * tail

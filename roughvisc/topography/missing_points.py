@@ -11,12 +11,14 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import FILL, WINDOW
-from roughvisc.topography.blocks import extremes_of, median_of
+from roughvisc.topography.blocks import extremes_of, median_of, row_blocks
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
 from roughvisc.topography.harmonic import harmonic
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
+#: Side of the window that tells large holes from small, in points.
+_HOLE = 9
 #: Numbers in the windows that are sorted at once.
 _AT_ONCE = 2_000_000
 
@@ -109,6 +111,22 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
     )
     line = f"filled: {int(missing.sum())} missing points, {method}"
     return noted(filled, line, fill_method=method)
+
+
+def in_large_holes(missing: np.ndarray) -> np.ndarray:
+    """Mask of the points that lie in large holes: most of the points around them are missing, they or not.
+
+    Parameters
+    ----------
+    missing : ndarray of bool, shape (nx, ny)
+        Where no height is.
+    """
+    inside, reach = np.empty(missing.shape, dtype=bool), _HOLE // 2
+    for rows in row_blocks(missing.shape):  # each with the rows that its windows reach
+        first = max(rows.start - reach, 0)
+        share = scipy.ndimage.uniform_filter(missing[first : rows.stop + reach].astype(float), _HOLE, mode="nearest")
+        inside[rows] = share[rows.start - first : rows.stop - first] > 0.5
+    return inside
 
 
 def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.ndarray]]:

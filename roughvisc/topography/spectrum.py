@@ -6,12 +6,17 @@ from typing import Literal
 
 import numpy as np
 import scipy.fft
+import scipy.ndimage
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.blocks import column_blocks, count_of, mean_of, row_blocks
-from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.bridging import bridged
+from roughvisc.topography.grid import checked, like, spacing
+from roughvisc.topography.missing_points import in_large_holes
 
+#: Share of the points that may be bridged.
+MOST_MISSING = 0.5
 # Of the mean square slope, what tells the shortest wave of a surface.
 _OF_SLOPE = 0.99
 
@@ -105,15 +110,18 @@ def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
     return 0.5 * float(q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])])
 
 
-def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
+def psd(h: xr.DataArray, window: Literal["hann"] | None = None, *, bridge: bool = False) -> xr.Dataset:
     r"""Radially averaged power spectral density.
 
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y), without missing points. [m]
+        Height over (x, y), without missing points unless these are bridged. [m]
     window : {"hann"}, optional
         None for a surface that repeats. "hann": a cosine window, for a scan that does not (its mean square is one).
+    bridge : bool
+        Whether to go by measured points alone. Those that are missing or were filled in are bridged smoothly, and so
+        are those left over inside a large hole or on its rim, which are wrong more often than not.
 
     Returns
     -------
@@ -124,7 +132,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     Raises
     ------
     InputError
-        If points are missing, or the window is another.
+        If points are missing and not to be bridged, more than half of them are, or the window is another.
 
     Notes
     -----
@@ -133,13 +141,19 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     in one ring: the sum of ``psd * modes`` over the area :math:`A` is the variance exactly (Parseval) where there is no
     window. Rings are as wide as the coarser of the two wavevector steps; beyond the Nyquist wavevector they are parts.
 
+    A steep spectrum ends many orders of magnitude below where it begins. Missing points that are set to the mean, or
+    filled by a membrane (:func:`roughvisc.fill`), have steps or kinks at their rims, which raise that end: at 10 % of
+    missing points, and noise a hundredth of the rms height, to 100 times and 1.7 times what it is. Bridges go on with
+    the curvature beyond the rim: the end is then off by up to a quarter at 10 %, by 1 % at 0.4 %. A large hole holds
+    no waves shorter than it is wide: the end is too low by the share of such holes in the square of the window.
+
     References
     ----------
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     """
-    h = checked(h, "psd", least=1)
+    h = _bridged(checked(h, "psd", least=1)) if bridge else checked(h, "psd", least=1)
     if missing := h.size - count_of(h.values):
-        raise InputError(f"psd: {missing} points are missing: expected none (fill them first)")
+        raise InputError(f"psd: {missing} points are missing: expected none (bridge=True goes by the others)")
     if window not in (None, "hann"):
         raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
     cells, shape = spacing(h), h.shape
@@ -171,6 +185,25 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         coords={"wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"})},
         attrs={"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"},
     )
+
+
+def _bridged(h: xr.DataArray) -> xr.DataArray:
+    """Heights with the points bridged that are not to go by. [m]"""
+    missing = unmeasured(h)
+    if (count := np.count_nonzero(missing)) > MOST_MISSING * h.size:
+        raise InputError(f"psd: {count} of {h.size} points were not measured: expected half at most")
+    return like(h, bridged(h.values, missing)) if count else h
+
+
+def unmeasured(h: xr.DataArray) -> np.ndarray:
+    """Mask of the points that were not measured: missing, filled in, or left over in a large hole or on its rim.
+
+    What instruments give inside a large hole and on its rim is wrong more often than not.
+    """
+    missing = np.isnan(h.values)
+    if "filled" in h.coords:
+        missing |= h["filled"].transpose("x", "y").values.astype(bool)
+    return missing | scipy.ndimage.binary_dilation(in_large_holes(missing)) if missing.any() else missing
 
 
 def _transformed(heights: np.ndarray, window: bool) -> np.ndarray:

@@ -143,7 +143,7 @@ def _slope(found: Inspection) -> tuple[str, str, str]:
 def _noise(found: Inspection) -> Iterator[tuple[str, str, str]]:
     noise = found.noise
     if noise is None:
-        yield "Noise", "not known: the scan is flat, or smaller than 16 points", _NOTHING
+        yield "Noise", "not known: the scan is flat, smaller than 16 points, or mostly missing", _NOTHING
         return
     if noise.floor:
         seen = (

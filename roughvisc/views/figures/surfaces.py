@@ -22,7 +22,7 @@ from roughvisc.topography.blocks import (
     row_blocks,
 )
 from roughvisc.topography.grid import cell_edges, checked, spacing
-from roughvisc.topography.spectrum import psd
+from roughvisc.topography.spectrum import MOST_MISSING, psd, unmeasured
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -102,7 +102,7 @@ def surface(height: xr.DataArray) -> Figure:
     -----
     Map and profile show the heights as they are; distribution and spectrum those less their mean plane. The
     distribution is shown with the normal one of the same Sq. The spectrum is that of :func:`roughvisc.psd` under a
-    Hann window, missing points on the plane: a quick look, not a measurement.
+    Hann window, by measured points alone: those that are missing or were filled in are bridged.
     """
     height = _checked(height)
     low, high = robust_limits(height.values)
@@ -198,10 +198,12 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
 def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     ax.set_xlabel("Wavevector [rad/m]")
     ax.set_ylabel("Power spectral density [m⁴]")
-    drawn = False
-    if min(levelled.shape) >= 8:
-        levelled.values[np.isnan(levelled.values)] = 0.0  # of this figure alone
-        spectrum = psd(levelled, window="hann")
+    drawn, reason = False, "too small or too flat"
+    gaps = np.count_nonzero(unmeasured(levelled))
+    if gaps > MOST_MISSING * levelled.size:
+        reason = "too few measured points"
+    elif min(levelled.shape) >= 8:
+        spectrum = psd(levelled, window="hann", bridge=True)
         spectrum = spectrum.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings that are seen whole
         wavevector, density = spectrum["wavevector"].values, spectrum["psd"].values
         scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
@@ -215,9 +217,10 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
             spread_axis(ax.yaxis, y, always=True)
             ax.set_xlabel(f"Wavevector [rad/{symbol}]")
             ax.set_ylabel(f"Power spectral density [{symbol}⁴]")
+            ax.set_title("gaps bridged" if gaps else "", loc="right")
             ax.grid(color="0.9", lw=0.5)
             drawn = True
     if not drawn:
-        ax.text(0.5, 0.5, "too small or too flat", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        ax.text(0.5, 0.5, reason, transform=ax.transAxes, ha="center", va="center", color="0.4")
         ax.set_xticks([])
         ax.set_yticks([])

@@ -479,6 +479,25 @@ def test_surface__states_the_sq_and_the_spectrum_of_the_levelled_heights():
     np.testing.assert_allclose(1e-24 * density, whole.psd, rtol=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.004, 0.1])
+def test_surface__draws_the_floor_of_the_points_that_were_measured(share):
+    """White noise on waves of eight cells and more: C = variance * cell area at the end, however many are missing."""
+    h = rv.self_affine((1.2e-4, 1.1e-4), (120, 110), hurst=0.8, rms_height=1e-6, rolloff=4e-5, shortcut=8e-6, seed=1)
+    rng = np.random.default_rng(2)
+    h = (h + 3e-9 * rng.standard_normal(h.shape)).where(rng.random(h.shape) >= share)
+    spectrum = plot.surface(h).axes[3]
+    q, density = spectrum.lines[0].get_data()
+    floor = 1e-24 * np.mean(density[q > 0.6 * q[-1]])
+    assert floor / (9e-18 * 1e-12) == pytest.approx(1, rel=0.15)
+    assert spectrum.get_title("right") == ("gaps bridged" if share else "")
+
+
+def test_surface__draws_no_spectrum_of_a_scan_that_is_mostly_missing():
+    h = rv.self_affine((3e-5, 2e-5), (30, 20), hurst=0.8, rms_height=1e-6, seed=1)
+    figure = plot.surface(h.where(np.random.default_rng(1).random(h.shape) < 0.4))
+    assert [text.get_text() for text in figure.axes[3].texts] == ["too few measured points"]
+
+
 def test_surface__of_noise_has_the_level_of_its_variance():
     shape, steps, deviation = (160, 121), (2e-6, 3e-6), 1e-7
     values = deviation * np.random.default_rng(1).standard_normal(shape)
