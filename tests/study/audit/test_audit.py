@@ -407,7 +407,7 @@ def test_inertia__of_a_slide_is_by_its_speed_over_that_of_waves():
 def test_heating__is_that_of_the_friction_power_in_the_spots():
     """A wave in full contact: one spot of the whole surface, and the power is force times speed."""
     ds = rubbed(SPEED, fields=("pressure",))
-    force, area = float(rv.observables.history(ds).friction_force.max()), float(ds.contact_area_corrected[-1])
+    force, area = float(rv.observables.history(ds).friction_force.max()), float(ds.contact_area[-1])
     found = rv.audit(ds, **RUBBING)["heating"]
     rise = cf.flash_temperature(force * SPEED / area, math.sqrt(area / math.pi), SPEED, 0.2, 1.8e6)
     assert found.number == pytest.approx(rise, rel=1e-9)
