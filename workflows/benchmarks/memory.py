@@ -50,7 +50,7 @@ def one(side, material, boundary):
     case = vary(case, BOUNDARIES[boundary])
     with tempfile.TemporaryDirectory() as folder:
         with open_result(run_case(case, folder)) as ds:
-            contact, rows = float(ds.contact_fraction.max()), ds.sizes["time"]
+            contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.solving(), case.program().on_area(nominal_area(case.height()))
     memory = choose_memory(case.material(), **memory_wanted(program, settings)).memory

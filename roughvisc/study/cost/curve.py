@@ -15,6 +15,7 @@ from roughvisc.study.simulation.friction import rub
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
+from roughvisc.topography.grid import nominal_area
 
 #: Sides of the coarse grids, in cells, and by what factors a curve may grow dearer from a grid to one twice as fine.
 _COARSE, _GROWS = (24, 48), (1.0, 1.5)
@@ -37,13 +38,13 @@ def curve_march(case: Case, height: xr.DataArray) -> March:
     found = [_convolutions(case, height, side) for side in _COARSE]
     octaves = math.log2(max(math.sqrt(height.size) / _COARSE[1], 1.0))
     growth = min(max(found[1][0] / max(found[0][0], 1.0), _GROWS[0]), _GROWS[1])
-    _, contact, level, force = found[1]
+    _, contact, level, force, fraction = found[1]
     curve = _curve(case)
     times = 1.0 + float(curve.last_octave)
     count = float(len(curve.asked))
     again = _AGAIN if case.solving().grid_error else 1.0
     work = found[1][0] * growth**octaves * times * again
-    return March(count, count, work, 0.0, max(contact), True, level, force, contact)
+    return March(count, count, work, 0.0, max(contact), True, level, force, fraction, contact)
 
 
 def memory_of_curve(cells: float, settings: Settings) -> float:
@@ -57,8 +58,9 @@ def _curve(case: Case) -> Curve:
     return experiment
 
 
-def _convolutions(case: Case, height: xr.DataArray, side: int) -> tuple[float, tuple[float, ...], float, float]:
-    """Convolutions of all speeds on a coarse grid; contact fractions, largest approach [m] and force [N]."""
+def _convolutions(case: Case, height: xr.DataArray, side: int) -> tuple[float, tuple[float, ...], float, float, float]:
+    """Convolutions of all speeds on a coarse grid; parts of the cells in contact, and the largest values of approach
+    [m], force [N] and contact fraction."""
     curve = _curve(case)
     asked = np.sort(curve.asked)
     few = asked[np.unique(np.linspace(0, len(asked) - 1, min(_SPEEDS, len(asked))).astype(int))]
@@ -68,9 +70,11 @@ def _convolutions(case: Case, height: xr.DataArray, side: int) -> tuple[float, t
     again = replace(curve, speeds=few.tolist(), last_octave=False)
     found = rub(small, case.material(), again, settings, progress=False)
     work = _OF_ITERATION * found["iterations"].values + _OF_PROBLEM * found["outer_iterations"].values
-    contact = np.interp(np.log(asked), np.log(few), found["contact_fraction"].values)
+    cells = found["contact_area_counted"].values / nominal_area(small)
+    contact = np.interp(np.log(asked), np.log(few), cells)
     total = float(np.interp(np.log(asked), np.log(few), work).sum())
-    return total, tuple(contact.tolist()), float(found["approach"].max()), float(found["force"][0])
+    largest = (float(found[name].max()) for name in ("approach", "force", "contact_fraction"))
+    return total, tuple(contact.tolist()), *largest
 
 
 def _coarser(height: xr.DataArray, side: int, shape: tuple[int, ...]) -> xr.DataArray:

@@ -23,7 +23,7 @@ from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.cost.short_slides import shortened, slid_cells
 from roughvisc.study.simulation.footprint import PROCESS, march_bytes
 from roughvisc.study.simulation.kept_times import kept_times
-from roughvisc.study.simulation.rows import in_slide
+from roughvisc.study.simulation.rows import in_slide, staircase_area
 from roughvisc.study.simulation.scene import Ground, prepare
 from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
@@ -64,15 +64,17 @@ class March:
     damped : float
         Part of the steps that the two-step rule takes.
     contact : float
-        Largest contact fraction.
+        Largest part of the cells that are in contact.
     whole : bool
         Whether the coarse marches came to their end in the time that they were given.
     level : float
         Largest approach: what lies deeper cannot be touched. [m]
     force : float
         Largest force. [N]
+    fraction : float
+        Largest contact fraction: that of the contact area, which is corrected for the grid.
     kept : tuple of float
-        Contact fraction at each kept time that a coarse march reached.
+        Part of the cells in contact at each kept time that a coarse march reached.
     slid, slid_convolutions : float
         Steps in slides and what they take, part of all.
     """
@@ -85,6 +87,7 @@ class March:
     whole: bool
     level: float = math.inf
     force: float = math.nan
+    fraction: float = math.nan
     kept: tuple[float, ...] = ()
     slid: float = 0.0
     slid_convolutions: float = 0.0
@@ -142,19 +145,22 @@ def _march(case: Case, height: xr.DataArray) -> March:
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
     scene, _ = prepare(Ground(height, settings.missing, kernel=settings.kernel), case.material(), program, settings)
     steps = rows = damped = 0
-    reached = contact = level = force = 0.0
+    reached = contact = fraction = level = force = 0.0
     work, instants = 0, [0.0]
     slid = slid_work = 0
     kept, contacts = set(scene.times or ()), []
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
         steps += 1
-        share = float(np.mean(step.shown.pressure > 0))
+        touching = step.shown.pressure > 0
+        share = float(np.mean(touching))
         if settings.times is None or now in kept:
             rows += 1
             contacts.append(share)
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, share)
+        taken_off = staircase_area(touching, scene) / (scene.halfspace.cell_area * touching.size)
+        fraction = max(fraction, share - taken_off)
         level, force = max(level, step.level), max(force, step.shown.force)
         if in_slide(step):
             slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
@@ -169,7 +175,7 @@ def _march(case: Case, height: xr.DataArray) -> March:
         pace = (reached - instants[half]) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
-    known = (part, contact, bool(whole), level, force, tuple(contacts), slid, slid_work)
+    known = (part, contact, bool(whole), level, force, fraction, tuple(contacts), slid, slid_work)
     return March(steps * stretch, kept_rows, work * stretch, *known)
 
 

@@ -267,7 +267,7 @@ def _row(
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,
-        "contact_fraction": found.contact,
+        "contact_fraction": found.fraction,
         "convolutions": found.convolutions,
         "wall_time": wall_time(settings, cells, found, choice, convolution, part),
         "memory": needed(cells),
@@ -321,7 +321,7 @@ def _curve_row(
         "nominal_pressure": nominal,
         "full_contact_pressure": relaxed,
         "warning": full_contact_warning(nominal, relaxed),
-        "contact_fraction": found.contact,
+        "contact_fraction": found.fraction,
         "convolutions": found.convolutions,
         "wall_time": found.convolutions * convolution,
         "memory": needed(cells),
@@ -349,7 +349,7 @@ def _audit(case: Case, surface: _Surface, found: March) -> str:
     height, boundary = surface.height, case.settings.solve.boundary
     if boundary not in surface.textures:
         surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
-    foreseen = {"force": found.force, "approach": found.level, "fraction": found.contact}
+    foreseen = {"force": found.force, "approach": found.level, "fraction": found.fraction}
     return judged(of_case(case, height, surface.textures[boundary], **foreseen), Given(), case.title).warning
 
 

@@ -84,7 +84,7 @@ class Rows:
         shown, window = step.shown, self._ground.window
         contact = shown.contact.positive()
         touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
-        area = max(touching - _staircase(contact, step.scene), 0.0)
+        area = max(touching - staircase_area(contact, step.scene), 0.0)
         arrays: dict[str, Array] = {}
         if window.whole:
             mean_gap = self._mean_of_gap(step, contact)
@@ -320,7 +320,7 @@ def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
     return {name: own[id(array)] for name, array in arrays.items()}
 
 
-def _staircase(contact: NDArray[np.bool_], scene: Scene) -> float:
+def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
     """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
 
     The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent

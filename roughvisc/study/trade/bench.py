@@ -18,6 +18,7 @@ from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
+from roughvisc.topography.grid import nominal_area
 
 Report = Callable[[str, float, float], None]
 
@@ -163,7 +164,7 @@ class Bench:
     def _memory(self, case: Case, dataset: xr.Dataset, steps: int) -> float:
         """As a plan counts it, with the steps that were taken. [byte]"""
         settings, cells = case.solving(), dataset.sizes["x"] * dataset.sizes["y"]
-        contact, rows = float(dataset["contact_fraction"].max()), dataset.sizes["time"]
+        contact, rows = float(dataset["contact_area_counted"].max()) / nominal_area(dataset), dataset.sizes["time"]
         choice = choose_memory(case.material(), **memory_wanted(case.program(), settings))
         found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
         increments = 8.0 * cells * steps if settings.method == "seed" else 0.0

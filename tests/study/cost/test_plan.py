@@ -279,6 +279,17 @@ def test_plan__says_how_much_comes_into_contact(study):
     assert f"about {100 * float(free.contact_fraction[0]):.2g} % of the grid" in console.export_text()
 
 
+def test_plan__means_by_contact_fraction_what_a_result_means(study):
+    """The surface is as coarse as the plan's own grid, so that the plan presses what the run does."""
+    case = study(ROUGH.replace("[90, 108]", "[33, 31]").replace("50 um", "100 um"))[0]
+    touching = rv.run(case, progress=False).pressure.values > 0
+    faces = sum((touching & ~np.roll(touching, turn, axis)).sum((1, 2)) for axis in (1, 2) for turn in (1, -1))
+    share = (touching.sum((1, 2)) - 0.088 * faces) / (33 * 31)
+    found = float(rv.plan([case]).contact_fraction[0])
+    assert found == pytest.approx(share.max(), rel=1e-3)
+    assert found < 0.95 * touching.mean((1, 2)).max(), "it is not the count"
+
+
 def test_disk__of_a_contact_that_is_small_at_most_kept_times(study, tmp_path):
     """The pressure is written compressed; the largest contact, at the last of nine times, says little of the file."""
     changes = {

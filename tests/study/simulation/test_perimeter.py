@@ -8,7 +8,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.mechanics.contact.neighbours import PERIMETER_CORRECTION
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation.rows import _staircase
+from roughvisc.study.simulation.rows import staircase_area
 from roughvisc.study.simulation.scene import Ground
 
 UNIT = rv.elastic(0.25)
@@ -37,7 +37,7 @@ def test_perimeter__runs_between_contact_and_material_out_of_contact(seed, bound
     present = rng.random(shape) < 0.8
     contact = present & (rng.random(shape) < 0.5)
     scene = SimpleNamespace(halfspace=HalfSpace(shape, sides, boundary), present=present, outside=np.inf)
-    assert _staircase(contact, scene) == pytest.approx(counted(contact, present, sides, boundary == "periodic"))
+    assert staircase_area(contact, scene) == pytest.approx(counted(contact, present, sides, boundary == "periodic"))
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -49,7 +49,7 @@ def test_perimeter__of_a_quarter_is_a_quarter(boundary):
     scene = SimpleNamespace(halfspace=halfspace, present=there, outside=np.inf)
     whole = counted(contact, present, (1.0, 0.7), boundary == "periodic")
     assert halfspace.cell_area == pytest.approx(4 * 0.7)
-    assert _staircase(part & there, scene) == pytest.approx(whole)
+    assert staircase_area(part & there, scene) == pytest.approx(whole)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -59,7 +59,7 @@ def test_perimeter__goes_on_at_the_border_of_a_window(mirrored):
         halfspace=HalfSpace((4, 3), (1.0, 1.0), "free", mirrored=mirrored), present=None, outside=1.0
     )
     faces = 4 * (4 + 3) if mirrored else 2 * (4 + 3)
-    assert _staircase(contact, scene) == pytest.approx(PERIMETER_CORRECTION * faces)
+    assert staircase_area(contact, scene) == pytest.approx(PERIMETER_CORRECTION * faces)
 
 
 def pillars():
