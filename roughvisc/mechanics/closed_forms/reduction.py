@@ -9,7 +9,8 @@ of pressure and displacement, contact with a half-space of contact compliance ``
     w = int C(t - s) dF(s),   w = approach - g(x) where the element touches,   F = 0 where it does not,
 
 and the force is ``2 int F dx`` over the contact. This holds for loading, unloading, opening and closing, as
-long as the contact is a disc; the run stops where it is not. Nothing here is shared with the solver on a grid.
+long as the contact is a disc; the run stops where it is not. On a sheet the elements are not independent. Nothing here
+is shared with the solver on a grid.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from roughvisc.mechanics.closed_forms.element_memory import AllForces, Exponenti
 from roughvisc.mechanics.closed_forms.element_row import ElementRow, OutOfElements, edge
 from roughvisc.mechanics.closed_forms.indenters import Indenter
 from roughvisc.mechanics.closed_forms.instants import fastest_change, instants_of, same_instant
+from roughvisc.mechanics.closed_forms.sheet import OnSheet
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 from roughvisc.mechanics.stepping.program import Program
 
@@ -212,7 +214,7 @@ def reduced_contact(
     Parameters
     ----------
     indenter : Indenter
-        A :class:`Paraboloid` or a :class:`Cone`.
+        A :class:`Paraboloid` or a :class:`Cone` on a half-space.
     material : Material
         Anything with ``contact_compliance(t)`` and ``contact_integral(t)``.
     program : Program
@@ -236,7 +238,8 @@ def reduced_contact(
     Raises
     ------
     InputError
-        If the program jumps in approach and the material cannot, or a time lies outside of the program.
+        If the indenter is on a sheet, the program jumps in approach and the material cannot, or a time lies outside of
+        the program.
     ConvergenceError
         If the contact ceases to be a disc.
 
@@ -265,6 +268,12 @@ def reduced_contact(
     >>> found.radius.round(4), found.work.round(4)
     (array([1., 0.]), array([0.5333, 0.    ]))
     """
+    if isinstance(indenter, OnSheet):
+        raise InputError(
+            f"indenter is on a sheet ({indenter.sheet!r}), and the reduction to independent elements holds on a "
+            "half-space only: expected a Paraboloid or a Cone; lee_radok holds on a sheet, and simulate takes any "
+            "program"
+        )
     corners = program.corners
     instants = np.unique(corners) if times is None else np.asarray(times, dtype=float)
     if instants.ndim != 1 or np.any(np.diff(instants) <= 0) or not np.all((instants >= 0) & (instants <= corners[-1])):

@@ -35,7 +35,11 @@ _IN_PANEL, _PHASE = 16, 10.0
 
 @dataclass(frozen=True)
 class OnSheet:
-    """An indenter on a sheet: whatever is built on an indenter holds for it, the growing contact of Lee and Radok too.
+    """An indenter on a sheet, for the solutions that follow from elastic contact alone.
+
+    The growing contact of Lee and Radok holds on a sheet too. So does the single maximum of Ting, which takes minutes:
+    it asks for thousands of radii, and each is a solution of the Fredholm equation. The reduction to independent
+    elements does not hold: :func:`~roughvisc.mechanics.closed_forms.reduction.reduced_contact` refuses a sheet.
 
     Parameters
     ----------
