@@ -73,6 +73,21 @@ class Kernel(Protocol):
             the mean displacement is left out then, and approach with periodic boundaries counts without it. [m]
         """
 
+    def check_cells(self, spacing: tuple[float, float]) -> None:
+        """Refuse cells on which :meth:`influence` is not accurate; called once for the grid of a surface.
+
+        Parameters
+        ----------
+        spacing : tuple of float
+            Cell sides ``(dx, dy)``. [m]
+
+        Raises
+        ------
+        InputError
+            Naming the cells and what is expected. Default: never.
+        """
+        return
+
     def described(self) -> dict[str, Any]:
         """What a result says of the body: names of attributes and their values."""
         return {"kernel": repr(self)}

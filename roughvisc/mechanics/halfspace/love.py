@@ -70,7 +70,7 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     return kernel * (longer / math.pi)
 
 
-def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
+def _corner_sum(x: Array, y: Array, dx: float | Array, dy: float | Array) -> Array:
     total = np.zeros_like(x)
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
@@ -78,15 +78,15 @@ def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
     return total
 
 
-def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float, float]) -> Array:
+def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float | Array, float | Array]) -> Array:
     """Displacement due to unit pressure on a rectangle and unit contact compliance, in closed form.
 
     Parameters
     ----------
     x, y : ndarray
         Positions, which broadcast, from the rectangle's centre; none on its edges' lines. [m]
-    sides : tuple of float
-        Of the rectangle. [m]
+    sides : tuple of float or ndarray
+        Of the rectangle, or of one rectangle for each position. [m]
 
     Returns
     -------

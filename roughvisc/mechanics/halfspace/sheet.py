@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.halfspace.kernel import Kernel, check_grid
+from roughvisc.mechanics.halfspace.long_cells import long_cell_influence
 from roughvisc.mechanics.halfspace.love import love_kernel
 
 Array = NDArray[np.float64]
@@ -28,8 +29,9 @@ SHORTEST_WAVE = 24.0
 # The correction in the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
 _PIECE, _NODES = 0.15, 10
 # Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
-_GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.6, 7), (1.5, 11), (3.0, 16), (6.0, 28))
-_GAUSS_PER_THICKNESS = 5.0
+_GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
+# Cells of more thicknesses than the first are long: see the module on them. Beyond the second they are refused.
+_LONG, _LONGEST = 0.5, 50.0
 # Below this, sinh(2 x) - 2 x comes from its series.
 _SERIES_BELOW = 0.5
 
@@ -61,7 +63,8 @@ class Sheet(Kernel):
         \qquad S = \frac{\cosh 2x - 1}{\sinh 2x + 2x}.
 
     In free space the kernel is that of the half-space less a smooth correction,
-    ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell.
+    ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
+    the thickness it is that of :mod:`roughvisc.mechanics.halfspace.long_cells`.
 
     References
     ----------
@@ -107,9 +110,13 @@ class Sheet(Kernel):
         return np.where(long, self.uniform_displacement, 2 / q * reduction(q * self.thickness, self.poisson, self.base))
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-        """Love's kernel less the correction, to 1e-13 of a cell's displacement of itself. [m]"""
-        kernel = love_kernel(shape, spacing)
+        """Love's kernel less the correction, to 1e-13 of a cell's displacement of itself; or that of long cells. [m]"""
+        check_grid(shape, spacing)
         dx, dy = (side / self.thickness for side in spacing)
+        if max(dx, dy) > _LONG:
+            uniform = self.uniform_displacement / self.thickness
+            return self.thickness * long_cell_influence(shape, (dx, dy), self._scaled_transfer, uniform, _REACH)
+        kernel = love_kernel(shape, spacing)
         x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
         margin = _REACH - math.hypot(dx, dy) / 2
         near = np.hypot(x[:, None], y) <= margin
@@ -124,6 +131,20 @@ class Sheet(Kernel):
                 mean += weight_a * weight_b * correction(np.sqrt(square + (y[columns] + b) ** 2))
         kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
         return kernel
+
+    def _scaled_transfer(self, x: Array) -> Array:
+        """The transfer function over the thickness, of wave numbers times the thickness."""
+        return 2 / x * reduction(x, self.poisson, self.base)
+
+    def check_cells(self, spacing: tuple[float, float]) -> None:
+        """Refuse cells longer than fifty thicknesses."""
+        ratio = max(spacing) / self.thickness
+        if ratio > _LONGEST * (1 + 1e-9):
+            raise InputError(
+                f"thickness is {self.thickness:.6g} m and a cell is {max(spacing):.6g} m long, {ratio:.4g} times the "
+                f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
+                "periodic boundaries, or a thicker sheet"
+            )
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
@@ -202,6 +223,6 @@ def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
 
 def _gauss(side: float) -> tuple[Array, Array]:
     """Gauss nodes about the centre of a side, in thicknesses, and weights that add up to one."""
-    points = next((count for longest, count in _GAUSS if side <= longest), math.ceil(_GAUSS_PER_THICKNESS * side))
+    points = next(count for longest, count in _GAUSS if side <= longest)
     nodes, weights = np.polynomial.legendre.leggauss(points)
     return nodes * side / 2, weights / 2

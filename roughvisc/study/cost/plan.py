@@ -45,7 +45,7 @@ from roughvisc.study.simulation.available import Available, memory_available
 from roughvisc.study.simulation.coarser import coarser
 from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.refusal import PART, too_large
-from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
+from roughvisc.study.simulation.scene import Ground, check_cells, follows, memory_wanted
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
@@ -243,6 +243,7 @@ def _row(
     mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
+        check_cells(height, settings)
         choice = choices.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}

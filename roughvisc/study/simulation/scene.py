@@ -181,6 +181,16 @@ def follows(settings: Settings) -> bool:
     return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
 
 
+def check_cells(height: xr.DataArray, settings: Settings) -> None:
+    """Refuse a surface on whose cells the kernel is not accurate in free space.
+
+    With periodic boundaries the transfer function is exact on any cells. Coarser copies of the surface are not refused.
+    """
+    if settings.boundary == "free":
+        dx, dy = spacing(height, "height")
+        settings.kernel.check_cells((dx, dy))
+
+
 def prepare(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Choice]:
     """Scene of a case and what models its material.
 

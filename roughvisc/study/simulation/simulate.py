@@ -29,7 +29,7 @@ from roughvisc.study.simulation.malloc import keeping
 from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, edge_note, left_out, slope_note
 from roughvisc.study.simulation.refusal import require_memory
 from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
-from roughvisc.study.simulation.scene import Ground, follows, prepare
+from roughvisc.study.simulation.scene import Ground, check_cells, follows, prepare
 from roughvisc.study.simulation.slides import slide_note
 from roughvisc.study.simulation.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
 from roughvisc.study.statement.body import body, not_one_body
@@ -178,6 +178,7 @@ def press(
     The seed paper's algorithm keeps all past pressures and is not checkpointed: an interrupted run begins again.
     """
     height = checked(height, "simulate", least=1)
+    check_cells(height, settings)
     needed = ("pressure",) if settings.grid_error and "pressure" not in settings.fields else ()
     with_needed = replace(settings, fields=(*settings.fields, *needed))
     count = threads_for(threads)

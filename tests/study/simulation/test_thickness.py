@@ -2,14 +2,16 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad
+from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
@@ -146,6 +148,20 @@ def test_both_memories_and_the_grid_that_grows__agree():
         np.testing.assert_allclose(other.force, one.force, rtol=2e-3)
 
 
+def test_unloading__is_that_of_ting_on_a_sheet():
+    """His solution asks of the body only that space and time separate; tables stand for the integral equation."""
+    exact, rubber = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), rv.zener(1e6, 3e5, 1e5)
+    radii = np.linspace(0, 1.6e-4, 60)
+    force, depth = exact.scaled_force(radii) ** (1 / 3), exact.reduced(radii)
+    table = SimpleNamespace(
+        radius_at_scaled_force=lambda value: np.interp(np.cbrt(value), force, radii),
+        reduced=CubicSpline(radii, depth),
+    )
+    program, times = rv.Program().load(2e-3, over=1.0).load(0.0, over=1.0), [0.5, 1.0, 1.25, 1.5, 1.75]
+    ds = pressed(rv.sphere(RADIUS, 3.2e-4, 25), rubber, program, times=times, tolerance=5e-3)
+    np.testing.assert_allclose(ds.approach, ting(table, rubber, program).approach(times), rtol=5e-3)
+
+
 def test_grid_error__knows_the_base():
     exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), THICKNESS
     load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
@@ -277,6 +293,23 @@ def test_note__bounds_what_a_half_space_has_more(case):
 def test_study__refuses(case, change, message):
     with pytest.raises(rv.InputError, match=message):
         vary(case, change)
+
+
+def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path):
+    thickness, load = 2e-4 / 51 / 15, rv.Program().load(1e-3, over=0)
+    message = r"thickness is 2.61438e-07 m and a cell is 1.33333e-05 m long, 51 times .* expected cells of at most 50"
+    ball = rv.sphere(RADIUS, 2e-4, (15, 16))
+    with pytest.raises(rv.InputError, match=message):
+        pressed(ball, rv.elastic(1e6), load, thickness=thickness)
+    assert float(pressed(ball, rv.elastic(1e6), load, thickness=thickness, boundary="periodic").force[0]) > 0
+    study = tmp_path / "gel.toml"
+    text = STUDY.replace('"0.1 mm"', f"{thickness}").replace('"0.3 mm"', '"0.2 mm"').replace("[24, 21]", "[15, 16]")
+    study.write_text(text)
+    for verb in (["plan"], ["run", "--out", str(tmp_path / "out"), "--no-plots"]):
+        done = CliRunner().invoke(main, [*verb, str(study)])
+        assert done.exit_code == 2, done.output
+        assert "51 times the thickness" in " ".join((done.output + done.stderr).split())
+    assert not list(tmp_path.glob("out/*.nc"))
 
 
 def test_study__refuses_a_base_without_thickness_and_sheets_in_a_pair(tmp_path):
