@@ -16,21 +16,25 @@ def verify(results: Path) -> None:
     """Read results again, and say which are damaged.
 
     Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of
-    their study sets damaged results aside and computes them anew. The exit status is 1 if any is damaged.
+    their study sets damaged results aside and computes them anew. The exit status is 1 if any is damaged. A file that
+    another program has changed has lost its checksum: it is named, and whether its values are right cannot be said.
 
     \b
     Example:
       roughvisc verify results/ground_steel-study
     """
+    from roughvisc.study.storage.store import UNSEALED
     from roughvisc.study.storage.verify import verify as verified
 
     found = verified(results)
     bad = [one for one in found if one.flaw]
-    bare = sum(not one.sealed for one in found if not one.flaw)
+    bare = [one for one in found if not one.flaw and not one.sealed]
     for one in bad:
         complain(f"{one.path}: is damaged: {one.flaw}")
+    for one in bare:
+        complain(f"{one.path}: {UNSEALED}")
     whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} whole"
-    click.echo(whole + (f", {bare} of them without a checksum" if bare else ""))
+    click.echo(whole + (f", {len(bare)} of them without a checksum" if bare else ""))
     if bad:
         raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to have the results computed anew", 1)
 

@@ -28,7 +28,7 @@ from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, warn_once, write_result
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
 
@@ -218,8 +218,8 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path, same_bits):
-                    if path.exists() and not is_result_of(case, path):  # damaged, and not of other transforms
-                        set_aside(path)
+                    if path.exists() and (problem := _problem(case, path)):  # not one of other transforms
+                        set_aside(path, problem)
                     keeper.resume()
                     _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
@@ -257,19 +257,24 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper,
 
 def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
     """Whether a file is the whole result of a case, and on request of the transforms that are here."""
-    if not path.exists():
+    if not path.exists() or _problem(case, path):
         return False
+    with open_result(path) as dataset:
+        made_with = str(dataset.attrs.get("transforms", ""))
+    if made_with != transform_library():
+        warn_once(path, f"{path}: {other_transforms([made_with])}")
+        return not same_bits
+    return True
+
+
+def _problem(case: Case, path: Path) -> str:
+    """Why a file is not the whole result of a case; empty if it is."""
     try:
         with open_result(path) as dataset:
-            whole = bool(dataset.attrs.get("case_key") == case.key)
-            made_with = str(dataset.attrs.get("transforms", ""))
+            found = dataset.attrs.get("case_key")
     except InputError as error:
-        log.warning("%s", error)
-        return False
-    if whole and made_with != transform_library():
-        log.warning("%s: %s", path, other_transforms([made_with]))
-        return not same_bits
-    return whole
+        return str(error)
+    return "" if found == case.key else f"{path}: holds the result of case {found}: expected that of its name"
 
 
 def other_transforms(made_with: Iterable[str]) -> str:

@@ -25,6 +25,7 @@ from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of
 from roughvisc.study.storage.links import open_unlinked, refuse_link
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.store import UNSEALED
 from roughvisc.study.storage.tidy import tidy
 
 if TYPE_CHECKING:
@@ -181,6 +182,10 @@ def run_cases(
             told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
             if told:
                 book.tell(told)
+            unsealed = [one.entry.file for one in outcomes.values() if one.entry and not one.entry.sealed]
+            if unsealed:
+                more = f" and {len(unsealed) - 1} more" if len(unsealed) > 1 else ""
+                book.tell(f"{folder / unsealed[0]}{more}: {UNSEALED}")
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise

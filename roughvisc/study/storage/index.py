@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.seal import seal, unsealed
-from roughvisc.study.storage.store import NETCDF, require_whole, result_files, whole_file
+from roughvisc.study.storage.store import NETCDF, UNSEALED, require_whole, result_files, warn_once, whole_file
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
 
@@ -70,6 +70,8 @@ class Entry:
         Everything over the rows, ``time`` or ``speed`` too, and over the accepted steps.
     x, y : ndarray
         Positions of the cells. [m]
+    sealed : bool
+        Whether the file has a checksum.
     """
 
     file: str
@@ -79,6 +81,7 @@ class Entry:
     histories: dict[str, NDArray[Any]] = field(repr=False)
     x: NDArray[np.float64] = field(repr=False)
     y: NDArray[np.float64] = field(repr=False)
+    sealed: bool = True
 
     @property
     def key(self) -> str:
@@ -121,7 +124,7 @@ def read_entry(path: Path) -> Entry:
 
     try:
         stamp = _stamp(path)
-        require_whole(path)
+        sealed = require_whole(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -142,7 +145,7 @@ def read_entry(path: Path) -> Entry:
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
     kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)} | {"result_format": RESULT_FORMAT}
-    return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float))
+    return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float), sealed)
 
 
 def _is_table(text: Any) -> bool:
@@ -185,15 +188,17 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
                 entry = read_entry(path)
+            elif not entry.sealed:
+                warn_once(path, f"{path}: {UNSEALED}")
         except InputError as error:
-            log.warning("%s", error)
+            warn_once(path, str(error))
         except FileNotFoundError:  # gone meanwhile
             continue
         else:
             if entry.key == path.stem:
                 entries[entry.key] = entry
             else:
-                log.warning("%s: holds the result of case %s: expected the one that its name says", path, entry.key)
+                warn_once(path, f"{path}: holds the result of case {entry.key}: expected the one that its name says")
     return Index(entries, _latest(folder))
 
 
@@ -207,6 +212,7 @@ def save_index(folder: Path, index: Index) -> None:
             "stamp": entry.stamp,
             "attributes": entry.attributes,
             "fields": entry.fields,
+            "sealed": entry.sealed,
             "histories": {name: len(values) for name, values in entry.histories.items()},
             "grid": grids.number(entry),
         }
@@ -283,5 +289,6 @@ def _entries(heads: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[An
             at[name] += count
         x, y = arrays[f"x{head['grid']}"], arrays[f"y{head['grid']}"]
         size, changed = head["stamp"]
-        entries.append(Entry(head["file"], (size, changed), head["attributes"], head["fields"], histories, x, y))
+        stamp, sealed = (size, changed), head["sealed"]
+        entries.append(Entry(head["file"], stamp, head["attributes"], head["fields"], histories, x, y, sealed))
     return entries

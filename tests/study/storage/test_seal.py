@@ -16,6 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
+from roughvisc.study.storage import store
 from roughvisc.study.storage.seal import flaw, is_sealed, unsealed
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.verify import verify
@@ -45,6 +46,64 @@ def test_seal__is_no_matter_to_readers_and_goes_with_what_another_program_writes
     assert flaw(result) == ""
     assert not is_sealed(result)
     assert open_result(result).attrs["note"] == "mine"
+
+
+def test_changed_by_another_program__is_served_with_one_warning(tmp_path, caplog, capfd, invoke):
+    path = tmp_path / "ball.toml"
+    path.write_text(TWO_LOADS)
+    cases, out = read_cases(path), tmp_path / "out"
+    sweep(cases, out, workers=0, progress=False)
+    changed = out / f"{cases[0].key}.nc"
+    with netCDF4.Dataset(changed, "a") as file:  # as ncatted does
+        file["force"][:] = 7.0
+    rewritten = out / f"{cases[1].key}.nc"
+    with xr.open_dataset(rewritten, decode_timedelta=False) as ds:
+        whole = ds.load()
+    whole.to_netcdf(rewritten)
+    both = {f"{one}: {store.UNSEALED}" for one in (changed, rewritten)}
+
+    def warned_by(act):
+        caplog.clear()
+        act()
+        return [one.getMessage() for one in caplog.records if "has no checksum" in one.getMessage()]
+
+    assert warned_by(lambda: open_result(changed)) == [f"{changed}: {store.UNSEALED}"]
+    assert open_result(changed).force.values.tolist() == [7.0, 7.0, 7.0]
+    assert warned_by(lambda: run(cases[0], out, progress=False)) == []
+    assert warned_by(lambda: run(cases[1], out, progress=False)) == [f"{rewritten}: {store.UNSEALED}"]
+    assert warned_by(lambda: rv.open_results(out)) == []
+    store._warned.clear()  # another process, which reads the index
+    said = warned_by(lambda: [rv.open_results(out), rv.open_results(out, ragged=True)])
+    assert (len(said), set(said)) == (2, both)
+    capfd.readouterr()
+    sweep(cases, out, workers=0, progress=False)
+    first = capfd.readouterr().err
+    assert first == f"roughvisc: {changed} and 1 more: {store.UNSEALED}\n"
+    status, said, err = invoke("verify", out)
+    assert (status, said) == (0, "2 of 2 files whole, 2 of them without a checksum\n")
+    assert set(err.splitlines()) == {f"roughvisc: {one}" for one in both}
+
+
+def test_damaged_result__is_warned_of_once(tmp_path, caplog):
+    path = tmp_path / "ball.toml"
+    path.write_text(TWO_LOADS)
+    cases, out = read_cases(path), tmp_path / "out"
+
+    def warned_by(act):
+        sweep(cases, out, workers=0, progress=False)
+        result = out / f"{cases[0].key}.nc"
+        content = bytearray(result.read_bytes())
+        content[-3000] ^= 4
+        result.write_bytes(content)
+        caplog.clear()
+        act()
+        return [one.getMessage() for one in caplog.records if f"{result}: is damaged" in one.getMessage()]
+
+    (message,) = warned_by(lambda: run(cases[0], out, progress=False))
+    assert message.endswith(f"; it is set aside as {cases[0].key}.nc.damaged, and computed anew")
+    assert len(warned_by(lambda: [rv.open_results(out), rv.open_results(out), rv.to_table(out)])) == 1
+    (message,) = warned_by(lambda: sweep(cases, out, workers=0, progress=False))
+    assert "is set aside" not in message, "that is said after it"
 
 
 def test_seal__tells_every_changed_bit_and_every_cut(result):
