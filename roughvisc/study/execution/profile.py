@@ -29,9 +29,9 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
         *((HalfSpace, name) for name in ("displacement", "displacement_single")),
         *((HalfSpace, name) for name in ("approximate_inverse", "approximate_inverse_within")),
         (Reach, "spread"),
-        *((Sliding, name) for name in ("skew", "lagging", "slope")),
+        *((Sliding, name) for name in ("displacement", "full_contact", "lagging", "force_across")),
     ),
-    "vector work of the solver": ((attempt, "solve_contact"), (steady, "solve_contact")),
+    "vector work of the solver": ((attempt, "solve_contact"), (steady, "solve_complementarity")),
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
     "surface and kernels": (
         (Case, "height"),

@@ -128,7 +128,7 @@ def test_charts__draw_the_errors_that_the_table_holds_against_the_tolerance(with
     ds.attrs["tolerance"] = tolerance
     steps = np.linspace(0, float(ds.time[-1]), 17)
     ds["step_time"], ds["step_time_error"] = ("step", steps), ("step", np.full(17, 0.3))
-    for name in ("force", "approach", "contact_area_corrected"):
+    for name in ("force", "approach", "contact_area"):
         ds[f"step_{name}"] = "step", np.interp(steps, ds.time, ds[name])
     (chart,) = [one for one in frames_of(ds, 10**5)["charts"] if one["label"] == "Relative error"]
     assert chart["time"].startswith("Kept time")
