@@ -223,7 +223,7 @@ def test_big_scans_and_results__are_measured(tmp_path, monkeypatch, capsys):
     scans.make(tmp_path, 48, "npy")
     with_header = rv.open_scan(tmp_path / "scan-48.sur")
     exact = rv.open_scan(tmp_path / "scan-48.npy", unit="m", spacing=scans.SPACING)
-    np.testing.assert_allclose(with_header.values.T, exact.values, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(with_header.values, exact.values, rtol=0, atol=1e-11)
     prepare, step = scans.steps(tmp_path, 48)["surface card: level, outliers, fill, filter"]
     scans.make(tmp_path, 48, "sdf")
     assert step(prepare()).shape == (48, 48)

@@ -12,7 +12,7 @@ SHAPE, SIDE = (10, 9), 0.1
 
 
 def rough():
-    height = rv.self_affine((1.0, 0.9), SHAPE, hurst=0.8, rms_slope=0.1, seed=1)
+    height = rv.self_affine((1.0, 0.9), SHAPE, hurst=0.8, rms_slope=0.1, seed=2)
     height.values[np.random.default_rng(0).random(SHAPE) < 0.2] = np.nan
     return height
 

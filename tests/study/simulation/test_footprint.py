@@ -27,7 +27,7 @@ hurst = 0.8
 rms_slope = 0.1
 rolloff = "0.25 mm"
 shortcut = "50 um"
-seed = 1
+seed = 4
 [material]
 model = "zener"
 shear_modulus = "3 MPa"
@@ -135,7 +135,7 @@ def test_march_with_one_exponential__holds_few_fields_beside_gap_and_heights(ove
     """Counted by hand: the contact solver's gap, pressure, displacement and response; displacements of two
     instants of the march and of one of its companion; what both remember. Pressures are held by their cells. While a
     step after a corner waits for its companion, what it remembers and the displacement before it are held too."""
-    surface = rv.self_affine(1e-3, COUNTED, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=5e-5, seed=1)
+    surface = rv.self_affine(1e-3, COUNTED, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=5e-5, seed=4)
     material = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
     program = rv.Program().pressure(6e3, over=over).hold(0.5)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": [0.5 + over], "fields": (), "progress": False}
