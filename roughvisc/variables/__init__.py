@@ -93,7 +93,9 @@ VARIABLES: dict[str, Variable] = {
         "rigid-body approach from first touch",
         "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
         "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
-        "absent; while the contact is open: the value at which it would just close",
+        "absent; while the contact is open: the value at which it would just close; first touch is at the highest "
+        "cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while mean_gap "
+        "(periodic) and mean_plane_separation (free space) do",
         ancillary=("approach_error",),
         short="approach",
     ),
@@ -158,7 +160,21 @@ VARIABLES: dict[str, Variable] = {
         short="contact fraction",
     ),
     "mean_gap": Variable(
-        _SERIES, "m", "mean gap over the present cells", ancillary=("approach_error",), short="mean gap"
+        _SERIES,
+        "m",
+        "mean gap over the present cells",
+        "with periodic boundaries and no cells absent: the separation of the mean planes of both surfaces",
+        ancillary=("approach_error",),
+        short="mean gap",
+    ),
+    "mean_plane_separation": Variable(
+        _SERIES,
+        "m",
+        "separation of the mean plane of the profile and the undeformed plane of the half-space",
+        "free space alone: mean undeformed gap over the present cells minus approach; negative once the mean plane has "
+        "passed the other; not stated of an indenter that is known beyond its grid: its mean would be that of the grid",
+        ancillary=("approach_error",),
+        short="mean-plane separation",
     ),
     **SLIDES,
     # accuracy and cost
@@ -374,7 +390,7 @@ def current_name(name: str) -> str:
 #: What is known of any contact.
 STATE = ("force", "approach", "contact_area", "contact_area_counted", "contact_fraction", "mean_gap")
 #: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
-STEPPED = (*STATE, "work", "stored_energy", "dissipated_energy", "time_error", "status")
+STEPPED = (*STATE, "mean_plane_separation", "work", "stored_energy", "dissipated_energy", "time_error", "status")
 
 
 def of_step(name: str) -> str:

@@ -63,6 +63,8 @@ class Rows:
         earlier = (plain.get("border") for plain in store.plain)
         #: When contact was found at the border of a free-space domain first, where that is accepted. [s]
         self.border: float | None = next((time for time in earlier if time is not None), None)
+        #: Whether the profile has a mean plane of its own: that of an indenter depends on how large its grid is.
+        self._has_mean_plane = settings.boundary == "free" and not ground.can_grow()
         single = settings.tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, ground.kernel, single=single))
         self._mean_influence = lru_cache(maxsize=2)(
@@ -108,6 +110,7 @@ class Rows:
             "contact_area_counted": touching,
             "contact_fraction": self._ground.contact_fraction(contact, area),
             "mean_gap": mean_gap,
+            **self._mean_plane(shown.approach),
             **friction_row(step),
         }
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
@@ -128,7 +131,7 @@ class Rows:
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         if len(kept) < len(rows):
-            for name in ("time", *STEPPED, *(name for name in STEPPED_IN_SLIDES if name in columns)):
+            for name in ("time", *(name for name in (*STEPPED, *STEPPED_IN_SLIDES) if name in columns)):
                 variables[of_step(name)] = (("step",), np.array([row[name] for row in rows]))
             variables["step"] = (("step",), np.arange(len(rows)))
         for name in self._settings.fields:
@@ -250,6 +253,10 @@ class Rows:
         """Of the surface. [m2]"""
         dx, dy = self._ground.spacing
         return dx * dy * self._ground.height.size
+
+    def _mean_plane(self, approach: float) -> dict[str, float]:
+        """Separation of the mean plane of the profile and the undeformed plane in free space. [m]"""
+        return {"mean_plane_separation": self._ground.mean_gap - approach} if self._has_mean_plane else {}
 
     def _status(self, step: Step, converged: bool, contact: NDArray[np.bool_]) -> int:
         if not converged:

@@ -40,6 +40,7 @@ _TOLD: dict[Rows, tuple[str, ...]] = {
         "contact_area_solver_upper",
         "contact_fraction",
         "mean_gap",
+        "mean_plane_separation",
         "sliding_distance",
         "friction_force",
         "friction_force_across",
