@@ -127,11 +127,8 @@ def test_friction__slides_under_the_nominal_pressure_of_the_rest():
     weight = np.outer(ds.taper_x, ds.taper_y)
     np.testing.assert_allclose(ds.force, 2e4 * 0.81 * 5e-4 * 4.5e-4, rtol=1e-3)
     contact = ds.pressure.values[0] > 0
-<<<<<<< HEAD
     corrected = float(ds.contact_area[0] / ds.contact_area_counted[0])
     assert float(ds.contact_fraction[0]) == pytest.approx(corrected * (contact * weight).sum() / weight.sum(), rel=1e-9)
-=======
-    assert float(ds.contact_fraction[0]) == pytest.approx((contact * weight).sum() / weight.sum(), rel=1e-9)
 
 
 def test_history__has_an_axis_of_the_fraction_only_where_area_and_fraction_are_proportional():
@@ -139,4 +136,3 @@ def test_history__has_an_axis_of_the_fraction_only_where_area_and_fraction_are_p
         ds = rv.simulate(h, RUBBER, rv.Program().pressure(4e4, over=1), **OPTIONS | {"times": [0.1, 0.5, 1]})
         labels = [child.get_ylabel() for ax in rv.plot.history(ds).axes for child in ax.child_axes]
         assert ("of nominal [%]" in labels) == shown
->>>>>>> 75905c6 (Test the axis of the contact fraction on tapered surfaces)
