@@ -278,4 +278,4 @@ def disk(case: Case, cells: int, found: March) -> float:
     few = kept[len(kept) // 2] < _COMPRESSED  # the frame that the writer asks
     pressure = found.rows * (float(np.mean(kept)) + 0.01) if few else rows * dense
     fields = sum(pressure if name == "pressure" else rows * dense for name in case.settings.keep.fields)
-    return 20e3 + 8.0 * cells * (fields + 1.0) + found.rows * 120 + found.steps * 8 * len(STEPPED)
+    return 40e3 + 8.0 * cells * (fields + 1.0) + found.rows * 120 + found.steps * 8 * len(STEPPED)

@@ -342,7 +342,7 @@ def test_bytes__are_fields_of_the_cells_and_what_the_process_takes(study):
 def test_disk__takes_the_fields_and_fifteen_histories_of_each_row(study):
     case = vary(study(ROUGH)[0], {"keep.fields": ["pressure", "gap"], "keep.precision": None})
     empty, ten = (estimate.disk(case, 1000, March(20, rows, 400, 0.0, 0.1, True)) for rows in (0, 10))
-    assert empty == 20e3 + 8 * 1000 + 8 * 20 * len(STEPPED), "and the histories of twenty steps"
+    assert empty == 40e3 + 8 * 1000 + 8 * 20 * len(STEPPED), "and the histories of twenty steps"
     assert ten - empty == 10 * (2 * 8 * 1000 + 15 * 8)
     rare = estimate.disk(case, 1000, March(20, 10, 400, 0.0, 0.01, True))
     assert rare - empty == pytest.approx(10 * (1.02 * 8 * 1000 + 15 * 8)), "a sparse pressure is compressed"
