@@ -22,6 +22,11 @@ from roughvisc.study.simulation.grid_error import counting_error
 
 log = logging.getLogger("roughvisc")
 
+#: Stated over what counting leaves open of an area at rest. On 24 rough surfaces at three pressures and three speeds the
+#: stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the powers of
+#: an area at rest it was less than 0.8 in 15 of these 216.
+_COUNTING_CAUTION = 1.5
+
 _NOTHING = {"grid_error_friction": math.nan, "grid_error_area": math.nan}
 
 
@@ -73,9 +78,9 @@ class CoarserFaces:
             for one, other in pairwise(runs)
         )
         friction = float(grid_uncertainty("friction", near[0], far[0], self._ratio))
-        area = float(grid_uncertainty("contact_area", near[1], far[1], self._ratio))
+        area = float(grid_uncertainty("sliding_area", near[1], far[1], self._ratio))
         contact = found.pressure > 0
-        counting = counting_error(contact, faces_between(contact, ~contact, True))
+        counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
         return {"grid_error_friction": friction, "grid_error_area": float(np.maximum(area, counting))}  # NaN stays
 
 
