@@ -22,9 +22,9 @@ from roughvisc.study.simulation.grid_error import counting_error
 
 log = logging.getLogger("roughvisc")
 
-#: Stated over what counting leaves open of an area at rest. On 24 rough surfaces at three pressures and three speeds the
-#: stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the powers of
-#: an area at rest it was less than 0.8 in 15 of these 216.
+#: Stated over what counting leaves open of an area at rest. On 24 rough surfaces, at three pressures and three speeds,
+#: the stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the
+#: powers of an area at rest it was less than 0.8 in 15 of these 216.
 _COUNTING_CAUTION = 1.5
 
 _NOTHING = {"grid_error_friction": math.nan, "grid_error_area": math.nan}

@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 #: Powers of the cell's side with which the error of a quantity vanishes: no lower one is believed, and no higher one
 #: expected. Measured: of the pressure's L1 norm; the mean gap follows the displacements, the counted area the cells at
 #: its edge; of the contact area the scatter of the count is left. Friction shows the power 2 or more; with 1.5 what is
-#: stated is 1.1 times the true error or more on 24 rough surfaces, and 10 times that in the median. The area of a sliding
-#: contact settles more slowly than that of one at rest.
+#: stated is 1.1 times the true error or more on 24 rough surfaces, and 10 times that in the median. The area of a
+#: sliding contact settles more slowly than that of one at rest.
 ORDERS = {
     "pressure": (1.0, 1.5),
     "approach": (1.0, 2.0),

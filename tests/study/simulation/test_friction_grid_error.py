@@ -37,7 +37,7 @@ def test_grid_error__bounds_the_true_one_of_a_line_contact(pressure):
         assert (stated > LEAST * true - NOISE).all()
 
 
-@pytest.mark.parametrize("hurst, seed, pressure", [(0.8, 2, 1e5), (0.8, 3, 5e3), (0.8, 1, 2e4), (0.5, 9, 5e3)])
+@pytest.mark.parametrize(("hurst", "seed", "pressure"), [(0.8, 2, 1e5), (0.8, 3, 5e3), (0.8, 1, 2e4), (0.5, 9, 5e3)])
 def test_grid_error__bounds_the_true_one_of_a_rough_surface(hurst, seed, pressure):
     fine = rv.self_affine(1e-3, 120, hurst=hurst, rms_slope=0.1, rolloff=5e-4, shortcut=1e-3 / 40 * 8, seed=seed)
     for stated, true in judged(rv.from_array(fine.values[1::3, 1::3], 1e-3 / 40), fine, pressure):
