@@ -140,8 +140,20 @@ def test_accuracy__of_random_cases_is_judged_and_resumed(tmp_path, monkeypatch, 
     again, _ = module.main(3, first=10, out=tmp_path / "accuracy.nc", processes=0)
     assert again.identical(ds), "cases in the record are taken from there"
     assert "3 cases taken from" in capsys.readouterr().out
-    late = module.judge(1, 12, time_limit=0.01)
+    (late,) = module.judge(1, 12, time_limit=0.01)
     assert late["status"].startswith("run: TimeoutError"), "reported, not dropped"
+
+
+def test_accuracy__with_more_choices_of_kept_times_and_a_checked_reference(monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    module = importlib.import_module("accuracy")
+    drawn, few, reference = module.judge(1, 11, kept=(module.DRAWN, 3), check=True)
+    assert [one["kept_times"] for one in (drawn, few, reference)] == ["drawn", 3, "reference"]
+    assert len(few["rows"]["pressure"]["true"]) == 3
+    own, finer = (np.nanmax(module.over_tolerance(one, "total")) for one in (few, reference))
+    assert 0 < finer < own / 3, "the reference is the more accurate"
+    module.summarise([drawn, few, reference], module.table([drawn, few, reference]))
+    assert "kept times: 3; 1 cases" in capsys.readouterr().out
 
 
 @pytest.mark.long

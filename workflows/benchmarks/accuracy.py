@@ -1,6 +1,6 @@
 """Does every row keep its word? Random cases, each against a run of the same case at a thirtieth of its tolerance.
 
-    python workflows/benchmarks/accuracy.py [COUNT] [SEED] [--first N] [--out OUT.nc] [--processes N]
+    python workflows/benchmarks/accuracy.py [COUNT] [SEED] [--first N] [--out OUT.nc] [--processes N] [--kept 1 10 50]
     python workflows/benchmarks/accuracy.py --against OTHER_CHECKOUT [COUNT] [SEED] [--first N]
 
 The cases are those of ``accuracy_cases.py``; COUNT is 1000 (12 with ``--against``) and SEED 1 unless given, and
@@ -9,6 +9,9 @@ all its rows; cases that are found there are not run again, so delete it after a
 OUT.nc holds a table of the cases, and a summary is printed. Errors of a row are relative: of the pressure its absolute
 difference summed, over the largest force so far; of approach, force and work over their largest absolute values so far,
 all of the reference and up to that row. Approach and force are judged where the program does not give them.
+``--kept`` runs each case once more for each number of kept times, evenly spaced up to the end of the program; all runs
+of a case share a reference, which keeps the times of all of them. ``--check N`` holds the references of the first N
+cases against runs ten times finer.
 With ``--against`` the cost is compared with that of another checkout: see ``accuracy_cost.py``.
 """
 
@@ -30,40 +33,45 @@ import roughvisc as rv
 
 SHARPER = 30
 QUANTITIES = ("total", "pressure", "approach", "force", "work")
+#: The same of the references that are checked, over that of the references.
+FINER = 10
 #: Errors below this part of the tolerance do not count where stated errors are compared with true ones.
 FLOOR = 1e-3
 #: Processor time of a case, its reference included. [s]
 TIME_LIMIT = 60
+#: Name of the kept times that a case has drawn itself.
+DRAWN = "drawn"
 
 
-def main(count=1000, seed=1, first=0, out="accuracy.nc", processes=2, time_limit=TIME_LIMIT):
+def main(count=1000, seed=1, first=0, out="accuracy.nc", processes=2, time_limit=TIME_LIMIT, kept=(DRAWN,), check=0):
     """Run the cases that are not in the record yet; the table and the records."""
     record = Path(out).with_suffix(".jsonl")
     lines = record.read_text().splitlines() if record.exists() else ()
     wanted = range(first, first + count)
     found = [line for line in map(json.loads, lines) if line["seed"] == seed and line["number"] in wanted]
     if found:
-        print(f"{len(found)} cases taken from {record}", flush=True)
+        print(f"{len({line['number'] for line in found})} cases taken from {record}", flush=True)
     left = sorted(set(wanted) - {line["number"] for line in found})
     with record.open("a") as file:
-        for result in _judged(left, seed, processes, time_limit):
-            file.write(json.dumps(result) + "\n")
+        for results in _judged(left, seed, processes, time_limit, tuple(kept), check):
+            file.write("".join(json.dumps(result) + "\n" for result in results))
             file.flush()
-            print(described(result), flush=True)
-            found.append(result)
-    found.sort(key=lambda result: result["number"])
+            print(*map(described, results), sep="\n", flush=True)
+            found += results
+    found.sort(key=lambda result: (result["number"], str(result["kept_times"])))
     ds = table(found)
     ds.to_netcdf(out, engine="netcdf4")
     summarise(found, ds)
     return ds, found
 
 
-def _judged(numbers, seed, processes, time_limit):
+def _judged(numbers, seed, processes, time_limit, kept, check):
+    jobs = [(seed, number, time_limit, kept, number < check) for number in numbers]
     if not processes:
-        yield from (judge(seed, number, time_limit) for number in numbers)
+        yield from (judge(*job) for job in jobs)
         return
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(judge, seed, number, time_limit) for number in numbers]):
+        for future in as_completed([pool.submit(judge, *job) for job in jobs]):
             yield future.result()
 
 
@@ -71,25 +79,47 @@ def _judged(numbers, seed, processes, time_limit):
 # one case
 
 
-def judge(seed, number, time_limit=TIME_LIMIT):
-    """Plain record of a case: what it is, what it took, and the errors of its rows; or what went wrong."""
+def judge(seed, number, time_limit=TIME_LIMIT, kept=(DRAWN,), check=False):
+    """Plain records of a case, one for each choice of kept times: what it is, what it took, and the errors of its rows.
+
+    Or what went wrong. With ``check`` the reference's own errors are those of a last record.
+    """
     logging.getLogger("roughvisc").setLevel(logging.ERROR)  # of steep slopes
     drawn = case(seed, number)
-    record = {"seed": seed, "number": number, **drawn.families, "tolerance": drawn.settings["tolerance"],
-              "soft": drawn.soft, "status": "ok", "rows": {}}  # fmt: skip
-    part = "run"
+    tolerance = drawn.settings["tolerance"]
+    about = {"seed": seed, "number": number, **drawn.families, "tolerance": tolerance, "soft": drawn.soft}
+    records, runs, part = [], [], "run"
     try:
-        with limited(time_limit):
-            ds = timed(drawn, drawn.settings["tolerance"], drawn.times)
-            record |= {name: ds.attrs[name] for name in ("steps", "cpu")} | {"convolutions": int(ds.convolutions.sum())}
+        with limited(time_limit * len(kept)):
+            for one in kept:
+                records.append({**about, "kept_times": one, "status": "ok", "rows": {}})
+                runs.append(timed(drawn, tolerance, times_of(drawn, one)))
+                records[-1] |= {name: runs[-1].attrs[name] for name in ("steps", "cpu")}
+                records[-1] |= {"convolutions": int(runs[-1].convolutions.sum())}
             part = "reference"
-            exact = timed(drawn, drawn.settings["tolerance"] / SHARPER, [*ds.time.values, *watched(drawn.program)])
-            record |= {"reference_cpu": exact.attrs["cpu"]}
+            told = {float(time) for ds in runs for time in ds.time.values}
+            times = sorted(told | set(watched(drawn.program)))
+            exact = timed(drawn, tolerance / SHARPER, times)
             part = "comparison"
-            record["rows"] = compared(ds, exact, drawn.program)
+            for record, ds in zip(records, runs, strict=True):
+                record |= {"reference_cpu": exact.attrs["cpu"], "rows": compared(ds, exact, drawn.program)}
+        if check:
+            part = "check of the reference"
+            with limited(10 * time_limit):
+                finest = timed(drawn, tolerance / SHARPER / FINER, times)
+                rows = compared(exact.isel(time=np.isin(exact.time.values, list(told))), finest, drawn.program)
+            records.append({**records[0], "kept_times": "reference", "rows": rows})
     except Exception as error:
-        record["status"] = f"{part}: {type(error).__name__}: {error}"
-    return record
+        for record in records:
+            if not record["rows"]:
+                record["status"] = f"{part}: {type(error).__name__}: {error}"
+    return records
+
+
+def times_of(drawn, kept):
+    """Kept times of a case by its own draw, or so many."""
+    end = drawn.program.duration
+    return drawn.times if kept == DRAWN else np.linspace(0, end, kept + 1)[1:].tolist()
 
 
 @contextlib.contextmanager
@@ -210,7 +240,7 @@ def table(found):
     variables = {name: (("case", "quantity"), values) for name, values in columns.items()}
     for name in ("steps", "convolutions", "cpu", "reference_cpu", "tolerance"):
         variables[name] = ("case", np.array([result.get(name, np.nan) for result in found], float))
-    for name in ("material", "program", "surface", "kept", "status"):
+    for name in ("material", "program", "surface", "kept", "kept_times", "status"):
         variables[name] = ("case", np.array([result[name] for result in found], dtype=str))
     variables["soft"] = ("case", np.array([result["soft"] for result in found], "int8"))
     areas = [result["rows"].get("contact_area", {"cells_off": [np.nan], "inside": [np.nan]}) for result in found]
@@ -234,9 +264,15 @@ def stated_over_true(result, name):
     return stated[counts] / true[counts]
 
 
+def _kept(result):
+    """How many rows are kept."""
+    kept = result.get("kept_times", DRAWN)
+    return result["kept"] if kept == DRAWN else f"{kept} kept"
+
+
 def described(result):
     """A line for a case."""
-    families = ", ".join(result[name] for name in ("material", "program", "surface", "kept"))
+    families = ", ".join([*(result[name] for name in ("material", "program", "surface")), _kept(result)])
     line = f"{result['number']:5d} {families}, {result['tolerance']:g}{', soft' if result['soft'] else ''}"
     if result["status"] != "ok":
         return f"{line}: {result['status']}"
@@ -251,8 +287,9 @@ def summarise(found, ds):
     print(f"\n{len(found)} cases, {len(wrong)} without a comparison", *map(described, wrong), sep="\n")
     print(f"processor time of a case [s]: median {float(ds.cpu.median()):.2f}, largest {float(ds.cpu.max()):.1f}; with "
           f"its reference {float((ds.cpu + ds.reference_cpu).mean()):.2f} in the mean")  # fmt: skip
+    own = [result for result in found if result["rows"] and result.get("kept_times", DRAWN) == DRAWN]
     for soft, title in ((False, "materials that give way at once"), (True, "soft: C(0) below a tenth of C(end)")):
-        part = [result for result in found if result["rows"] and result["soft"] == soft]
+        part = [result for result in own if result["soft"] == soft]
         print(
             f"\n{title}: {len(part)} cases\n{'':19}rows  within  within 3  cases within    stated >= 0.8 true  median"
         )
@@ -264,10 +301,46 @@ def summarise(found, ds):
         if off.size:
             held = f", {np.mean(inside):.2%} within the stated interval" if inside.size else ""
             print(f"contact area: {np.mean(off > 0):.1%} of rows off, by {off.max():.0f} cells at most{held}")
+    for kept in dict.fromkeys(result.get("kept_times", DRAWN) for result in found):
+        part = [result for result in found if result["rows"] and result.get("kept_times", DRAWN) == kept]
+        if part:
+            _verdict(kept, part)
     print(f"(true errors below {FLOOR:g} of the tolerance are left out of stated over true)")
     for soft, title in ((False, "not soft"), (True, "soft")):
-        lines = _misses([result for result in found if result["rows"] and result["soft"] == soft])
+        wanted = [result for result in found if result["rows"] and result["soft"] == soft]
+        lines = _misses([result for result in wanted if result.get("kept_times", DRAWN) != "reference"])
         print(f"\nworst over the tolerance, {title}: {len(lines)} pairs of case and quantity", *lines[:25], sep="\n")
+
+
+#: Errors of rows that are to be stated well, over the tolerance; from the second on, a statement below the true error
+#: is a fault. How a statement may lie to the true error.
+SMALL, LARGE = 1 / 50, 1 / 2
+STATED_WITHIN = (0.8, 5.0)
+
+
+def _verdict(kept, part):
+    """A line for all cases with the same choice of kept times: what was asked of the program, quantity by quantity."""
+    steps, convolutions, cpu = (sum(result[name] for result in part) for name in ("steps", "convolutions", "cpu"))
+    print(f"\nkept times: {kept}; {len(part)} cases, {steps} steps, {convolutions} convolutions, {cpu:.1f} s")
+    print(f"{'':9}  rows  within   cases  worst  stated 0.8 to 5.0 true    below, of large  median of the worst")
+    for name in ("total", "work"):
+        over = [over_tolerance(result, name) for result in part]
+        over = [values for values in over if values.size]
+        if not over:
+            continue
+        rows, worst = np.concatenate(over), np.array([values.max() for values in over])
+        ratio, low = [], 0
+        for result in part:
+            row = result["rows"].get(name, {"true": [], "stated": []})
+            true, stated = np.array(row["true"], float) / result["tolerance"], np.array(row["stated"], float)
+            known = np.isfinite(true) & np.isfinite(stated) & (true > SMALL)
+            here = stated[known] / result["tolerance"] / true[known]
+            ratio.append(here)
+            low += int(np.count_nonzero((here < STATED_WITHIN[0]) & (true[known] > LARGE)))
+        ratio = np.concatenate(ratio)
+        fine = np.mean((ratio >= STATED_WITHIN[0]) & (ratio <= STATED_WITHIN[1])) if ratio.size else np.nan
+        print(f"{name:9}{rows.size:6d}{np.mean(rows <= 1):8.2%}{np.mean(worst <= 1):8.1%}{worst.max():7.2f}"
+              f"{fine:14.1%} of {ratio.size:5d}{low:19d}{np.median(worst[worst > 0]):21.2f}")  # fmt: skip
 
 
 def _misses(part):
@@ -283,7 +356,7 @@ def _miss(result, name):
     stated = np.array(result["rows"]["total"]["stated"], float) / result["tolerance"]
     worst = int(np.nanargmax(true))
     rows = f"{np.count_nonzero(true > 1)} of {true.size} rows, the worst row {worst} (states {stated[worst]:.2g})"
-    families = ", ".join(result[kind] for kind in ("material", "program", "surface", "kept"))
+    families = ", ".join([*(result[kind] for kind in ("material", "program", "surface")), _kept(result)])
     return f"{result['number']:5d} {name:8} {true[worst]:8.3g} in {rows}; {families}, {result['tolerance']:g}"
 
 
@@ -309,10 +382,13 @@ if __name__ == "__main__":
     asked.add_argument("--processes", type=int, default=2)
     asked.add_argument("--limit", type=float, default=TIME_LIMIT, help="processor time of a case [s]")
     asked.add_argument("--against", metavar="OTHER_CHECKOUT")
+    asked.add_argument("--kept", nargs="*", type=int, default=[], help="numbers of kept times beside the drawn ones")
+    asked.add_argument("--check", type=int, default=0, help="cases whose reference is checked")
     given = asked.parse_args()
     if given.against:
         from accuracy_cost import against
 
         against(given.against, given.count or 12, given.seed, given.first)
     else:
-        main(given.count or 1000, given.seed, given.first, given.out, given.processes, given.limit)
+        kept = (DRAWN, *given.kept)
+        main(given.count or 1000, given.seed, given.first, given.out, given.processes, given.limit, kept, given.check)
