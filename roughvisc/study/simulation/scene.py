@@ -89,6 +89,7 @@ class Ground:
         #: What is solved for: the surface, or the quarter of it at the end of both axes.
         self.domain = height[cells]
         values = self.domain.values
+        self._centres = self.domain["x"].values, self.domain["y"].values
         self.present: NDArray[np.bool_] = present[cells]
         #: Height of the highest point, which on an indenter may lie between the cells. [m]
         self.highest = highest(height)
@@ -106,8 +107,8 @@ class Ground:
     @property
     def corner(self) -> tuple[float, float]:
         """Centre of the window's first cell. [m]"""
-        first = self.window.first
-        return float(self.domain["x"].values[first[0]]), float(self.domain["y"].values[first[1]])
+        (i, j), (x, y) = self.window.first, self._centres
+        return float(x[i]), float(y[j])
 
     def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
         """The body under the window's grid."""
@@ -147,7 +148,7 @@ class Ground:
         else:
             self.widen()
         self.growths += 1
-        first = (self._cell("x", x) - self.window.first[0], self._cell("y", y) - self.window.first[1])
+        first = (self._cell(0, x) - self.window.first[0], self._cell(1, y) - self.window.first[1])
         halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
         return replace(scene, halfspace=halfspace, **self.shown()), first
 
@@ -166,13 +167,13 @@ class Ground:
             "outside": self.window.outside,
         }
 
-    def _cell(self, axis: str, position: float) -> int:
+    def _cell(self, axis: int, position: float) -> int:
         """Index in the domain of the cell at a position. [m]"""
-        return int(np.searchsorted(self.domain[axis].values, position))
+        return int(np.searchsorted(self._centres[axis], position))
 
     def window_at(self, corner: Sequence[float], shape: Sequence[int]) -> Window:
         """A window of the present domain that was solved on before: its first cell's centre and its shape."""
-        first = (self._cell("x", corner[0]), self._cell("y", corner[1]))
+        first = (self._cell(0, corner[0]), self._cell(1, corner[1]))
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
