@@ -140,7 +140,7 @@ class Copies:
         self._height, self._boundary = height, boundary
         self._found: dict[tuple[tuple[int, ...], int], xr.DataArray] = {}
 
-    def of(self, shape: tuple[int, ...], most: int = MOST_PRESSED) -> xr.DataArray:
+    def of(self, shape: tuple[int, ...], most: int) -> xr.DataArray:
         """The surface, or the grid of so many cells that it grows to, on so many cells a side at most. [m]"""
         if (shape, most) not in self._found:
             grown = self._height if shape == self._height.shape else over(self._height, shape, most)
@@ -241,13 +241,18 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
 
 
 def _rescaled(found: March, pressed: Pressed) -> March:
-    """A march whose approach is that of a finer grid, which has the higher summits."""
-    largest = max((passed.level for passed in found.course), default=0.0)
-    if not largest > 0 or not pressed.approach > 0:
-        return found
-    ratio = pressed.approach / largest
-    course = tuple(passed._replace(level=ratio * passed.level) for passed in found.course)
-    return replace(found, course=course, level=ratio * found.level)
+    """A march whose largest approach and contact are those of a finer grid, which has the higher summits."""
+    largest = (
+        max((passed.level for passed in found.course), default=0.0),
+        *(max((passed.width[axis] for passed in found.course), default=0.0) for axis in (0, 1)),
+    )
+    finest = (pressed.approach, *pressed.width)
+    level, *widths = (new / old if new > 0 and old > 0 else 1.0 for new, old in zip(finest, largest, strict=True))
+    course = tuple(
+        Passed(level * passed.level, (widths[0] * passed.width[0], widths[1] * passed.width[1]), passed.convolutions)
+        for passed in found.course
+    )
+    return replace(found, course=course, level=level * found.level)
 
 
 def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
@@ -405,13 +410,13 @@ class Solved:
 
 def solved_on(stages: tuple[Stage, ...], found: March) -> Solved:
     """What a march is solved on, by its contacts on a coarse grid."""
-    extent = (0.0, 0.0) if found.pressed is None else found.pressed.width
-    end, reached, taken = stage_at(stages, _BEYOND * found.level, extent), 0, [0.0] * len(stages)
-    for passed in found.course:  # it does not shrink again
-        reached = min(max(reached, stage_at(stages, _BEYOND * passed.level, passed.width)), end)
+    course = found.course or (Passed(found.level, (0.0, 0.0), 1.0),)
+    reached, taken = 0, [0.0] * len(stages)
+    for passed in course:  # it does not shrink again
+        reached = max(reached, stage_at(stages, _BEYOND * passed.level, passed.width))
         taken[reached] += passed.convolutions
-    taken[end] += 0.0 if sum(taken) else 1.0
-    return Solved(stages[: end + 1], tuple(np.array(taken[: end + 1]) / sum(taken)))
+    shares = np.array(taken[: reached + 1]) / sum(taken) if sum(taken) else np.eye(reached + 1)[-1]
+    return Solved(stages[: reached + 1], tuple(shares.tolist()))
 
 
 def wall_time(settings: Settings, solved: Solved, found: March, choice: Choice, convolution: float) -> float:
@@ -425,10 +430,12 @@ def wall_time(settings: Settings, solved: Solved, found: March, choice: Choice, 
     return found.convolutions * convolution * solved.mean(work) / work(cells) * again + stepping + writing
 
 
-def bytes_needed(settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0) -> float:
+def bytes_needed(
+    settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0, grows: bool = False
+) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     counts = {"contact": found.contact, "steps": found.steps, "rows": found.rows, "part": part}
-    return PROCESS + march_bytes(settings, cells, choice.memory, **counts)
+    return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
 def disk(case: Case, cells: int, found: March) -> float:

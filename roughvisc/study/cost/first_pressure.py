@@ -8,7 +8,7 @@ import xarray as xr
 
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.materials.models import zener
-from roughvisc.study.cost.press import Push, copy_to_press, press
+from roughvisc.study.cost.press import MOST_PRESSED, Push, copy_to_press, press
 from roughvisc.study.statement.starter import (
     CONTACT,
     KELVIN_MODULUS,
@@ -44,7 +44,7 @@ def first_pressure(scan: xr.DataArray, found: Inspection) -> FirstPressure:
         What is seen in it, and how it is going to be conditioned.
     """
     steps = {name: value for name, value in found.steps.items() if name != "mirror"}
-    few = copy_to_press(condition(scan, steps), "free")
+    few = copy_to_press(condition(scan, steps), "free", MOST_PRESSED)
     slope = rms_slope(few)
     if "mirror" in found.steps:
         few = condition(few, {"mirror": True})

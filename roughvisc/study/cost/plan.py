@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -273,13 +273,16 @@ def _row(
     if settings.method != "fast":
         stages = (Stage(stages[0].shape, height.size),)
     solved = solved_on(stages, found)
+    found = replace(
+        found, convolutions=found.convolutions * (1 + solved.growths / max(found.steps, 1.0))
+    )  # tried again
     shape, cells = solved.stages[-1].shape, solved.cells
     timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
     convolution = stopwatch.seconds(timed, settings.boundary, settings.kernel) * work(cells) / work(timed.size)
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
     quarter = work(cells / 4) / work(cells)
-    needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part)
+    needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     if needed(cells) > PART * there.size:
         row["refusal"] = too_large(shape, needed, there, [])
     if found.fraction < NEARLY_FULL:

@@ -65,7 +65,7 @@ class Pressed:
     at_border: bool
 
 
-def copy_to_press(height: xr.DataArray, boundary: Boundary, most: int = MOST_PRESSED) -> xr.DataArray:
+def copy_to_press(height: xr.DataArray, boundary: Boundary, most: int) -> xr.DataArray:
     """The surface itself, or the waves of it that a grid of so many cells along the longer side holds. [m]"""
     longest = max(height.shape)
     return height if longest <= most else coarser(height, longest / most, boundary)
