@@ -115,11 +115,11 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     -----
     The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
     tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
-    that is timed for at most two seconds in all. Where the grid or its window follows the contact, the coarse grids cover
-    the one that it comes to, and each convolution counts by the cells that it will be on. The contact fraction is that of
-    an elastic press on 256 cells a side at most. Expect a quarter either way, and half where a soft material makes
-    the pressure jump with each cell that enters. Curves of friction are computed at some of their speeds on grids of 24
-    and 48 cells; expect a factor of two.
+    that is timed for at most two seconds in all. Where the grid or its window follows the contact, the coarse grids
+    cover the one that it comes to, and each convolution counts by the cells that it will be on. Expect a quarter either
+    way, and half where a soft material makes the pressure jump with each cell that enters, or where a grid grows.
+    Curves of friction are computed at some of their speeds on grids of 24 and 48 cells; expect a factor of two. The
+    contact fraction is that of an elastic press on 256 cells a side at most, or of the curve on 48.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
