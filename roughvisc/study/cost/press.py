@@ -90,9 +90,6 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     nothing = push.load == 0 if push.approach is None else push.approach <= ground.least_gap
     if nothing:
         return Pressed(shape, 0.0, push.approach or ground.least_gap, (0.0, 0.0), at_border=False)
-    if push.approach is not None and not halfspace.definite and push.approach >= ground.mean_gap:
-        sides = tuple(n * side for n, side in zip(shape, ground.spacing, strict=True))
-        return Pressed(shape, 1.0, push.approach, (sides[0], sides[1]), at_border=True)
     found = solve_contact(
         halfspace,
         ground.gap,

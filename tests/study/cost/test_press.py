@@ -47,7 +47,8 @@ def test_press__nothing_and_everything():
     assert press(wave, Push(load=0.0), "periodic", HALF_SPACE).fraction == 0
     assert press(wave, Push(approach=0.0), "periodic", HALF_SPACE).fraction == 0
     mean_gap = float(wave.max() - wave.mean())
-    assert press(wave, Push(approach=1.01 * mean_gap), "periodic", HALF_SPACE).fraction == 1
+    for part in (1.01, 4.0):
+        assert press(wave, Push(approach=part * mean_gap), "periodic", HALF_SPACE).fraction == 1
     assert press(wave, Push(approach=0.99 * mean_gap), "periodic", HALF_SPACE).fraction < 1
 
 
@@ -70,22 +71,22 @@ def touching(surface, pressure, compliance):
 def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, most):
     """A rubber of 3 and 1 MPa has the contact compliance 1 / 12 MPa at once and 1 / 3 MPa in the end."""
     monkeypatch.setattr(first_module, "MOST_PRESSED", most)
-    scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=3.2e-5, seed=3)
+    scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=1.7e-5, seed=3)
     found = inspect_scan(scan)
     assert "mirror" not in found.steps
     first = first_pressure(scan, found)
     assert max(first.shape) == min(most, 128)
     surface = rv.level(scan, found.steps["level"])
     near = 0.02 if most > 128 else 0.1
-    assert first.late == pytest.approx(0.05, rel=0.02)
-    assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(0.05, rel=near)
+    assert first.late == pytest.approx(0.05, rel=0.05), "the pressure has two digits"
+    assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(first.late, rel=near)
     assert touching(surface, first.pressure, 1 / 12e6) == pytest.approx(first.early, rel=2 * near)
 
 
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
     first = first_pressure(flat, inspect_scan(flat))
-    assert (first.pressure > 0, first.late, first.early) == (True, 1.0, 1.0)
+    assert (first.pressure, first.late, first.early) == (1e3, 1.0, 1.0)
     heights = np.zeros((33, 33))
     heights[:, 11:22] = -1e-6  # the other two thirds touch under any pressure
     plateaus = rv.from_array(heights, (1e-6, 1e-6))
