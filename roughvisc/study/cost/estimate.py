@@ -143,8 +143,11 @@ class Copies:
     def of(self, shape: tuple[int, ...], most: int) -> xr.DataArray:
         """The surface, or the grid of so many cells that it grows to, on so many cells a side at most. [m]"""
         if (shape, most) not in self._found:
-            grown = self._height if shape == self._height.shape else over(self._height, shape, most)
-            self._found[shape, most] = copy_to_press(grown, self._boundary, most)
+            if most < MOST_PRESSED:  # a large surface is not transformed again
+                finer = self.of(shape, MOST_PRESSED)
+            else:
+                finer = self._height if shape == self._height.shape else over(self._height, shape, most)
+            self._found[shape, most] = copy_to_press(finer, self._boundary, most)
         return self._found[shape, most]
 
 
