@@ -20,8 +20,8 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
     """Write a first study for a scan, to be run and to be changed.
 
     The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
-    on a rubber with a pressure that brings some per cent of its area into contact. FILE is an instrument file or a
-    surface card; without one a scan is written here to try things with, ground_steel.x3p.
+    on a rubber with a pressure that brings about 5 per cent of its area into contact, found by pressing it. FILE is an
+    instrument file or a surface card; without one a scan is written here to try things with, ground_steel.x3p.
 
     \b
     Example:
@@ -32,6 +32,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
     """
     from rich.console import Console
 
+    from roughvisc.study.cost.first_pressure import first_pressure
     from roughvisc.study.statement.starter import starter_study
     from roughvisc.study.storage.store import whole_file
     from roughvisc.topography.example import EXAMPLE
@@ -50,8 +51,9 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
         for option in (name for name, value in given.items() if value):
             raise InputError(f"--{option}: says how a file is read, and none is named: expected FILE")
         _write_example(wanted)
-    found = inspect_scan(open_scan(wanted, **options))
-    text = starter_study(wanted, out, options, found)
+    scan = open_scan(wanted, **options)
+    found = inspect_scan(scan)
+    text = starter_study(wanted, out, options, found, first_pressure(scan, found))
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()

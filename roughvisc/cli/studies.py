@@ -184,8 +184,9 @@ def _run_all(
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Say what a study will model, and what it will cost.
 
-    Nothing is run or written. Steps and transforms are those of coarse marches, seconds those of a solve that is
-    timed here; a study that cannot fit into memory or on the disk is refused with the reason, by exit status 2.
+    Nothing is run or written. How much comes into contact is that of an elastic press on 256 cells a side at most.
+    Steps and transforms are those of coarse marches, seconds those of a solve that is timed here; a study that cannot
+    fit into memory or on the disk is refused with the reason, by exit status 2.
 
     \b
     Example:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -121,7 +121,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     h = h.transpose("x", "y")
     axes = [h[axis].values for axis in ("x", "y")]
     first = [round(at[0] / d - 0.5) for at, d in zip(axes, cell, strict=True)]
-    margin = [max(1, math.ceil(n * (factor - 1) / 2 - 1e-6)) for n in h.shape]
+    margin = [(larger - n) // 2 for n, larger in zip(h.shape, grown_shape(h.shape, factor), strict=True)]
     wider = []
     for at, d, i, m in zip(axes, cell, first, margin, strict=True):
         there = (np.arange(i - m, i + at.size + m) + 0.5) * d
@@ -137,12 +137,33 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     )
 
 
-def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
-    """The same indenter on another number of cells over the domain that it was made for; None if it is none."""
+def grown_shape(shape: Sequence[int], factor: float) -> tuple[int, ...]:
+    """Numbers of cells of the grid that :func:`grown` makes of one.
+
+    Examples
+    --------
+    >>> grown_shape((32, 101), 1.5), grown_shape((5, 1), 1.0)
+    ((48, 153), (7, 3))
+    """
+    return tuple(n + 2 * max(1, math.ceil(n * (factor - 1) / 2 - 1e-6)) for n in shape)
+
+
+def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | None = None) -> xr.DataArray | None:
+    """The same indenter on another number of cells; None if it is none.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    shape : tuple of int
+        Number of cells.
+    size : tuple of float, optional
+        Sides of the domain; default: those that it was made for. [m]
+    """
     if grown(h, 1.0) is None:
         return None
     recipe = json.loads(h.attrs["recipe"])
-    return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
+    return _indenter(recipe["name"], recipe["parameters"], recipe["size"] if size is None else size, shape)
 
 
 def highest(h: xr.DataArray) -> float:

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from roughvisc.study.cost.estimate import March, coarse
+from roughvisc.study.cost.estimate import Copies, March, coarse
+from roughvisc.study.cost.press import Pressed
 from roughvisc.study.simulation.coarser import on_fewer_cells
 from roughvisc.study.simulation.footprint import PROCESS, curve_bytes
 from roughvisc.study.simulation.friction import rub
@@ -27,7 +28,7 @@ _OF_ITERATION, _OF_PROBLEM = 2.0, 5.0
 _AGAIN = 1.4
 
 
-def curve_march(case: Case, height: xr.DataArray) -> March:
+def curve_march(case: Case, height: xr.DataArray, _: Copies | None = None) -> March:
     """Speeds as steps, and convolutions of a curve, from coarse grids.
 
     Raises
@@ -44,7 +45,12 @@ def curve_march(case: Case, height: xr.DataArray) -> March:
     count = float(len(curve.asked))
     again = _AGAIN if case.solving().grid_error else 1.0
     work = found[1][0] * growth**octaves * times * again
-    return March(count, count, work, 0.0, max(contact), True, level, force, fraction, contact)
+    pressed, halved = (
+        Pressed(tuple(min(n, side) for n in height.shape), one[4], one[2], (0.0, 0.0), at_border=False)
+        for side, one in zip(reversed(_COARSE), reversed(found), strict=True)
+    )
+    known = {"pressed": pressed, "halved": halved if max(height.shape) > _COARSE[1] else None}
+    return March(count, count, work, 0.0, max(contact), True, level, force, fraction, contact, **known)
 
 
 def memory_of_curve(cells: float, settings: Settings) -> float:

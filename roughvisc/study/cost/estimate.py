@@ -5,30 +5,37 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
+from roughvisc.mechanics.stepping.domain import at_border
 from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
 from roughvisc.study.cost.short_slides import shortened, slid_cells
+from roughvisc.study.cost.stages import Stage, stage_at
+from roughvisc.study.simulation.coarser import coarser_shape
 from roughvisc.study.simulation.footprint import PROCESS, march_bytes
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.rows import in_slide, staircase_area
-from roughvisc.study.simulation.scene import Ground, prepare
+from roughvisc.study.simulation.scene import GROWTH, MOST_CELLS, Ground, prepare
 from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.settings import Settings
-from roughvisc.topography.grid import axis_step, resampled_taper, spacing, with_taper_weights
+from roughvisc.topography.grid import axis_step, nominal_area, resampled_taper, spacing, with_taper_weights
+from roughvisc.topography.indenters import grown, grown_shape, remade
 from roughvisc.variables import STEPPED
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
@@ -47,8 +54,18 @@ _TIMED = 1024**2
 _AGAIN = 1.5
 #: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
 _WRITE, _ROUNDED = 3e-9, 0.5
+#: An approach leaves a window that reaches this much deeper.
+_BEYOND = 1.05
 #: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed.
 _CHUNK, _COMPRESSED = 8, 0.03
+
+
+class Passed(NamedTuple):
+    """A step of a coarse march: approach and extent of its contact along x and y [m], and what it took."""
+
+    level: float
+    width: tuple[float, float]
+    convolutions: float
 
 
 @dataclass(frozen=True)
@@ -72,11 +89,21 @@ class March:
     force : float
         Largest force. [N]
     fraction : float
-        Largest contact fraction: that of the contact area, which is corrected for the grid.
+        Largest contact fraction: that of the contact area, which is corrected for the grid, on the cells ``pressed``.
     kept : tuple of float
         Part of the cells in contact at each kept time that a coarse march reached.
     slid, slid_convolutions : float
         Steps in slides and what they take, part of all.
+    course : tuple of Passed
+        Each step of the coarse march.
+    push : Push or None
+        What an elastic body is pressed with to have the largest contact.
+    at_border : bool
+        Whether a contact came to the border of a free surface.
+    pressed : Pressed or None
+        The largest contact on cells as fine as are pressed at once.
+    halved : Pressed or None
+        The same on cells twice as long, where these are coarser than the surface's.
     """
 
     steps: float
@@ -91,6 +118,55 @@ class March:
     kept: tuple[float, ...] = ()
     slid: float = 0.0
     slid_convolutions: float = 0.0
+    course: tuple[Passed, ...] = ()
+    push: Push | None = None
+    at_border: bool = False
+    pressed: Pressed | None = None
+    halved: Pressed | None = None
+
+
+class Copies:
+    """A surface on few cells, to press; each copy is made once.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        The surface. [m]
+    boundary : {"free", "periodic"}
+        Of the run.
+    """
+
+    def __init__(self, height: xr.DataArray, boundary: Boundary) -> None:
+        self._height, self._boundary = height, boundary
+        self._found: dict[tuple[tuple[int, ...], int], xr.DataArray] = {}
+
+    def of(self, shape: tuple[int, ...], most: int) -> xr.DataArray:
+        """The surface, or the grid of so many cells that it grows to, on so many cells a side at most. [m]"""
+        if (shape, most) not in self._found:
+            if most < MOST_PRESSED:  # a large surface is not transformed again
+                finer = self.of(shape, MOST_PRESSED)
+            else:
+                finer = self._height if shape == self._height.shape else over(self._height, shape, most)
+            self._found[shape, most] = copy_to_press(finer, self._boundary, most)
+        return self._found[shape, most]
+
+
+def over(height: xr.DataArray, shape: tuple[int, ...], side: int) -> xr.DataArray:
+    """An indenter over a grid of so many cells that it grows to, on about so many cells a side at most. [m]"""
+    dx, dy = spacing(height, "height")
+    few = coarser_shape((shape[0], shape[1]), max(max(shape) / side, 1.0), same_parity=True)
+    made = remade(height, few, (shape[0] * dx, shape[1] * dy))
+    assert made is not None, "it is asked of indenters"
+    return made
+
+
+def grids_of(height: xr.DataArray, settings: Settings) -> tuple[tuple[int, ...], ...]:
+    """Shape of a surface's grid, and of those that it may grow to."""
+    shapes = [height.shape]
+    if settings.boundary == "free" and settings.edge == "error" and settings.method == "fast":
+        while grown(height, 1.0) is not None and math.prod(shape := grown_shape(shapes[-1], GROWTH)) <= MOST_CELLS:
+            shapes.append(shape)
+    return tuple(shapes)
 
 
 def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
@@ -107,8 +183,10 @@ def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
     return with_taper_weights(few, resampled_taper(height, few.shape))
 
 
-def march_of(case: Case, height: xr.DataArray) -> March:
-    """Steps and convolutions of a case, from marches over coarse grids.
+def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> March:
+    """Steps and convolutions of a case, from marches over coarse grids; how much comes into contact, from a press.
+
+    Where the grid may grow, the coarse grids cover the one that it grows to.
 
     Raises
     ------
@@ -117,38 +195,87 @@ def march_of(case: Case, height: xr.DataArray) -> March:
     """
     program, settings = case.program(), case.solving()
     check_slides(program, settings, spacing(height, "height"))
-    found = [_march(case, coarse(height, side)) for side in _COARSE]
-    octaves = math.log2(max(math.sqrt(height.size) / _COARSE[1], 1.0))
-    first, second = found
-    pressed = [(one.steps - one.slid, one.convolutions - one.slid_convolutions) for one in found]
-    grown = {
-        "steps": pressed[1][0] * _growth(pressed[0][0], pressed[1][0], _STEPS_GROW) ** octaves,
-        "convolutions": pressed[1][1] * _growth(pressed[0][1], pressed[1][1], _WORK_GROWS) ** octaves,
+    program = program.on_area(nominal_area(height))  # larger grids carry the same loads
+    copies, shapes = copies or Copies(height, settings.boundary), grids_of(height, settings)
+
+    def marched(grid: int, side: int, outgrowing: bool = False) -> March:
+        few = coarse(height, side) if grid == 0 else over(height, shapes[grid], side)
+        return _march(case, program, few, outgrowing)
+
+    def pressed(grid: int, push: Push | None, most: int = MOST_PRESSED) -> Pressed:
+        return press(copies.of(shapes[grid], most), push or Push(load=0.0), settings.boundary, settings.kernel)
+
+    last, grid = len(shapes) - 1, 0
+    first = marched(0, _COARSE[0], last > 0)
+    while first.at_border and grid < last:
+        grid += 1
+        first = marched(grid, _COARSE[0], grid < last)
+    coarsely = grid  # on a coarse grid the outermost cells reach farther inwards
+    while grid > 0 and not pressed(grid - 1, first.push).at_border:
+        grid -= 1
+    while grid < last and pressed(grid, first.push).at_border:
+        grid += 1
+    if grid != coarsely:
+        first = marched(grid, _COARSE[0])
+    second = marched(grid, _COARSE[1])
+    octaves = math.log2(max(math.sqrt(math.prod(shapes[grid])) / _COARSE[1], 1.0))
+    in_all = [(one.steps - one.slid, one.convolutions - one.slid_convolutions) for one in (first, second)]
+    taken = {
+        "steps": in_all[1][0] * _growth(in_all[0][0], in_all[1][0], _STEPS_GROW) ** octaves,
+        "convolutions": in_all[1][1] * _growth(in_all[0][1], in_all[1][1], _WORK_GROWS) ** octaves,
     }
     if settings.time_step != "auto":
-        grown["steps"] = pressed[1][0]
+        taken["steps"] = in_all[1][0]
     if program.slides:
         cells = slid_cells(program, height)
         each = second.slid_convolutions / max(second.slid, 1.0)
-        grown = {"steps": grown["steps"] + cells, "convolutions": grown["convolutions"] + cells * each, "slid": cells}
-    rows = grown["steps"] if settings.times is None else float(len(kept_times(program, settings.times) or ()))
-    return March(**{**vars(second), **grown, "rows": rows, "whole": first.whole and second.whole})
+        taken = {"steps": taken["steps"] + cells, "convolutions": taken["convolutions"] + cells * each, "slid": cells}
+    rows = taken["steps"] if settings.times is None else float(len(kept_times(program, settings.times) or ()))
+    finest = pressed(grid, second.push)
+    halved = pressed(grid, second.push, MOST_PRESSED // 2) if max(shapes[grid]) > MOST_PRESSED else None
+    known = {
+        "whole": first.whole and second.whole,
+        "fraction": finest.fraction,
+        "at_border": settings.boundary == "free" and finest.at_border,
+        "pressed": finest,
+        "halved": halved,
+    }
+    return March(**{**vars(_rescaled(second, finest)), **taken, **known, "rows": rows})
+
+
+def _rescaled(found: March, pressed: Pressed) -> March:
+    """A march whose largest approach and contact are those of a finer grid, which has the higher summits."""
+    largest = (
+        max((passed.level for passed in found.course), default=0.0),
+        *(max((passed.width[axis] for passed in found.course), default=0.0) for axis in (0, 1)),
+    )
+    finest = (pressed.approach, *pressed.width)
+    level, *widths = (new / old if new > 0 and old > 0 else 1.0 for new, old in zip(finest, largest, strict=True))
+    course = tuple(
+        Passed(level * passed.level, (widths[0] * passed.width[0], widths[1] * passed.width[1]), passed.convolutions)
+        for passed in found.course
+    )
+    return replace(found, course=course, level=level * found.level)
 
 
 def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
     return min(max(second / max(first, 1.0), limits[0]), limits[1])
 
 
-def _march(case: Case, height: xr.DataArray) -> March:
-    settings, program = replace(case.solving(), missing="absent", edge="accept"), case.program()
+def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool = False) -> March:
+    """March over a coarse grid; no farther than to its border, if that is ``outgrowing`` it."""
+    settings = replace(case.solving(), missing="absent", edge="accept")
     if program.slides:  # its corners will do: the times that are kept lie elsewhere in a shorter program
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
-    scene, _ = prepare(Ground(height, settings.missing, kernel=settings.kernel), case.material(), program, settings)
+    ground = Ground(height, settings.missing, kernel=settings.kernel)
+    scene, _ = prepare(ground, case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = fraction = level = force = 0.0
     work, instants = 0, [0.0]
     slid = slid_work = 0
     kept, contacts = set(scene.times or ()), []
+    course: list[Passed] = []
+    forces, largest, push, bordering = [0.0], -1.0, Push(load=0.0), False
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
         steps += 1
@@ -162,10 +289,18 @@ def _march(case: Case, height: xr.DataArray) -> March:
         taken_off = staircase_area(touching, scene) / (scene.halfspace.cell_area * touching.size)
         fraction = max(fraction, share - taken_off)
         level, force = max(level, step.level), max(force, step.shown.force)
+        course.append(Passed(step.level, width_of(touching, ground), step.state.convolutions - work))
+        bordering = bordering or at_border(scene, step.shown.contact)
         if in_slide(step):
             slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
         work, reached = step.state.convolutions, now
         instants.append(now)
+        forces.append(step.shown.force)
+        if share - taken_off > largest:
+            largest = share - taken_off
+            push = Push(approach=step.level) if step.control == "approach" else _push(scene, instants, forces)
+        if outgrowing and bordering:
+            break
         if work > _MOST_CONVOLUTIONS or steps > _MOST_STEPS:
             break
     whole = reached >= program.duration
@@ -176,7 +311,15 @@ def _march(case: Case, height: xr.DataArray) -> March:
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
     known = (part, contact, bool(whole), level, force, fraction, tuple(contacts), slid, slid_work)
+    known = (*known, tuple(course), push, bordering)
     return March(steps * stretch, kept_rows, work * stretch, *known)
+
+
+def _push(scene: Scene, instants: Sequence[float], forces: Sequence[float]) -> Push:
+    """What an elastic body is pressed with to have the contact at the last of some instants [s] under forces [N]."""
+    ages = instants[-1] - np.asarray(instants)
+    means = [scene.compliance(float(age)) for age in 0.5 * (ages[1:] + ages[:-1])]
+    return Push(load=max(float(np.dot(means, np.diff(forces))), 0.0))
 
 
 def _is_damped(scene: Scene, length: float) -> bool:
@@ -224,48 +367,78 @@ class Stopwatch:
         return seconds * work(cells) / work(height.size)
 
 
-def windows(ground: Ground) -> tuple[tuple[float, float], ...]:
-    """Windows that follow a contact on a surface, from the present one to the whole domain, which is the ground's then.
-
-    The least gap beyond each [m], and the part of the surface's cells that it takes.
-    """
-
-    def present() -> tuple[float, float]:
-        return ground.window.outside, math.prod(ground.window.shape) / ground.height.size
-
-    found = [present()]
-    while not ground.window.whole:
-        ground.widen()
-        found.append(present())
-    return tuple(found)
-
-
-def solved_on(windows: Iterable[tuple[float, float]], level: float) -> float:
-    """Part of the surface's cells that are solved on where the approach comes to a level. [m]"""
-    return next(part for outside, part in windows if outside > level)
-
-
 def work(cells: float) -> float:
     return cells * math.log2(cells + 2)
 
 
-def wall_time(
-    settings: Settings, cells: int, found: March, choice: Choice, convolution: float, window: float = 1.0
-) -> float:
-    """Seconds for a case in one process with one thread, ``window`` being the part of the cells solved on. [s]"""
-    convolution *= work(window * cells) / work(cells)
+@dataclass(frozen=True)
+class Solved:
+    """What a case is solved on: its stages in order, and the part of the convolutions that each takes.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+        The last one is that of the end.
+    shares : tuple of float
+        One a stage; they sum to one.
+    """
+
+    stages: tuple[Stage, ...]
+    shares: tuple[float, ...]
+
+    @property
+    def cells(self) -> int:
+        """Of the surface in the end."""
+        return math.prod(self.stages[-1].shape)
+
+    @property
+    def part(self) -> float:
+        """Part of these that is solved on in the end."""
+        return self.stages[-1].solved / self.cells
+
+    @property
+    def growths(self) -> int:
+        """How many times the window or the grid grows."""
+        return sum(share > 0 for share in self.shares[:-1])
+
+    def on_longer_cells(self) -> Solved:
+        """The same on cells twice as long."""
+        few = [Stage((one.shape[0] // 2, one.shape[1] // 2), one.solved / 4) for one in self.stages]
+        return Solved(tuple(few), self.shares)
+
+    def mean(self, of: Callable[[float], float]) -> float:
+        """Mean of a function of the cells that are solved on over all convolutions."""
+        return sum(share * of(stage.solved) for stage, share in zip(self.stages, self.shares, strict=True))
+
+
+def solved_on(stages: tuple[Stage, ...], found: March) -> Solved:
+    """What a march is solved on, by its contacts on a coarse grid."""
+    course = found.course or (Passed(found.level, (0.0, 0.0), 1.0),)
+    reached, taken = 0, [0.0] * len(stages)
+    for passed in course:  # it does not shrink again
+        reached = max(reached, stage_at(stages, _BEYOND * passed.level, passed.width))
+        taken[reached] += passed.convolutions
+    shares = np.array(taken[: reached + 1]) / sum(taken) if sum(taken) else np.eye(reached + 1)[-1]
+    return Solved(stages[: reached + 1], tuple(shares.tolist()))
+
+
+def wall_time(settings: Settings, solved: Solved, found: March, choice: Choice, convolution: float) -> float:
+    """Seconds for a case in one process with one thread, by those of a convolution on the final surface. [s]"""
+    cells = solved.cells
     modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
     past = found.contact * found.steps / 2 if isinstance(choice.memory, History) else 0.0
-    stepping = found.steps * window * cells * 8 * (10 + 4 * modes + past) * 0.3e-9
+    stepping = found.steps * solved.mean(float) * 8 * (10 + 4 * modes + past) * 0.3e-9
     writing = found.rows * cells * 8 * len(settings.fields) * _WRITE
     again = _AGAIN if settings.grid_error else 1.0
-    return found.convolutions * convolution * again + stepping + writing
+    return found.convolutions * convolution * solved.mean(work) / work(cells) * again + stepping + writing
 
 
-def bytes_needed(settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0) -> float:
+def bytes_needed(
+    settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0, grows: bool = False
+) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     counts = {"contact": found.contact, "steps": found.steps, "rows": found.rows, "part": part}
-    return PROCESS + march_bytes(settings, cells, choice.memory, **counts)
+    return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
 def disk(case: Case, cells: int, found: March) -> float:

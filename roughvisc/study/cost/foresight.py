@@ -11,6 +11,18 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.topography.grid import nominal_area
 
+#: No full contact is foreseen where a press finds less: theories of roughness do not tell of single indenters.
+NEARLY_FULL = 0.9
+
+
+def border_warning(shape: tuple[int, ...]) -> str:
+    """What to say of contact that reaches the border of a free surface of so many cells, where that ends a run."""
+    return (
+        f"Contact is foreseen to reach the border of the free-space domain of {shape[0]} x {shape[1]} cells, which "
+        "ends a run: use boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = "
+        "'accept' to press it as a punch of that outline."
+    )
+
 
 def largest_pressure(height: xr.DataArray, program: Program, force: float) -> float:
     """Largest nominal pressure that a program comes to; NaN where only its approach is known. [Pa]

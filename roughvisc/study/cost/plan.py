@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,18 +27,26 @@ from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.columns import COLUMNS, attributes
 from roughvisc.study.cost.curve import curve_march, memory_of_curve
 from roughvisc.study.cost.estimate import (
+    Copies,
     March,
     Stopwatch,
     bytes_needed,
     disk,
     march_of,
+    over,
     solved_on,
     wall_time,
-    windows,
     work,
 )
-from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning, largest_pressure
+from roughvisc.study.cost.foresight import (
+    NEARLY_FULL,
+    border_warning,
+    full_contact_pressure,
+    full_contact_warning,
+    largest_pressure,
+)
 from roughvisc.study.cost.planned import Plan
+from roughvisc.study.cost.stages import Stage, stages_of
 from roughvisc.study.cost.totals import totals
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.simulation.available import Available, memory_available
@@ -55,18 +63,23 @@ from roughvisc.topography.parameters import rms_slope
 
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
+#: Cells of the longer side of a grid still to come that a solve is timed on, at most.
+_TIMED_SIDE = 1024
+#: Columns that count cells.
+_COUNTS = [f"{name}cells_{axis}" for name in ("", "final_", "pressed_", "coarser_") for axis in "xy"]
 #: Fewest cells a side of a surface of which half the resolution is thought of.
 _HALVED = 8
 
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, its :func:`windows`, its rms slope and its textures, or why it cannot be had."""
+    """A surface's height, its copies and :class:`Stage`s, its rms slope and its textures, or why it cannot be had."""
 
     height: xr.DataArray | None
     grows: bool
     problem: str
-    windows: tuple[tuple[float, float], ...] = ()
+    copies: Copies | None = None
+    stages: tuple[Stage, ...] = ()
     mirrored: bool = False
     slope: float = 0.0
     half_slope: float = math.nan
@@ -102,9 +115,11 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     -----
     The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
     tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
-    that is timed for at most two seconds in all. Expect a quarter either way, and half where a soft material makes
-    the pressure jump with each cell that enters. Curves of friction are computed at some of their speeds on grids of 24
-    and 48 cells; expect a factor of two.
+    that is timed for at most two seconds in all. Where the grid or its window follows the contact, the coarse grids
+    cover the one that it comes to, and each convolution counts by the cells that it will be on. Expect a quarter either
+    way, and half where a soft material makes the pressure jump with each cell that enters, or where a grid grows.
+    Curves of friction are computed at some of their speeds on grids of 24 and 48 cells; expect a factor of two. The
+    contact fraction is that of an elastic press on 256 cells a side at most, or of the curve on 48.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -157,7 +172,9 @@ def _marches(
             problems[number] = surfaces[name].problem
         elif time.perf_counter() < until or not marches:
             try:
-                marches[number] = _KINDS[type(cases[number].experiment())].march(cases[number], height)
+                marches[number] = _KINDS[type(cases[number].experiment())].march(
+                    cases[number], height, surfaces[name].copies
+                )
             except InputError as error:
                 problems[number] = str(error)
     return marches, surfaces, problems
@@ -184,7 +201,8 @@ def _surface(case: Case) -> _Surface:
         height,
         ground.can_grow(),
         "",
-        windows(ground),
+        Copies(height, boundary),
+        stages_of(ground, ground.can_grow()),
         ground.mirrored,
         rms_slope(height),
         _half_slope(height, boundary),
@@ -234,12 +252,12 @@ def _row(
     there: Available,
 ) -> dict[str, Any]:
     settings = case.solving()
-    free = settings.boundary == "free"
     row = _blank(settings, marched, problem)
     if surface is None or surface.height is None:
         return row
-    height, grows = surface.height, surface.grows and free and settings.edge == "error"
-    window = len(surface.windows) > 1 and follows(settings)
+    height, grows = surface.height, surface.grows and follows(settings)
+    whole = next(i for i, stage in enumerate(surface.stages) if stage.outside == math.inf)
+    window = whole > 0 and follows(settings)
     mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
@@ -253,26 +271,38 @@ def _row(
     row |= _pressures(case, surface, choice, found.force if found and marched else np.nan)
     if found is None or problem:
         return row
-    cells, convolution = height.size, stopwatch.seconds(height, settings.boundary, settings.kernel)
-    reachable = surface.windows if window else surface.windows[-1:]
-    part = solved_on(reachable, found.level) if settings.method == "fast" else 1.0
+    stages = surface.stages[0 if window else whole : None if grows else whole + 1]
+    if settings.method != "fast":
+        stages = (Stage(stages[0].shape, height.size),)
+    solved = solved_on(stages, found)
+    found = replace(
+        found, convolutions=found.convolutions * (1 + solved.growths / max(found.steps, 1.0))
+    )  # tried again
+    shape, cells = solved.stages[-1].shape, solved.cells
+    timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
+    convolution = stopwatch.seconds(timed, settings.boundary, settings.kernel) * work(cells) / work(timed.size)
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
     quarter = work(cells / 4) / work(cells)
-    needed = partial(bytes_needed, settings, found=found, choice=choice, part=part)
+    needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     if needed(cells) > PART * there.size:
-        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there, [])
+        row["refusal"] = too_large(shape, needed, there, [])
+    if found.fraction < NEARLY_FULL:
+        row["warning"] = ""
     return row | {
+        "border_warning": border_warning(shape) if found.at_border and settings.edge == "error" else "",
+        "final_cells_x": shape[0],
+        "final_cells_y": shape[1],
         "audit": _audit(case, surface, found) if marched else "",
         "body_note": body_note(settings.kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,
-        "contact_fraction": found.fraction,
+        **_contact(found, marched),
         "convolutions": found.convolutions,
-        "wall_time": wall_time(settings, cells, found, choice, convolution, part),
+        "wall_time": wall_time(settings, solved, found, choice, convolution),
         "memory": needed(cells),
-        "half_wall_time": wall_time(settings, cells // 4, found, choice, convolution * quarter, part),
+        "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter),
         "half_memory": needed(cells // 4),
         "rms_slope": surface.slope,
         "half_rms_slope": surface.half_slope,
@@ -280,12 +310,24 @@ def _row(
     }
 
 
+def _contact(found: March, marched: bool) -> dict[str, Any]:
+    """How much comes into contact, on which cells, and on cells twice as long; of a case that was marched itself."""
+    finest, halved = found.pressed, found.halved
+    if finest is None or not marched:
+        return {}
+    row = {"contact_fraction": finest.fraction, "pressed_cells_x": finest.shape[0], "pressed_cells_y": finest.shape[1]}
+    if halved is None:
+        return row
+    longer = {"coarser_cells_x": halved.shape[0], "coarser_cells_y": halved.shape[1]}
+    return row | longer | {"coarser_contact_fraction": halved.fraction}
+
+
 def _blank(settings: Settings, marched: bool, problem: str) -> dict[str, Any]:
     """A row of a case of which nothing is known yet."""
     row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
     free = settings.boundary == "free"
     row |= {"boundary": settings.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
-    return row | {"exponentials": 0, "cells_x": 0, "cells_y": 0}
+    return row | {"exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
 
 
 def _curve_row(
@@ -322,7 +364,7 @@ def _curve_row(
         "nominal_pressure": nominal,
         "full_contact_pressure": relaxed,
         "warning": full_contact_warning(nominal, relaxed),
-        "contact_fraction": found.fraction,
+        **_contact(found, marched),
         "convolutions": found.convolutions,
         "wall_time": found.convolutions * convolution,
         "memory": needed(cells),
@@ -369,7 +411,7 @@ def _scheme(settings: Settings, choice: Choice, found: March) -> str:
 class _Kind:
     """How the cost of one kind of experiment is foretold: from coarse grids, and as a row."""
 
-    march: Callable[[Case, xr.DataArray], March]
+    march: Callable[[Case, xr.DataArray, Copies | None], March]
     row: Callable[..., dict[str, Any]]
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from roughvisc.mechanics.materials.models import zener
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.writers import surface_table, written_quantity
@@ -19,6 +19,30 @@ SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY = 3e6, 1e6, 1e5
 CONTACT = 0.05
 #: Points from which a coarser grid is proposed for the first run.
 _LARGE = 400_000
+
+
+@dataclass(frozen=True)
+class FirstPressure:
+    """The pressure of a first study, and what it was found to do.
+
+    Attributes
+    ----------
+    pressure : float
+        Nominal. [Pa]
+    late, early : float
+        Contact fractions in the end and at once. [-]
+    shape : tuple of int
+        Cells that were pressed.
+    slope : float
+        Root mean square slope of these: that of a large scan's copy is less. [-]
+    """
+
+    pressure: float
+    late: float
+    early: float
+    shape: tuple[int, int]
+    slope: float
+
 
 _REMARKS = {
     "crop": "the largest part without large holes",
@@ -35,6 +59,7 @@ def starter_study(
     study: str | os.PathLike[str],
     options: Mapping[str, Any],
     found: Inspection,
+    first: FirstPressure,
 ) -> str:
     """A study of a scan pressed on a rubber, as TOML, ready to be run and to be changed.
 
@@ -48,11 +73,8 @@ def starter_study(
         ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
     found : Inspection
         What is seen in the scan.
-
-    Returns
-    -------
-    str
-        With the pressure that :func:`pressure_for` gives for 5 % of the area in contact in the end.
+    first : FirstPressure
+        What the scan is pressed with, and what comes into contact then.
     """
     steps = dict(found.steps)
     remarks = dict(_REMARKS)
@@ -66,9 +88,6 @@ def starter_study(
     if math.prod(found.shape) > _LARGE:
         coarse = [max(16, n // (4 if "mirror" in steps else 2)) for n in found.shape]
         surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
-    rubber = zener(SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY)
-    early, late = (1 / float(rubber.contact_compliance(time)) for time in (0.0, math.inf))
-    pressure = pressure_for(CONTACT, late, found.rms_slope)
     title = Path(file).stem.replace("_", " ")
     return _TEXT.format(
         title=title.replace("\\", "").replace('"', ""),
@@ -78,11 +97,11 @@ def starter_study(
         shear=written_quantity(SHEAR_MODULUS, "Pa"),
         kelvin=written_quantity(KELVIN_MODULUS, "Pa"),
         viscosity=written_quantity(KELVIN_VISCOSITY, "Pa") + " s",
-        late=written_quantity(late, "Pa", 3),
-        slope=f"{found.rms_slope:.2g}",
-        percent=f"{100 * CONTACT:g}",
-        first=f"{100 * CONTACT * late / early:.2g}",
-        program=_program(pressure, found),
+        late=f"{100 * first.late:.2g}",
+        early=f"{100 * first.early:.2g}",
+        pressed=f"{first.shape[0]} x {first.shape[1]}",
+        copy="" if first.shape == found.shape else _COPY.format(few=f"{first.slope:.2g}", all=f"{found.rms_slope:.2g}"),
+        program=_program(first.pressure, found),
     )
 
 
@@ -145,6 +164,9 @@ def written_area(area: float) -> str:
     return f"{area / 1e-18:.4g} nm^2"
 
 
+_COPY = """
+# These cells are longer than those of the run, and their rms slope is {few}, not {all}: they were pressed less by that
+# ratio."""
 _TEXT = """\
 # A first study of {name}: pressed on a rubber, and held while the contact creeps.
 #   roughvisc plan {study}     what it will model and cost
@@ -160,9 +182,8 @@ kelvin_modulus = "{kelvin}"            # softer in the end ...
 kelvin_viscosity = "{viscosity}"      # ... after some 0.1 s: viscosity over modulus
 poisson = 0.5
 
-# The pressure brings about {percent} % of the area into contact in the end, and {first} % at once. It is a rough
-# estimate: real over nominal area = 2 p / (E* h'), with the long-term contact modulus E* = E / (1 - nu^2) = {late}
-# and the rms slope h' = {slope}.
+# The pressure brings about {late} % of the area into contact in the end; at once it would be {early} %. That was found
+# by pressing the surface, on {pressed} cells, on elastic bodies as soft as the rubber is then.{copy}
 [[program]]
 {program}
 over = "50 ms"                      # within this time, linearly

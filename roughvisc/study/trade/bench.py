@@ -12,7 +12,8 @@ import xarray as xr
 
 from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, march_of, solved_on, windows, work
+from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, march_of, solved_on, work
+from roughvisc.study.cost.stages import stages_of
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case
@@ -91,7 +92,7 @@ class Bench:
         settings = replace(case.solving(), method="fast", missing="absent")
         self._convolution = Stopwatch().seconds(height, settings.boundary, settings.kernel)
         ground = Ground(height, settings.missing, follow=follows(settings), mirror=True, kernel=settings.kernel)
-        self._part = solved_on(windows(ground), self._found.level)  # of the cells
+        self._part = solved_on(stages_of(ground, grows=False), self._found).part  # of the cells
         self._calibration = 1.0
 
     @property

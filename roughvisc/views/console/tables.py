@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,6 @@ import xarray as xr
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
-from scipy import special
 
 from roughvisc.errors import printable
 from roughvisc.topography.grid import spacing
@@ -77,9 +75,9 @@ def plan_tables(costs: xr.Dataset) -> Group:
     whole = [
         ("Cases", f"{total}, {_side_by_side(attrs['processes'], attrs['threads'], costs)}"),
         *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
-        ("Grid", _range_of(costs, lambda row: f"{int(row['cells_x'])} x {int(row['cells_y'])} cells")),
-        ("Nominal pressure at most", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
-        ("Contact at most", _contact(costs)),
+        ("Grid", _range_of(costs, _grid)),
+        ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
+        ("Contact", _contact(costs)),
         *((f"{name.capitalize()} a case", _span(costs[name], "")) for name in _counts(costs)),
         ("Convolutions a case", _span(costs["convolutions"], "")),
         ("Wall time a case", _span(costs["wall_time"], "s")),
@@ -146,6 +144,8 @@ _MODELLED = {
 _THREADED = 1024**2
 #: Memory of a case from which a plan tells what half the resolution takes. [byte]
 _LARGE = 1e9
+#: A contact on cells twice as long that is this much larger tells that one on shorter cells is smaller.
+_FALLS = 1.02
 #: Cases that a plan lists one by one.
 _LISTED = 20
 
@@ -163,23 +163,36 @@ def profile_table(profile: Profile) -> Group:
     return Group(table)
 
 
-def _contact(costs: xr.Dataset) -> str:
-    """How much comes into contact: by theories for a surface that repeats, else as a coarse grid has it.
+def _grid(row: xr.Dataset) -> str:
+    """Cells of a case, and those that they grow to."""
+    first, final = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "final_"))
+    grown = f", growing with the contact to about {final[0]} x {final[1]}" if final not in ((0, 0), first) else ""
+    return f"{first[0]} x {first[1]} cells{grown}"
 
-    Under light loads the contact fraction is ``sqrt(8/pi)`` (Persson) to ``sqrt(2 pi)`` times the pressure over that of
-    full contact (A. W. Bush, R. D. Gibson, T. R. Thomas, Wear 35 (1975) 87); beyond, both saturate as his theory does.
-    """
-    whole = costs["nominal_pressure"] / costs["full_contact_pressure"]
-    if (costs["boundary"] == "periodic").all() and np.isfinite(whole).any():
-        found = 100 * special.erf(np.multiply.outer((math.sqrt(2), math.pi / math.sqrt(2)), whole.values))
-        by = "of the area (by the rms slope: theories of Persson, and of Bush, Gibson and Thomas)"
-    else:
-        found, by = 100 * costs["contact_fraction"].values, "of the grid, judged on a coarse one"
-    found = found[np.isfinite(found)]
-    if not found.size:
+
+def _contact(costs: xr.Dataset) -> str:
+    """How much comes into contact, and on which cells that was found; on cells twice as long, if there is more."""
+    whole = "grid in the end" if (costs["final_cells_x"] > costs["cells_x"]).any() else "area"
+    own, longer = costs["contact_fraction"], costs["coarser_contact_fraction"]
+    if not np.isfinite(own).any():
         return ""
-    span = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
-    return f"about {span} % {by}"
+    text = f"about {_per_cent(own)} % of the {whole}, pressed on {_pressed_on(costs, own)} cells"
+    if not longer.max() > _FALLS * own.where(longer.notnull()).max():
+        return text
+    return f"{text}; {_per_cent(longer)} % on {_pressed_on(costs, longer)}: expect less on the finer grid of the run"
+
+
+def _per_cent(parts: xr.DataArray) -> str:
+    found = 100 * parts.values[np.isfinite(parts.values)]
+    return " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
+
+
+def _pressed_on(costs: xr.Dataset, found: xr.DataArray) -> str:
+    """The grids on which some contact fractions were found."""
+    x, y = (f"{'coarser' if str(found.name).startswith('coarser') else 'pressed'}_cells_{axis}" for axis in "xy")
+    known = costs.isel(case=np.flatnonzero(np.isfinite(found.values)))
+    grids = _range_of(known, lambda row: f"{int(row[x])} x {int(row[y])}")
+    return f"{'grids' if ',' in grids else 'a grid'} of {grids}"
 
 
 def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
@@ -202,12 +215,14 @@ def _at_half(costs: xr.Dataset) -> str:
 
 def _warnings(costs: xr.Dataset) -> list[str]:
     """What is foreseen in some cases, once, where most is foreseen; and in how many."""
-    warned = np.flatnonzero(costs["warning"].values != "")
-    if not warned.size:
-        return []
-    worst = warned[np.argmax(costs["nominal_pressure"].values[warned])]
-    several = f" ({warned.size} of {costs.sizes['case']} cases; this is the largest)" if costs.sizes["case"] > 1 else ""
-    return [f"{costs['warning'].values[worst]}{several}"]
+    found, total = [], costs.sizes["case"]
+    for name, which in (("warning", "; this is the largest"), ("border_warning", "")):
+        warned = np.flatnonzero(costs[name].values != "")
+        if warned.size:
+            worst = warned[np.argmax(costs["nominal_pressure"].values[warned])]
+            several = f" ({warned.size} of {total} cases{which})" if total > 1 else ""
+            found.append(f"{costs[name].values[worst]}{several}")
+    return found
 
 
 def _alike(costs: xr.Dataset, name: str) -> str:

@@ -119,7 +119,7 @@ def test_plan__warns_of_full_contact_in_megapascals(tmp_path):
     assert float(costs.nominal_pressure[0]) == pytest.approx(2e4)
     text = printed(plan_tables(costs))
     assert "Warning" not in text
-    assert "20 kPa" in next(line for line in text.splitlines() if line.startswith("Nominal pressure at most"))
+    assert "20 kPa" in next(line for line in text.splitlines() if line.startswith("Largest nominal pressure"))
     study.write_text(STUDY.replace('pressure = "20 kPa"', 'approach = "0.5 um"'))
     costs = rv.plan(study)  # the force is that of the coarse march
     assert 0 < float(costs.nominal_pressure[0]) < math.pi * 4e6 * 1e-6 / 1e-4
