@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from roughvisc.cli.interrupts import INTERRUPTED, Terminated, ending_at_once, terminable
 from roughvisc.cli.reading import naming_keys, naming_options
 from roughvisc.errors import InputError, RoughviscError, printable
 
@@ -51,31 +48,12 @@ def say(console: Console, what: str, path: Path) -> None:
     console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, which batch systems send some time before they kill."""
-
-
-@contextmanager
-def terminable() -> Iterator[None]:
-    """Have SIGTERM end what is inside as Ctrl-C does, so that a running case writes its checkpoint first."""
-
-    def end(*_: Any) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough: the checkpoint is being written
-        raise Terminated
-
-    mine = threading.current_thread() is threading.main_thread()
-    if not mine or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:  # somebody else takes care of it
-        yield
-        return
-    signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
 class Commands(click.Group):
     """Errors made on purpose end in one message and an exit status, never in a traceback."""
+
+    def main(self, *arguments: Any, **settings: Any) -> Any:
+        with ending_at_once():
+            return super().main(*arguments, **settings)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -105,7 +83,7 @@ class Commands(click.Group):
             raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
         except KeyboardInterrupt as error:
             status = 143 if isinstance(error, Terminated) else 130
-            raise Failure("interrupted; what was finished is kept", status) from error
+            raise Failure(INTERRUPTED, status) from error
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
