@@ -86,22 +86,20 @@ def shortened(message: str, longest: int, elsewhere: str = "") -> str:
     message : str
         One problem a line, below a first line that counts them; or a single line.
     longest : int
-        Characters that are left, 200 at least.
+        Characters that are left, 150 at least.
     elsewhere : str
         File that holds the whole message, if there is one.
 
     Examples
     --------
-    >>> print(shortened("s.toml: 9 problems\\n" + "\\n".join(f"  key_{i}: unknown" for i in range(9)), 200, "x.log"))
+    >>> problems = "\\n".join(f"  key_{number}: unknown" for number in range(9))
+    >>> print(shortened(f"s.toml: 9 problems\\n{problems}", 150, "sweep.log"))
     s.toml: 9 problems
       key_0: unknown
       key_1: unknown
       key_2: unknown
       key_3: unknown
-      key_4: unknown
-      key_5: unknown
-      key_6: unknown
-      and 2 more; all of it is in x.log
+      and 5 more; all of it is in sweep.log
     """
     if len(message) <= longest:
         return message

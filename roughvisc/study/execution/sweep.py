@@ -171,7 +171,7 @@ def run_cases(
         outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         if todo:
-            require_writable(folder, f"since {len(todo)} of {len(distinct)} cases are to be computed")
+            require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
         processes = 0 if client is not None else _processes(workers, list(todo.values()))
         if processes:
             try:

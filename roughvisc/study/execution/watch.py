@@ -15,7 +15,7 @@ from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.progress import Display, Row, clock
 from roughvisc.study.statement.case import Case
 
-#: Running cases that are shown.
+#: Running cases that are shown, and messages of cases that ended badly.
 _SHOWN = 8
 
 
@@ -58,6 +58,7 @@ class Watch:
         self._began = time.monotonic()
         self._display = Display(console, self._rows, self._summary, below=True)
         self._stopping = False
+        self._complaints = 0
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
         """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
@@ -80,7 +81,11 @@ class Watch:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
         if outcome.kind in ("failed", "hindered", "held", "unconverged") and not outcome.reused:
-            self._display.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+            self._complaints += 1
+            if self._complaints <= _SHOWN:
+                self._display.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+            else:
+                self._display.say("further cases that end so are counted here, and named in the log")
 
     def tick(self) -> None:
         """Show what has changed."""

@@ -37,21 +37,6 @@ def lock_path(folder: Path, key: str) -> Path:
     return folder / f".{key}.lock"
 
 
-def holder_of(path: Path) -> str:
-    """Who holds a lock, ``process 12 on host``; empty if nobody does. The file is not touched."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
-    except OSError:
-        return ""
-    try:
-        holder, alone = _holder(descriptor), _locked(descriptor, shared=True)
-        age = abs(time.time() - os.fstat(descriptor).st_mtime)
-    finally:
-        os.close(descriptor)
-    known = alone is not None and holder.get("host") == socket.gethostname()  # the system's lock tells
-    return _named(holder) if alone is False or (holder and not known and age <= STALE) else ""
-
-
 def _named(holder: dict[str, Any]) -> str:
     return f"process {holder['pid']} on {holder['host']}" if holder else "another run"
 
@@ -161,12 +146,12 @@ def _opened(path: Path, patience: float) -> int:
         os.close(descriptor)
 
 
-def _locked(descriptor: int, shared: bool = False) -> bool | None:
+def _locked(descriptor: int) -> bool | None:
     """Whether the file system's lock is had; None if it has none."""
     if fcntl is None:
         return None
     try:
-        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     except OSError:

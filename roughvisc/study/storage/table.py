@@ -14,7 +14,6 @@ from roughvisc.labels import heading
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.lock import holder_of, lock_path
 from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results, whole_file
 from roughvisc.units import number_and_unit, quantity
@@ -106,8 +105,7 @@ def to_table(out: str | Path) -> pd.DataFrame:
     index = index_of(folder)
     if not index.entries and not index.sweep:
         raise no_results(folder)
-    held = {key: holder for key in index.sweep or () if (holder := holder_of(lock_path(folder, key)))}
-    return _table(folder, index, {}, held)
+    return _table(folder, index, {}, {})
 
 
 def write_table(
