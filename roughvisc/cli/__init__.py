@@ -1,7 +1,7 @@
 """The command line: ``roughvisc scan | new | plan | run | trade | plot | report | audit | verify | clean | validate``.
 
-Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted, 143
-terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
+Exit status: 0 all done, 1 a case failed, did not converge or is held by another run, 2 the input is wrong, 130
+interrupted, 143 terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
 """
 
 from roughvisc.cli.interrupts import ending_at_once
