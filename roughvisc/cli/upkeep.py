@@ -44,7 +44,7 @@ def verify(results: Path) -> None:
 @click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
 @click.option("--superseded", is_flag=True, help="Also results of other versions that this one has computed again.")
 def clean(results: Path, everything: bool, superseded: bool) -> None:
-    """Remove what killed runs and earlier versions have left in a folder.
+    """Remove what killed runs and earlier versions left.
 
     Those are torn files, locks of dead runs, and checkpoints of cases that are finished or of an earlier version, from
     which nothing goes on. Results stay, and so does what an unfinished case would go on from, unless --all is given.
