@@ -103,7 +103,7 @@ def protected(monkeypatch):
     return protect
 
 
-def test_run__writes_nothing_where_it_may_not(study, tmp_path, invoke, protected):
+def test_run__writes_nothing_where_it_may_not(study, tmp_path, invoke, protected, caplog):
     folder = tmp_path / "results"
     assert invoke("run", study, "--out", folder, "--workers", "0", "-q") == (0, "", "")
     one = tmp_path / "one.toml"
@@ -117,6 +117,7 @@ def test_run__writes_nothing_where_it_may_not(study, tmp_path, invoke, protected
         status, out, err = invoke("run", path, "--out", folder, "-q")
         assert (status, out, err.count("\n")) == (0, "", 1), err
     assert rv.run(one, folder, progress=False).sizes["time"] == 3
+    assert "cannot be written" not in caplog.text
     assert everything(folder) == before
     study.write_text(TWO_LOADS.replace("4 mN", "6 mN"))
     status, out, err = invoke("run", study, "--out", folder, "-q")

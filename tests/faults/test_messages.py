@@ -118,14 +118,14 @@ def test_run__a_damaged_result_is_warned_of_once(tmp_path, invoke, capfd, worker
     assert (out / f"{result.name}.damaged").exists()
 
 
-def test_report__a_damaged_result_is_warned_of_once(tmp_path, invoke, capfd):
+def test_report__a_damaged_result_is_warned_of_once(tmp_path, invoke, caplog):
     path, out = study(tmp_path, TWO), tmp_path / "out"
     rv.sweep(path, out, workers=0, progress=False)
     result = sorted(out.glob("*.nc"))[1]
     result.write_bytes(result.read_bytes()[:-100] + b"0" * 100)
     status, said, err = invoke("report", out)
     assert status == 2
-    assert (said + err + capfd.readouterr().err).count("is damaged") == 1
+    assert (said + err + caplog.text).count("is damaged") == 1
 
 
 def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke):
