@@ -1,15 +1,18 @@
 """The command line: ``roughvisc scan | new | plan | run | trade | plot | report | audit | verify | clean | validate``.
 
-Exit status: 0 all done, 1 a case failed or did not converge, 2 the input is wrong, 130 interrupted, 143
-terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
+Exit status: 0 all done, 1 a case failed, did not converge or is held by another run, 2 the input is wrong, 130
+interrupted, 143 terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
 """
 
-from roughvisc.cli.group import main
-from roughvisc.cli.new import new
-from roughvisc.cli.results import audit, plot, report, validate
-from roughvisc.cli.scans import scan
-from roughvisc.cli.studies import plan, run, trade
-from roughvisc.cli.upkeep import clean, verify
+from roughvisc.cli.interrupts import ending_at_once
+
+with ending_at_once():
+    from roughvisc.cli.group import main
+    from roughvisc.cli.new import new
+    from roughvisc.cli.results import audit, plot, report, validate
+    from roughvisc.cli.scans import scan
+    from roughvisc.cli.studies import plan, run, trade
+    from roughvisc.cli.upkeep import clean, verify
 
 __all__ = ["main"]
 

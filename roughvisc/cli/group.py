@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
-import signal
-import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from roughvisc.cli.interrupts import INTERRUPTED, Terminated, ending_at_once, terminable
 from roughvisc.cli.reading import naming_keys, naming_options
-from roughvisc.errors import InputError, RoughviscError, printable
+from roughvisc.errors import ON_SCREEN, InputError, RoughviscError, printable, shortened
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,20 +23,52 @@ if TYPE_CHECKING:
 _READING = ("scan", "new")
 
 
+#: Where the context of a command says which folder its results are in.
+_RESULTS = "roughvisc.results"
+
+
 class Failure(click.ClickException):
     """One message on the standard error stream, and an exit status."""
 
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
         self.exit_code = status
+        self._results = _results_folder()  # the context is gone when it is shown
 
     def show(self, file: Any = None) -> None:
-        complain(self.message)
+        _complain(self.message, self._results)
 
 
 def complain(message: str) -> None:
-    """One message on the standard error stream."""
-    click.echo(f"roughvisc: {printable(message)}", err=True)
+    """One message on the standard error stream; all of a long one is in the log of the results, if there is one."""
+    _complain(message, _results_folder())
+
+
+def _complain(message: str, results: Path | None) -> None:
+    text = f"roughvisc: {printable(message)}"
+    log = None
+    if len(text) > ON_SCREEN and results is not None:
+        from roughvisc.study.storage.sweep_log import append
+
+        log = append(results, message)
+    click.echo(shortened(text, ON_SCREEN, str(log or "")), err=True)
+
+
+def complain_of_all(messages: Sequence[str], log: Path) -> None:
+    """Several messages that a log has whole; together they are not longer than one may be."""
+    text = "\n".join(f"roughvisc: {' '.join(printable(one).split())}" for one in messages)
+    if text:
+        click.echo(shortened(text, ON_SCREEN, str(log) if log.exists() else ""), err=True)
+
+
+def keep_long_messages(results: Path) -> None:
+    """Have what is too long for the screen written to the log of a folder of results, where that is there."""
+    click.get_current_context().meta[_RESULTS] = results
+
+
+def _results_folder() -> Path | None:
+    context = click.get_current_context(silent=True)
+    return context.meta.get(_RESULTS) if context else None
 
 
 def counted(count: int, what: str) -> str:
@@ -51,35 +83,45 @@ def say(console: Console, what: str, path: Path) -> None:
     console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, which batch systems send some time before they kill."""
+class _Screen(logging.Handler):
+    """Warnings of roughvisc that no log takes, each once."""
+
+    def __init__(self, otherwise: logging.Handler | None) -> None:
+        super().__init__(logging.WARNING)
+        self._otherwise = otherwise
+        self._said: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        message = record.getMessage()
+        if record.name != "roughvisc":
+            if self._otherwise is not None:
+                self._otherwise.handle(record)
+        elif message not in self._said:
+            self._said.add(message)
+            complain(message)
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
-    """Have SIGTERM end what is inside as Ctrl-C does, so that a running case writes its checkpoint first."""
-
-    def end(*_: Any) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough: the checkpoint is being written
-        raise Terminated
-
-    mine = threading.current_thread() is threading.main_thread()
-    if not mine or signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:  # somebody else takes care of it
-        yield
-        return
-    signal.signal(signal.SIGTERM, end)
+def warnings_on_screen() -> Iterator[None]:
+    """Have warnings that are logged look like all other messages, where nobody has set up logging."""
+    before = logging.lastResort
+    logging.lastResort = _Screen(before)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        logging.lastResort = before
 
 
 class Commands(click.Group):
     """Errors made on purpose end in one message and an exit status, never in a traceback."""
 
+    def main(self, *arguments: Any, **settings: Any) -> Any:
+        with ending_at_once():
+            return super().main(*arguments, **settings)
+
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with terminable():
+            with terminable(), warnings_on_screen():
                 return super().invoke(ctx)
         except InputError as error:
             named = naming_options if ctx.invoked_subcommand in _READING else naming_keys
@@ -105,7 +147,7 @@ class Commands(click.Group):
             raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
         except KeyboardInterrupt as error:
             status = 143 if isinstance(error, Terminated) else 130
-            raise Failure("interrupted; what was finished is kept", status) from error
+            raise Failure(INTERRUPTED, status) from error
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure, complain, say
+from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say
 from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -47,11 +47,12 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
     """
     from rich.console import Console
 
-    from roughvisc.study.execution.run import result_folder
+    from roughvisc.study.execution.run import result_folder, study_folder
     from roughvisc.study.statement.case import read_cases
 
+    keep_long_messages(study_folder(study, out))
     cases = read_cases(study)
-    folder = result_folder(cases[0], out)
+    folder = result_folder(cases[0], out, to_write=False)
     console = Console(quiet=quiet)
     elsewhere = where["scheduler"] or where["scheduler_file"]
     if profile and (elsewhere or where["workers"]):
@@ -86,11 +87,19 @@ def _run_one(
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.execution.side_by_side import threads_each
     from roughvisc.study.progress import Bar
-    from roughvisc.study.storage.store import open_result, result_path
+    from roughvisc.study.storage.store import is_writable, open_result, require_writable, result_path
+    from roughvisc.study.storage.versions import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
-    if is_result_of(case, result_path(folder, case.key)):
+    if is_result_of(case, result_path(folder, case.key), same_bits):
         console.print("Finished before: nothing has to be computed")
+        if not is_writable(folder):
+            complain(f"{folder}: may not be written to: the finished result is shown, and nothing is written")
+            plots = False
+    else:
+        require_writable(folder, "since the case is not finished")
+        if told := upgrade_note(folder, [case]):
+            complain(told)
     with Bar(console, label, case.at) as bar:
         path = run_case(case, folder, progress=bar.reached, same_bits=same_bits, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
@@ -135,9 +144,10 @@ def _run_all(
     from contextlib import ExitStack
 
     from roughvisc.study.execution.cluster import connect
-    from roughvisc.study.execution.sweep import LOG, run_cases
+    from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.execution.task import REFUSED
     from roughvisc.study.execution.watch import watcher
+    from roughvisc.study.storage.sweep_log import LOG
     from roughvisc.study.storage.table import CASES
     from roughvisc.views.console.tables import sweep_table
 
@@ -159,20 +169,26 @@ def _run_all(
             missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     say(console, "Results", folder)
-    say(console, "Table of the cases", folder / CASES)
-    say(console, "Log", folder / LOG)
+    for what, name in (("Table of the cases", CASES), ("Log", LOG)):
+        if (folder / name).exists():
+            say(console, what, folder / name)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
+    told = []
     for outcome in bad:
         again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
         where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
-        complain(f"{where}: {outcome.message}")
+        told.append(f"{where}: {outcome.message}")
+    complain_of_all(told, folder / LOG)
     if missed:
         complain(missed)
     if all(outcome.error in REFUSED for outcome in outcomes.values()):
         raise Failure("no case could be computed: the input is wrong", 2)
     if bad:
-        raise Failure(f"{len(bad)} of {len(outcomes)} cases failed", 1)
+        kept = sum(outcome.kind == "held" for outcome in bad)
+        failed = f"{len(bad) - kept} of {len(outcomes)} cases failed" if len(bad) > kept else ""
+        held = f"{kept} of {len(outcomes)} cases held by another run: give the command again when that has ended"
+        raise Failure("; ".join(filter(None, (failed, held if kept else ""))), 1)
     if missed:
         raise Failure("not all could be observed", 1)
 
@@ -200,6 +216,8 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     costs = planned(study, out, workers=workers)
     if not costs["refusal"].all():
         Console().print(plan_tables(costs))
+    if costs.attrs["upgrade"]:
+        complain(costs.attrs["upgrade"])
     if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
         raise Failure(f"{study}: cannot run as it stands: {why}", 2)
 

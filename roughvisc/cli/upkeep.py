@@ -42,19 +42,24 @@ def verify(results: Path) -> None:
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
-def clean(results: Path, everything: bool) -> None:
-    """Remove what killed runs have left in a folder.
+@click.option("--superseded", is_flag=True, help="Also results of other versions that this one has computed again.")
+def clean(results: Path, everything: bool, superseded: bool) -> None:
+    """Remove what killed runs and earlier versions left.
 
-    Those are torn files, locks of dead runs, and checkpoints of cases that are finished. Results stay, and so does
-    what an unfinished case would go on from, unless --all is given. A case that a run is at work on is left alone.
+    Those are torn files, locks of dead runs, and checkpoints of cases that are finished or of an earlier version, from
+    which nothing goes on. Results stay, and so does what an unfinished case would go on from, unless --all is given.
+    Results of another version, whose cases this one computes again, are named; --superseded removes those that it has
+    computed again. A case that a run is at work on is left alone.
 
     \b
     Example:
       roughvisc clean results/ground_steel-study
     """
-    from roughvisc.study.storage.tidy import tidy
+    from roughvisc.study.storage.tidy import kept_of_other_versions, tidy
 
-    removed = tidy(results, everything=everything)
+    removed = tidy(results, everything=everything, outdated=True, superseded=superseded)
     for path in removed:
         click.echo(printable(f"removed {path.name}"))
+    for line in kept_of_other_versions(results):
+        click.echo(printable(f"kept {line}"))
     click.echo(f"{counted(len(removed), 'leftover')} removed")

@@ -13,7 +13,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from roughvisc.errors import printable
+from roughvisc.errors import ON_SCREEN, printable, shortened
 
 #: Seconds between two lines, and between two pictures.
 LINE_EVERY, PICTURE_EVERY = 10.0, 0.2
@@ -72,7 +72,7 @@ class Display:
         """Write a line, once; a picture stays below it."""
         if line != self._said:
             self._said = line
-            self.console.print(Text(printable(line)), soft_wrap=True)
+            self.console.print(Text(shortened(printable(line), ON_SCREEN)), soft_wrap=True)
 
     def stop(self) -> None:
         """Draw no more: the picture vanishes."""

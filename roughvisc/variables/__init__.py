@@ -39,6 +39,9 @@ VARIABLES: dict[str, Variable] = {
     "y": Variable(("y",), "m", "position of the cell centre along y", axis="Y"),
     "step": Variable(("step",), "1", "number of the accepted step", "counted from 0", dtype="int32"),
     "case_key": Variable((), "", "key of the case", "what the file is named by", dtype="str"),
+    "roughvisc_version": Variable(
+        (), "", "version that computed the case", "of roughvisc, and the revision of its numerics", dtype="str"
+    ),
     # the surface
     "height": Variable(
         _GRID,

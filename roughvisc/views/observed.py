@@ -17,7 +17,7 @@ from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, result_path, write_result
+from roughvisc.study.storage.store import open_result, require_writable, result_path, write_result
 from roughvisc.study.storage.table import write_table
 from roughvisc.views.observables.tables import asked
 
@@ -60,7 +60,7 @@ def observe(
     """
     cases = read_cases(cases) if isinstance(cases, str | Path) else cases
     distinct = {case.key: case for case in cases if case.settings.observe is not None}
-    folder = result_folder(cases[0], out).absolute()
+    folder = result_folder(cases[0], out, to_write=False).absolute()
     added = []
     client = default_client() if distinct else None
     here = {"scheduler": "threads"} if client is not None and has_other_versions(client) else {}
@@ -86,6 +86,7 @@ def _add(case: Case, path: Path) -> bool:
         lacking = {name: values for name, values in wanted.items() if before.get(name) != values}
         if not lacking:
             return False
+        require_writable(path.parent, f"since {path.name} lacks {', '.join(lacking)}")
         try:
             found = asked(_frame_by_frame(result), lacking).compute()
         except InputError as error:

@@ -58,6 +58,7 @@ from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.statement.curve import Curve
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.parameters import labels_of, parameters_of
+from roughvisc.study.storage.versions import upgrade_note
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 
@@ -103,8 +104,8 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     xarray.Dataset
         One row a case along ``case``, varied parameters as coordinates; a notebook shows it as a table. Attributes:
         ``processes`` side by side and the ``threads`` that each may use, ``wall_time`` of the whole with one thread
-        each [s], ``memory`` of all processes [byte], ``disk`` [byte], what is free of both, and ``refusal``, empty if
-        all can run.
+        each [s], ``memory`` of all processes [byte], ``disk`` [byte], what is free of both, ``refusal``, empty if
+        all can run, and ``upgrade``, what another version has computed of it in the folder, empty if nothing.
 
     Raises
     ------
@@ -145,7 +146,9 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     labels = labels_of(parameters, stated[0], ("case",)).values()
     coords |= dict(zip(parameters, labels, strict=True))
     dataset = Plan(columns, coords=coords)
-    dataset.attrs = {"title": cases[0].title} | totals(dataset, folder, workers, there)
+    dataset.attrs = {"title": cases[0].title, "upgrade": upgrade_note(folder, cases)} | totals(
+        dataset, folder, workers, there
+    )
     return dataset
 
 

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Protocol
 
 from roughvisc.errors import DiskFullError
-from roughvisc.study.execution.task import Outcome
+from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.failures import forget_failure, record_failure
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
+from roughvisc.study.storage.store import is_writable
 from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
@@ -88,7 +89,9 @@ class Book:
         case = self.cases[outcome.key]
         varied = json.dumps(dict(case.varied))
         level = logging.INFO if outcome.kind == "done" else logging.WARNING
-        log.log(level, "%s %s %.3g s %s %s", outcome.key, outcome.kind, outcome.seconds, varied, outcome.message)
+        log.log(
+            level, "%s %s %.3g s %s %s", outcome.key, IN_WORDS[outcome.kind], outcome.seconds, varied, outcome.message
+        )
         if outcome.trace:
             log.error("%s", outcome.trace)
         if outcome.kind == "failed" and len(self.cases) > 1:
@@ -109,7 +112,11 @@ class Book:
         self.watch.told(message)
 
     def save(self) -> None:
+        """Write the index and the table of the folder, unless it may not be written to."""
         self.saved = time.monotonic()
+        if not is_writable(self.folder):
+            return
         index = Index(index_of(self.folder, self.entries).entries, tuple(self.cases))
         save_index(self.folder, index)
-        write_table(self.folder, index, {key: json.loads(case.to_json()) for key, case in self.cases.items()})
+        held = {key: outcome.message for key, outcome in self.outcomes.items() if outcome.kind == "held"}
+        write_table(self.folder, index, {key: json.loads(case.to_json()) for key, case in self.cases.items()}, held)

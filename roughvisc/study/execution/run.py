@@ -25,10 +25,20 @@ from roughvisc.study.simulation.experiment import carry_out
 from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.refusal import require_surface
 from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import Keeper
-from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, warn_once, write_result
+from roughvisc.study.storage.store import (
+    is_writable,
+    open_result,
+    require_writable,
+    result_path,
+    set_aside,
+    torn_files,
+    warn_once,
+    write_result,
+)
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
 
@@ -55,8 +65,22 @@ _ACCURACY: dict[Rows, str] = {"time": "'stated_error'", "speed": "'pressure_resi
 SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
 
 
-def result_folder(case: Case, out: str | Path | None = None) -> Path:
-    """Folder that the results of a study go to, refused here where nothing could be written there.
+def study_folder(study: Path, out: str | Path | None = None) -> Path:
+    """Folder that the results of a study file go to."""
+    return Path(out).expanduser() if out is not None else study.parent / "results" / study.stem
+
+
+def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool = True) -> Path:
+    """Folder that the results of a study go to.
+
+    Parameters
+    ----------
+    case : Case
+        Of the study.
+    out : path, optional
+        The folder, if it is not the usual one.
+    to_write : bool
+        Refuse it here where nothing could be written there.
 
     Raises
     ------
@@ -66,14 +90,14 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     if out is not None:
         folder = Path(out).expanduser()
     elif case.origin is not None:
-        folder = case.origin.parent / "results" / case.origin.stem
+        folder = study_folder(case.origin)
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not there.is_dir():
         raise InputError(f"{there}: is a file: expected a folder for the results")
-    if not os.access(there, os.W_OK):
-        raise InputError(f"{there}: may not be written to: expected a folder with write permission")
+    if to_write:
+        require_writable(folder)
     return folder
 
 
@@ -124,7 +148,7 @@ def _named(case: Case) -> Iterator[None]:
         raise type(error)(f"{case.origin}: {error}") from error
 
 
-def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[str, str]:
+def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[str, str | int]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -134,6 +158,7 @@ def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[st
         "Conventions": "CF-1.11",
         "title": case.title + varied,
         "source": f"roughvisc {version}",
+        "numerics_revision": NUMERICS_REVISION,
         "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
@@ -198,13 +223,13 @@ def run_case(
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path, same_bits) and not _leftovers(path):
+    if is_result_of(case, path, same_bits) and not (_leftovers(path) and is_writable(folder)):
         return path
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     keep_memory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with held(folder / f".{case.key}.lock") as lock:
+        with held(lock_path(folder, case.key)) as lock:
             for torn in torn_files(path):
                 torn.unlink()
             keeper = Keeper(
@@ -237,6 +262,16 @@ def run_case(
             with suppress(OSError):
                 place.rmdir()
     return path
+
+
+def set_aside_damaged(case: Case, folder: Path) -> str:
+    """Set the file of a case aside if it is not its result, unless a run is at work on it; why, empty if it was not."""
+    path = result_path(folder, case.key)
+    with suppress(InUseError, OSError), held(lock_path(folder, case.key), patience=0.0):
+        if path.exists() and (problem := _problem(case, path)):
+            set_aside(path, problem)
+            return f"{problem}; it is set aside as {path.name}.damaged"
+    return ""
 
 
 def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper, threads: int | None) -> None:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.run import Progress, result_folder, run_case, unconverged
+from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
 from roughvisc.study.statement.case import Case, read_study
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.store import open_result, require_writable, result_path
+from roughvisc.study.storage.versions import upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr
+
+log = logging.getLogger("roughvisc")
 
 
 def run(
@@ -60,7 +64,11 @@ def run(
     """
     if not isinstance(case, Case):
         case = read_study(case)
-    folder, client = result_folder(case, out), default_client()
+    folder, client = result_folder(case, out, to_write=False), default_client()
+    if not is_result_of(case, result_path(folder, case.key), same_bits):
+        require_writable(folder, "since the case is not finished")
+        if told := upgrade_note(folder, [case]):
+            log.warning("%s", told)
     if client is None:
         path = run_case(case, folder, progress=progress, same_bits=same_bits, threads=threads)
     else:

@@ -4,37 +4,36 @@ from __future__ import annotations
 
 import importlib.util
 import logging
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
-from roughvisc.errors import DiskFullError, FolderError, InputError, RoughviscError
+from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, pack
 from roughvisc.study.execution.book import Book, Watcher
 from roughvisc.study.execution.cluster import default_client, local_client
-from roughvisc.study.execution.run import other_transforms, result_folder
+from roughvisc.study.execution.run import other_transforms, result_folder, set_aside_damaged
 from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.side_by_side import side_by_side, threads_each
 from roughvisc.study.execution.task import REFUSED, Outcome, bring, outcome_of
 from roughvisc.study.simulation.available import cores
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, recorded_failure
-from roughvisc.study.storage.index import Index, index_of
-from roughvisc.study.storage.links import open_unlinked, refuse_link
+from roughvisc.study.storage.index import Index, index_of, warn_of
+from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import UNSEALED
+from roughvisc.study.storage.store import UNSEALED, is_writable, require_writable
+from roughvisc.study.storage.sweep_log import LOG, log_file
 from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.versions import upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
-
-LOG = "sweep.log"
 
 
 def sweep(
@@ -96,7 +95,7 @@ def sweep(
         cases = read_cases(cases)
     if not cases:
         raise InputError("cases is empty: expected at least one case")
-    folder = result_folder(cases[0], out).absolute()
+    folder = result_folder(cases[0], out, to_write=False).absolute()
     if client is None and workers is None:
         client = default_client()
     from roughvisc.study.execution.watch import watcher
@@ -156,17 +155,23 @@ def run_cases(
         raise InputError("client is asynchronous: expected a Client(asynchronous=False)")
     distinct = {case.key: case for case in cases}
     folder = folder.absolute()
-    folder.mkdir(parents=True, exist_ok=True)
+    writable = is_writable(folder)
+    if not folder.exists():
+        require_writable(folder)
+        folder.mkdir(parents=True)
     refuse_link(folder / LOG, "the log of a sweep")
     refuse_link(folder / INPUTS, "the folder of copied inputs")
     for key in distinct:
         for kind in ("lock", "unfinished"):
             refuse_link(folder / f".{key}.{kind}", f"what an unfinished run has left ({kind})")
-    with _log_file(folder):
-        tidy(folder)
-        index = index_of(folder)
+    with log_file(folder) if writable else nullcontext():
+        if writable:
+            tidy(folder)
+        index = index_of(folder, warn=False)
         outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
+        if todo:
+            require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
         processes = 0 if client is not None else _processes(workers, list(todo.values()))
         if processes:
             try:
@@ -178,6 +183,7 @@ def run_cases(
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
+            _tell_beforehand(book, index, todo, writable)
             _compute(todo, folder, book, client, processes, same_bits, threads)
             told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
             if told:
@@ -195,11 +201,25 @@ def run_cases(
         finally:
             book.save()
             watch.close()
-        hindered = {key: case for key, case in todo.items() if outcomes[key].kind == "hindered"}
+        hindered = {key: case for key, case in todo.items() if outcomes[key].kind in ("hindered", "held")}
         for key, entry in index_of(folder).entries.items() if hindered else ():
             if key in hindered:  # another run has finished it meanwhile
                 outcomes[key] = outcome_of(entry, reused=True)
     return {key: outcomes[key] for key in distinct}
+
+
+def _tell_beforehand(book: Book, index: Index, todo: Mapping[str, Case], writable: bool) -> None:
+    """Say what there is to say of the folder before anything is computed, each thing once."""
+    if not writable:
+        book.tell(f"{book.folder}: may not be written to: all cases are finished, and nothing is written")
+    if told := upgrade_note(book.folder, list(todo.values()), index):
+        book.tell(told)
+    problems = dict(index.problems)
+    for key in index.problems.keys() & todo.keys():
+        if told := set_aside_damaged(todo[key], book.folder):
+            book.watch.told(f"{told}, and computed anew")
+            del problems[key]
+    warn_of(book.folder, problems)
 
 
 def _known(
@@ -259,37 +279,3 @@ def _here(case: Case, folder: Path, book: Book, threads: int, same_bits: bool) -
         book.watch.tick()
 
     return bring(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)
-
-
-@contextmanager
-def _log_file(folder: Path) -> Iterator[None]:
-    """Everything that roughvisc logs, appended to a file beside the results."""
-    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
-    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
-    level = log.level
-    log.addHandler(handler)
-    log.setLevel(min(level or logging.INFO, logging.INFO))
-    try:
-        yield
-    finally:
-        log.setLevel(level)
-        log.removeHandler(handler)
-        with suppress(OSError):
-            handler.close()
-
-
-class _LogFile(logging.FileHandler):
-    """A log that stops nothing where it cannot be written, and follows no link."""
-
-    def _open(self) -> TextIO:
-        def opener(path: str, flags: int) -> int:
-            return open_unlinked(path, flags, "the log of a sweep")
-
-        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=opener)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        with suppress(OSError, FolderError):  # it cannot be opened
-            super().emit(record)
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        pass

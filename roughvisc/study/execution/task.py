@@ -10,11 +10,11 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypedDict
+from typing import Literal, TypedDict, get_args
 
 import numpy as np
 
-from roughvisc.errors import DiskFullError, HinderedError, RoughviscError
+from roughvisc.errors import DiskFullError, HinderedError, InUseError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
@@ -25,9 +25,11 @@ log = logging.getLogger("roughvisc")
 Progress = Callable[[float, float], None]
 
 #: How a case ended. ``hindered``: something outside the case was in the way (a full disk, too little memory, a process
-#: that was killed, another run that computes it), so the same command goes on from its checkpoint; ``failed`` is what
-#: would fail again.
-Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
+#: that was killed), so the same command goes on from its checkpoint; ``held``: another run is at work on it; ``failed``
+#: is what would fail again.
+Kind = Literal["done", "unconverged", "failed", "hindered", "held", "interrupted"]
+#: What the user reads for it.
+IN_WORDS: dict[Kind, str] = {kind: kind for kind in get_args(Kind)} | {"held": "held by another run"}
 #: Errors of a case that is refused as it stands.
 REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 #: Seconds between two reports of one case.
@@ -112,6 +114,8 @@ def bring(
     try:
         path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits, threads=threads)
         outcome = outcome_of(read_entry(path))
+    except InUseError as error:
+        outcome = Outcome(case.key, "held", str(error), type(error).__name__)
     except RoughviscError as error:
         kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)

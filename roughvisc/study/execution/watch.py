@@ -10,11 +10,12 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from roughvisc.study.execution.task import Outcome
+from roughvisc.errors import ON_SCREEN, printable, shortened
+from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.progress import Display, Row, clock
 from roughvisc.study.statement.case import Case
 
-#: Running cases that are shown.
+#: Running cases that are shown, and messages of cases that ended badly.
 _SHOWN = 8
 
 
@@ -33,7 +34,7 @@ class Silence:
 
     def told(self, message: str) -> None:
         """Something the user should know at once."""
-        print(f"roughvisc: {message}", file=sys.stderr)
+        print(shortened(f"roughvisc: {printable(message)}", ON_SCREEN), file=sys.stderr)
 
     def stopping(self) -> None: ...
     def close(self) -> None: ...
@@ -57,6 +58,7 @@ class Watch:
         self._began = time.monotonic()
         self._display = Display(console, self._rows, self._summary, below=True)
         self._stopping = False
+        self._complaints = 0
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
         """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
@@ -78,8 +80,12 @@ class Watch:
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
-        if outcome.kind in ("failed", "hindered", "unconverged") and not outcome.reused:
-            self._display.say(f"{self._names[outcome.key]}: {outcome.kind}: {outcome.message}")
+        if outcome.kind in ("failed", "hindered", "held", "unconverged") and not outcome.reused:
+            self._complaints += 1
+            if self._complaints <= _SHOWN:
+                self._display.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+            else:
+                self._display.say("further cases that end so are counted here, and named in the log")
 
     def tick(self) -> None:
         """Show what has changed."""
@@ -107,8 +113,8 @@ class Watch:
             running = dict(self._running)
         total, elapsed = len(self._names), time.monotonic() - self._began
         parts = [f"{kinds.count('done')} of {total} cases done"]
-        for kind in ("unconverged", "failed", "hindered"):
-            parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
+        for kind in ("unconverged", "failed", "hindered", "held"):
+            parts += [f"{kinds.count(kind)} {IN_WORDS[kind]}"] if kind in kinds else []
         if running:
             parts.append(f"{len(running)} running")
         worked = fresh + sum(now / end for now, end in running.values() if end)

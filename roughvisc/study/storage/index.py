@@ -25,7 +25,15 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.seal import seal, unsealed
-from roughvisc.study.storage.store import NETCDF, UNSEALED, require_whole, result_files, warn_once, whole_file
+from roughvisc.study.storage.store import (
+    NETCDF,
+    UNSEALED,
+    require_whole,
+    result_files,
+    result_path,
+    warn_once,
+    whole_file,
+)
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
 
@@ -106,10 +114,21 @@ class Entry:
 
 @dataclass(frozen=True)
 class Index:
-    """Entries by key, and the keys of the sweep that ran last in the folder, in its order; None if not known."""
+    """What is known of the results in a folder.
+
+    Attributes
+    ----------
+    entries : dict
+        Key -> entry.
+    sweep : tuple of str or None
+        Keys of the sweep that ran last in the folder, in its order; None if not known.
+    problems : dict
+        Key that a file is named by -> why that is not its result.
+    """
 
     entries: dict[str, Entry]
     sweep: tuple[str, ...] | None = ()
+    problems: dict[str, str] = field(default_factory=dict)
 
 
 def read_entry(path: Path) -> Entry:
@@ -161,7 +180,7 @@ def _stamp(path: Path) -> tuple[int, int]:
     return found.st_size, found.st_mtime_ns
 
 
-def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
+def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) -> Index:
     """Index of the results that are in a folder now, read from its file as far as that is up to date.
 
     Parameters
@@ -170,6 +189,8 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
         Of the results.
     known : iterable of Entry
         Entries that need not be read again.
+    warn : bool
+        Have the log say what is left out.
 
     Raises
     ------
@@ -181,6 +202,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
     stored = _load(folder / INDEX)
     before = {entry.file: entry for entry in (*stored, *known)}
     entries: dict[str, Entry] = {}
+    problems: dict[str, str] = {}
     for path in result_files(folder):
         if not _KEY.fullmatch(path.stem):  # made from a result, or by somebody else
             continue
@@ -188,18 +210,28 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> Index:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
                 entry = read_entry(path)
-            elif not entry.sealed:
+            elif not entry.sealed and warn:
                 warn_once(path, f"{path}: {UNSEALED}")
         except InputError as error:
-            warn_once(path, str(error))
+            problems[path.stem] = str(error)
         except FileNotFoundError:  # gone meanwhile
             continue
         else:
             if entry.key == path.stem:
                 entries[entry.key] = entry
             else:
-                warn_once(path, f"{path}: holds the result of case {entry.key}: expected the one that its name says")
-    return Index(entries, _latest(folder))
+                found = f"{path}: holds the result of case {entry.key}"
+                problems[path.stem] = f"{found}: expected the one that its name says"
+    index = Index(entries, _latest(folder), problems)
+    if warn:
+        warn_of(folder, problems)
+    return index
+
+
+def warn_of(folder: Path, problems: Mapping[str, str]) -> None:
+    """Log what is no result of a folder, once as long as the file is as it is."""
+    for key, problem in problems.items():
+        warn_once(result_path(folder, key), problem)
 
 
 def save_index(folder: Path, index: Index) -> None:

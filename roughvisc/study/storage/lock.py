@@ -32,6 +32,15 @@ BEAT, STALE = 10.0, 60.0
 _PATIENCE = 2.0
 
 
+def lock_path(folder: Path, key: str) -> Path:
+    """Lock of a case in a folder of results."""
+    return folder / f".{key}.lock"
+
+
+def _named(holder: dict[str, Any]) -> str:
+    return f"process {holder['pid']} on {holder['host']}" if holder else "another run"
+
+
 class Lock:
     """A lock that is held."""
 
@@ -123,10 +132,9 @@ def _opened(path: Path, patience: float) -> int:
                 if alone is False and time.monotonic() < until:
                     time.sleep(0.05)
                 elif alone is False or (holder and not _dead(path, holder, alone)):
-                    whom = f"process {holder['pid']} on {holder['host']}" if holder else "another run"
                     raise InUseError(
-                        f"{path}: {whom} is at work on this case in this folder: expected one run at a time; wait for "
-                        f"it, or use another folder"
+                        f"{path}: {_named(holder)} is at work on this case in this folder: expected one run at a "
+                        "time; wait for it, or use another folder"
                     )
                 else:
                     return descriptor

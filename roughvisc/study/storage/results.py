@@ -15,10 +15,13 @@ from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import LATEST, NETCDF, Entry, index_of, save_index
 from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
-from roughvisc.study.storage.store import no_results
+from roughvisc.study.storage.store import no_results, warn_once
+from roughvisc.study.storage.versions import counted_versions, version_of
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.rows import VOCABULARIES
 
+#: Coordinate that says which version computed each case.
+VERSION = "roughvisc_version"
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
 #: Attributes that all results of a sweep share.
@@ -65,8 +68,9 @@ def open_results(out, *, cases="last", ragged=False):
     xarray.Dataset or xarray.DataTree
         Variables as in a single result, over ``time`` or ``speed``, with a dimension ``case`` in front; ``height`` only
         where it differs. Varied parameters are coordinates on ``case``, numbers in SI or strings, each under two names:
-        its dotted key, and the identifier that it has in the files, ``program_0_load``. A tree has the parameters as
-        scalar coordinates of each node, whose name is the case's key.
+        its dotted key, and the identifier that it has in the files, ``program_0_load``. The coordinate
+        ``roughvisc_version`` says which version computed each case; where several did, a warning names them. A tree
+        has the parameters as scalar coordinates of each node, whose name is the case's key.
 
     Raises
     ------
@@ -89,6 +93,9 @@ def open_results(out, *, cases="last", ragged=False):
     entries = _chosen(index.entries, index.sweep or (), cases)
     if not entries:
         raise no_results(folder)
+    if len({version_of(entry.attributes) for entry in entries}) > 1:
+        told = f"{folder}: results of several versions: {counted_versions(entries)}"
+        warn_once(folder / entries[0].file, f"{told}; the coordinate {VERSION} says which is which")
     parameters = parameters_of([entry.case for entry in entries])
     if ragged:
         return _tree(folder, entries, parameters)
@@ -150,6 +157,8 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
         dataset = dataset.assign_coords(step=np.arange(dataset.sizes["step"]))
     dataset = annotate(dataset)
     keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
+    versions = np.array([version_of(entry.attributes) for entry in entries])
+    keys[VERSION] = (("case",), versions, VARIABLES[VERSION].attributes())
     labels = labels_of(parameters, first.case, ("case",))
     dotted = {attributes["long_name"]: (dims, values, attributes) for dims, values, attributes in labels.values()}
     return dataset.assign_coords(keys | dotted | labels)

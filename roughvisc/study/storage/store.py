@@ -59,6 +59,29 @@ def result_files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*.nc") if not path.name.startswith("."))
 
 
+def is_writable(folder: Path) -> bool:
+    """Whether files can be made in a folder, which need not exist yet."""
+    return os.access(_nearest(folder), os.W_OK)
+
+
+def require_writable(folder: Path, why: str = "") -> None:
+    """Refuse a folder of results in which no file can be made.
+
+    Raises
+    ------
+    FolderError
+        If there is none and none can be made, or it may not be written to; with the reason that is given.
+    """
+    if not is_writable(folder):
+        needed = f", {why}" if why else ""
+        raise FolderError(f"{_nearest(folder)}: may not be written to: expected a folder with write permission{needed}")
+
+
+def _nearest(folder: Path) -> Path:
+    """A folder, or what is there of the folders above it."""
+    return next(place for place in (folder, *folder.absolute().parents) if place.exists())
+
+
 def torn_files(path: Path) -> list[Path]:
     """What writes of a result that did not end have left beside it."""
     return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
@@ -302,9 +325,12 @@ def _is_news(path: Path, message: str) -> bool:
 def set_aside(path: Path, problem: str) -> None:
     """Give what is no whole result another name, by which nobody takes it for one, and say why."""
     aside = path.with_name(f"{path.name}.damaged")
-    what = f"{problem}; it" if _is_news(path, problem) else f"{path}:"
+    news = _is_news(path, problem)
     os.replace(path, aside)
-    log.warning("%s is set aside as %s, and computed anew", what, aside.name)
+    if news:
+        log.warning("%s; it is set aside as %s, and computed anew", problem, aside.name)
+    else:
+        log.info("%s: is set aside as %s, and computed anew", path, aside.name)
 
 
 def open_result(path: str | Path) -> xr.Dataset:

@@ -105,10 +105,12 @@ def to_table(out: str | Path) -> pd.DataFrame:
     index = index_of(folder)
     if not index.entries and not index.sweep:
         raise no_results(folder)
-    return _table(folder, index, {})
+    return _table(folder, index, {}, {})
 
 
-def write_table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]]) -> None:
+def write_table(
+    folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], held: Mapping[str, str] | None = None
+) -> None:
     """Write the table of a sweep as CSV; where that cannot be done, the log says so and the sweep goes on.
 
     Parameters
@@ -119,17 +121,19 @@ def write_table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any
         Of the folder.
     cases : mapping
         Key -> case in JSON of the sweep.
+    held : mapping, optional
+        Key -> message, of the cases that another run was at work on.
     """
     try:
         with whole_file(folder / CASES) as temporary:
             # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
             settings = {"encoding": "utf-8-sig", "float_format": "%.7g", "lineterminator": "\r\n"}
-            _table(folder, index, cases).to_csv(temporary, **settings)
+            _table(folder, index, cases, held or {}).to_csv(temporary, **settings)
     except (OSError, InputError) as error:
         log.warning("%s cannot be written: %s", folder / CASES, error)
 
 
-def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], held: Mapping[str, str]) -> pd.DataFrame:
     import pandas as pd
 
     known = {key: entry.case for key, entry in index.entries.items()}
@@ -150,9 +154,16 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]]) -
             column[:] = _filled(column, mine, name, _largest)
     table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
     records = [failures.get(key) or {} for key in keys]
+    messages = [held.get(key, "") if entry is None else "" for key, entry in zip(keys, entries, strict=True)]
     return table.assign(
-        status=[_status(entry, bool(record)) for entry, record in zip(entries, records, strict=True)],
-        message=[" ".join(str(record.get("message", "")).split()) for record in records],
+        status=[
+            "held by another run" if message else _status(entry, bool(record))
+            for entry, record, message in zip(entries, records, messages, strict=True)
+        ],
+        message=[
+            " ".join(str(message or record.get("message", "")).split())
+            for record, message in zip(records, messages, strict=True)
+        ],
         file=[entry.file if entry else "" for entry in entries],
     )
 

@@ -9,9 +9,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from roughvisc.errors import InputError, InUseError
-from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.index import index_of
+from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.seal import flaw
 from roughvisc.study.storage.store import result_path
+from roughvisc.study.storage.versions import checkpoints, counted_versions, is_later
+from roughvisc.study.storage.versions import outdated as former_results
 
 _OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
 _PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
@@ -19,7 +22,9 @@ _PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
 _ABANDONED = 3600.0
 
 
-def tidy(folder: str | Path, *, everything: bool = False) -> list[Path]:
+def tidy(
+    folder: str | Path, *, everything: bool = False, outdated: bool = False, superseded: bool = False
+) -> list[Path]:
     """Remove what is of no use to anybody: torn files, locks of dead runs, checkpoints of finished cases.
 
     Parameters
@@ -30,6 +35,11 @@ def tidy(folder: str | Path, *, everything: bool = False) -> list[Path]:
     everything : bool
         Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were set aside,
         and records of failures.
+    outdated : bool
+        Also remove the checkpoints of earlier versions, from which nothing in this one goes on. Those of later ones
+        stay, and so do they all where a sweep tidies up: somebody may go back to the version that wrote them.
+    superseded : bool
+        Also remove results of other revisions of the numerics whose cases this one has computed again.
 
     Returns
     -------
@@ -53,8 +63,42 @@ def tidy(folder: str | Path, *, everything: bool = False) -> list[Path]:
             others.append(path)
     if everything:
         others += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
-    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything)]
-    return removed + [path for path in others if _removed(path)]
+    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything, outdated)]
+    removed += [path for path in others if _removed(path)]
+    if superseded:
+        entries = index_of(folder, warn=False).entries
+        again = [key for key, today in former_results(entries.values()).items() if today in entries]
+        removed += [path for key in again if (path := _result_of(folder, key))]
+    return removed
+
+
+def _result_of(folder: Path, key: str) -> Path | None:
+    """Remove the result of a case, unless a run is at work on it; its path if it is gone."""
+    with suppress(InUseError, OSError), held(lock_path(folder, key), patience=0.0):
+        path = result_path(folder, key)
+        return path if _removed(path) else None
+    return None
+
+
+def kept_of_other_versions(folder: Path) -> list[str]:
+    """What a folder holds of other versions of roughvisc, a line each kind."""
+    entries = index_of(folder, warn=False).entries
+    former = former_results(entries.values())
+    again = [entries[key] for key, today in former.items() if today in entries]
+    alone = [entries[key] for key, today in former.items() if today not in entries]
+    told = []
+    for found, what in (
+        (again, "computed again by this version; --superseded removes them"),
+        (alone, "not computed by this version, which would compute their cases again"),
+    ):
+        if found:
+            size = f"{sum(entry.stamp[0] for entry in found) / 1e6:.3g} MB"
+            results = "1 result" if len(found) == 1 else f"{len(found)} results"
+            told.append(f"{results} ({counted_versions(found)}), {size}: {what}")
+    later = [place for place in checkpoints(folder) if is_later(place)]
+    return told + [
+        f"{place.name}: a checkpoint of a later version (numerics {checkpoints(folder)[place]})" for place in later
+    ]
 
 
 def _is_abandoned(path: Path) -> bool:
@@ -64,16 +108,21 @@ def _is_abandoned(path: Path) -> bool:
         return False
 
 
-def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> list[Path]:
+def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdated: bool) -> list[Path]:
     """Remove what is of no use of one case, while its lock is held."""
-    lock, result = folder / f".{key}.lock", result_path(folder, key)
+    lock, result = lock_path(folder, key), result_path(folder, key)
     if lock.is_symlink():  # nobody's lock
         return [path for path in [lock] if _removed(path)]
+    former = [path for path in checkpoints(folder) if not is_later(path)] if outdated else []
     finished = everything or (result.exists() and not flaw(result))
     needed = [
         path
         for path in paths
-        if path.suffix == ".unfinished" and not path.is_symlink() and any(path.glob("checkpoint.*")) and not finished
+        if path.suffix == ".unfinished"
+        and not path.is_symlink()
+        and any(path.glob("checkpoint.*"))
+        and not finished
+        and not (outdated and path in former)
     ]
     if needed == paths:
         return []

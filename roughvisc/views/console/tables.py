@@ -54,7 +54,12 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
     before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing had to be computed"
     rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
-    for kind, label in (("unconverged", "Not converged"), ("failed", "Failed"), ("hindered", "Hindered")):
+    for kind, label in (
+        ("unconverged", "Not converged"),
+        ("failed", "Failed"),
+        ("hindered", "Hindered"),
+        ("held", "Held by another run"),
+    ):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
     rows += accuracy_rows([entry.histories for entry in entries])
     if spent:

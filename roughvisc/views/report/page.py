@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.study.storage.store import no_results, open_result, require_whole, result_files, whole_file
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables.rows import rows_of
@@ -87,6 +87,8 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     if named:
         source = Path(results)
         sources: list[Any] = _files(source)
+        for one in sources:
+            require_whole(one)  # before anything is drawn, and before the folder's index warns of it
         failures = _failures(source) if source.is_dir() else []
         swept = _swept(source) if len(sources) > 1 else []
         out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)

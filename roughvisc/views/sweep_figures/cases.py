@@ -24,7 +24,7 @@ from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, s
 
 #: Quantities that span decades, and of which zero means that there is none.
 _SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")
-_NO_PARAMETERS = ("case", "case_key")
+_NO_PARAMETERS = ("case", "case_key", "roughvisc_version")
 
 
 @dataclass(frozen=True)

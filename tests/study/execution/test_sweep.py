@@ -21,13 +21,13 @@ from support import BALL, LONG, assert_same, numbers
 import roughvisc as rv
 from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import pack
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.watch import Silence, Watch
 from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.storage import sweep_log
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
@@ -200,8 +200,15 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     assert leftovers(tmp_path / "out") == [], "the records go when the cases are done"
 
 
-@pytest.mark.parametrize("error", [OSError(5, "Input/output error", "x.nc"), InUseError("in use"), MemoryError()])
-def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
+@pytest.mark.parametrize(
+    ("error", "kind"),
+    [
+        (OSError(5, "Input/output error", "x.nc"), "hindered"),
+        (InUseError("in use"), "held"),
+        (MemoryError(), "hindered"),
+    ],
+)
+def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error, kind):
     cases = study()
 
     def hindered(case, folder, **settings):
@@ -209,7 +216,7 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
 
     monkeypatch.setattr(task_module, "run_case", hindered)
     outcomes = run_cases(cases, tmp_path / "out", watch=Silence(), workers=0)
-    assert {o.kind for o in outcomes.values()} == {"hindered"}
+    assert {o.kind for o in outcomes.values()} == {kind}
     assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
@@ -242,9 +249,7 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
 @pytest.mark.parametrize("opened", [True, False])
 def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, monkeypatch, capfd, opened):
     if opened:
-        monkeypatch.setattr(
-            sweep_module._LogFile, "_open", lambda self: os.fdopen(os.open("/dev/full", os.O_WRONLY), "a")
-        )
+        monkeypatch.setattr(sweep_log._LogFile, "_open", lambda self: os.fdopen(os.open("/dev/full", os.O_WRONLY), "a"))
     else:
         (tmp_path / "out" / "sweep.log").mkdir(parents=True)
     assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
