@@ -98,7 +98,12 @@ def upgrade_note(folder: Path, cases: Sequence[Case], index: Index | None = None
     if not todo:
         return ""
     surfaces = {case.surface_sha256 for case in todo.values()}
-    alike = [entry for entry in index.entries.values() if entry.attributes.get("surface_sha256") in surfaces]
+    # a recipe may have come by more keys since, and another checksum with them
+    alike = [
+        entry
+        for entry in index.entries.values()
+        if entry.attributes.get("surface_sha256") in surfaces or "recipe" in entry.attributes
+    ]
     again = [index.entries[key] for key, today in outdated(alike).items() if today in todo]
     left = checkpoints(folder)
     told = []

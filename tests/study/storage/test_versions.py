@@ -12,7 +12,7 @@ import roughvisc as rv
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement import identity
-from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage import checkpoint, versions
 from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.tidy import tidy
@@ -104,6 +104,16 @@ def test_run__says_it_in_python_too(tmp_path, version, caplog):
         run_case(read_study(tmp_path / "s.toml"), out)
     rv.run(case, out, progress=False)
     rv.run(case, out, progress=False)
+    assert caplog.text.count("1 result here is of another version (1 by roughvisc 0.0.7") == 1
+
+
+def test_run__says_it_of_a_generated_surface_whose_recipe_has_more_keys_since(tmp_path, version, caplog, monkeypatch):
+    """As a version before wrote it: the checksum of its recipe is another one than today."""
+    path, out = study(tmp_path, FRICTION), tmp_path / "out"
+    with version("0.0.7", TODAY - 1), monkeypatch.context() as patch:
+        patch.setattr(Case, "surface_sha256", "0" * 64)
+        run_case(read_study(path), out)
+    rv.run(path, out, progress=False)
     assert caplog.text.count("1 result here is of another version (1 by roughvisc 0.0.7") == 1
 
 
