@@ -65,7 +65,7 @@ def read_sheet(
     path = Path(path)
     separator, rows = _rows(path)
     at, places = _heading(path, rows, wanted)
-    below = at + 1 < len(rows) and not any(_is_number(_cell(rows[at + 1][1], place)) for place in places.values())
+    below = at + 1 < len(rows) and _tells_units(path, rows[at + 1], places, wanted)
     data = rows[at + 1 + below :]
     if not data:
         raise InputError(f"{path}: holds no rows below the heading in line {rows[at][0]}: expected numbers")
@@ -113,6 +113,19 @@ def _rows(path: Path) -> tuple[str, list[Row]]:
 
 def _cell(row: Sequence[str], place: int) -> str:
     return row[place].strip() if place < len(row) else ""
+
+
+def _tells_units(path: Path, row: Row, places: Mapping[str, int], wanted: Mapping[str, Wanted]) -> bool:
+    """Whether the row below the heading holds units, or nothing; what holds neither them nor numbers is refused."""
+    line, cells = row
+    found = {key: _cell(cells, place) for key, place in places.items()}
+    if any(map(_is_number, found.values())):
+        return False
+    for key, cell in found.items():
+        if cell and not is_quantity(f"1 {cell.strip('[]() ')}", wanted[key].unit):
+            expected = f"expected a number for {key}, or a unit of its kind below the heading"
+            raise InputError(f"{path}, line {line}: found {cell!r}: {expected}")
+    return any(found.values()) or not any(map(str.strip, cells))
 
 
 def _is_number(cell: str) -> bool:
