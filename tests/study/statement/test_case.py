@@ -537,6 +537,19 @@ def test_read_study__refuses_a_file_that_is_not_there(study, tmp_path):
     assert refusal(tmp_path / "binary.toml").startswith("is no valid TOML")
 
 
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        ('title = "a"\r\nsize = "5 µm"\n'.encode("cp1252"), "line 2 holds a byte that is no UTF-8: expected a text"),
+        ('title = "a"'.encode("utf-16"), "it is in UTF-16: expected a text in UTF-8"),
+    ],
+)
+def test_read_study__names_what_is_no_utf_8(tmp_path, content, found):
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    assert refusal(path).startswith(f"is no valid TOML: {found}")
+
+
 def test_read_study__refuses_a_program_of_another_kind(study):
     assert refusal(study(BALL.split("[[program]]")[0] + "[program]\nload = 1")) == (
         "program: found a table with load: expected a list of [[program]] tables, at least one"
