@@ -28,7 +28,8 @@ from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import Keeper
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, warn_once, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, torn_files, write_result
+from roughvisc.study.storage.trust import warn_once
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
 

@@ -25,8 +25,8 @@ from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of
 from roughvisc.study.storage.links import open_unlinked, refuse_link
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import UNSEALED
 from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.trust import UNSEALED
 
 if TYPE_CHECKING:
     import xarray as xr
