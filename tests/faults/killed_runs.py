@@ -24,6 +24,7 @@ from roughvisc.study.execution.watch import Silence
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import open_result, result_files
 from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.verify import verify
 
 _ONE = BALL.replace("[24, 21]", "[12, 9]")
 _TWO = _ONE + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -32,6 +33,8 @@ _PATIENCE, _LINGERING = 60.0, 60.0
 #: How a run is started, and how often of twenty: in a fork, by its function, struck at a file operation or at a time;
 #: in a fork, by the command; as the command in processes of its own, with two workers.
 _WAYS = ("operation",) * 6 + ("function",) * 5 + ("command",) * 6 + ("workers",) * 3
+#: File operations of a run of the one case, of those that Python tells of.
+_OPERATIONS = range(1, 144)
 _SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGKILL, signal.SIGTERM)
 
 
@@ -97,7 +100,7 @@ def examine(studies, folder, number, rng):
 def _killed(way, path, cases, out, log, lasts, rng):
     """Start a run, and kill it; how, in words."""
     if way == "operation":
-        at = int(rng.integers(1, 144))
+        at = int(rng.choice(_OPERATIONS))
         status = _wait(_forked(lambda: strike(cases[0], out, at, "kill"), log))
         return f"SIGKILL at file operation {at}{_ended(status)}"
     sent = _SIGNALS[rng.integers(len(_SIGNALS))] if way != "function" else signal.SIGKILL
@@ -189,6 +192,8 @@ def _check(out, wanted, whole):
         assert not whole
         return
     found = _values(out)
+    unsealed = [one.path.name for one in verify(out) if not one.sealed] if found else []
+    assert not unsealed, f"{unsealed} count as results and have no checksum"
     assert set(found) <= set(wanted), f"{sorted(found)} count as results"
     assert not whole or set(found) == set(wanted), f"only {sorted(found)} are there"
     for name, ds in found.items():
