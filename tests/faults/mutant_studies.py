@@ -476,8 +476,11 @@ def names_key(message, path, raw):
     if len(said) > 1:
         said = said[1:]
     known = ("title", "surface", "material", "friction", "program", "solve", "keep", "observe", "audit", "sweep")
-    known += tuple(re.findall(r"\w+", shown_text(raw)))  # a key that the study has, whatever it means by it
-    return all(any(re.match(rf"['\"]?{re.escape(key)}['\"]?[.: ]", one) for key in known) for one in said)
+    for one in said:
+        key = one.partition(": ")[0].split(".")[0].strip("'\"")
+        if key not in known and (" " in key or key not in shown_text(raw)):  # a key that the study has and may not
+            return False
+    return True
 
 
 # ----------------------------------------------------------------------------------------------------------------

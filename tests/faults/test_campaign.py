@@ -4,10 +4,12 @@ import contextlib
 import os
 import signal
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign import examined, in_processes, listed
+from mutant_studies import names_key
 from stated_units import UnknownUnit, quantity_said
 
 from roughvisc.errors import InputError
@@ -206,6 +208,23 @@ def test_quantity_said__is_that_of_the_units_by_hand():
     assert quantity_said("soon") is None
     with pytest.raises(UnknownUnit):
         quantity_said("3 cubits")
+
+
+@pytest.mark.parametrize(
+    ("message", "named"),
+    [
+        ("-eep: unknown key; did you mean 'keep'?", True),
+        ("surface: the scan is flat", True),
+        ("2 problems\n  keep.times: found -1: expected more\n  -eep: unknown key", True),
+        ("is no valid TOML: Invalid value (at line 3, column 1)", True),
+        ("the load is below zero", False),
+        ("2 problems\n  keep.times: found -1\n  nothing: found -1", False),
+        ("is no valid TOML: it cannot be decoded", False),
+    ],
+)
+def test_names_key__wants_a_line_or_a_key_of_the_study(message, named):
+    path = Path("study.toml")
+    assert names_key(f"{path}: {message}", path, b"[-eep]\nthe = 1\n") == named
 
 
 def test_unsaid__tells_every_way_in_which_a_study_is_taken_wrong(tmp_path):
