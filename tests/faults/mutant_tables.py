@@ -1,7 +1,6 @@
 """Tables that are changed: the columns served are held against a parse in the dialect that the table was made in."""
 
 import csv
-import io
 import json
 import re
 from collections.abc import Callable
@@ -223,7 +222,8 @@ def parsed(table, raw):
     if table.separator == " ":
         rows = [line.split() for line in lines]
     else:
-        rows = list(csv.reader(io.StringIO("\n".join(lines)), delimiter=table.separator, skipinitialspace=True))
+        # line by line: a quotation mark that is not closed is no reason to lose the lines that follow
+        rows = [next(csv.reader([line], delimiter=table.separator, skipinitialspace=True)) for line in lines]
     names = list(table.columns)
     first, places, factors = 0, list(range(len(names))), [1.0] * len(names)
     headed = table.style != "none" and (table.sheet or not re.match(r"\s*[\d.,+-]", rows[0][0]))
