@@ -103,9 +103,16 @@ class Commands(click.Group):
                 raise
             advice = "a file is damaged, and roughvisc verify says which"
             raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
+        except ImportError as error:  # as libraries of C tell it that are interrupted while they are loaded
+            if not isinstance(error.__cause__, KeyboardInterrupt):
+                raise
+            raise _interrupted(error.__cause__) from error
         except KeyboardInterrupt as error:
-            status = 143 if isinstance(error, Terminated) else 130
-            raise Failure("interrupted; what was finished is kept", status) from error
+            raise _interrupted(error) from error
+
+
+def _interrupted(by: KeyboardInterrupt) -> Failure:
+    return Failure("interrupted; what was finished is kept", 143 if isinstance(by, Terminated) else 130)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

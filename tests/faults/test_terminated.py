@@ -68,3 +68,23 @@ def test_terminable__leaves_a_handler_of_others_alone():
             mine = signal.getsignal(signal.SIGTERM)
         assert signal.getsignal(signal.SIGTERM) is mine
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+@pytest.mark.parametrize(("by", "status"), [(group.Terminated(), 143), (KeyboardInterrupt(), 130)])
+def test_commands__interrupted_while_a_library_is_loaded_end_quietly(by, status, invoke, monkeypatch):
+    """Libraries made with pybind11 make an ImportError of what interrupts them."""
+
+    def loading(*_, **__):
+        raise ImportError("initialization failed") from by
+
+    monkeypatch.setattr(group.main.commands["verify"], "callback", loading)
+    assert invoke("verify", "x") == (status, "", "roughvisc: interrupted; what was finished is kept\n")
+
+
+def test_commands__a_library_that_is_missing_is_no_interrupt(monkeypatch):
+    def loading(*_, **__):
+        raise ImportError("no such library")
+
+    monkeypatch.setattr(group.main.commands["verify"], "callback", loading)
+    with pytest.raises(ImportError, match="no such library"):
+        group.main(["verify", "x"], standalone_mode=False)
