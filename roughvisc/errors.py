@@ -99,7 +99,8 @@ def shortened(message: str, longest: int, elsewhere: str = "") -> str:
       key_1: unknown
       key_2: unknown
       key_3: unknown
-      and 5 more; all of it is in sweep.log
+      key_4: unknown
+      and 4 more; all of it is in sweep.log
     """
     if len(message) <= longest:
         return message

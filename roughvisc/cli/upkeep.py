@@ -23,7 +23,7 @@ def verify(results: Path) -> None:
     Example:
       roughvisc verify results/ground_steel-study
     """
-    from roughvisc.study.storage.store import UNSEALED
+    from roughvisc.study.storage.trust import UNSEALED
     from roughvisc.study.storage.verify import verify as verified
 
     found = verified(results)

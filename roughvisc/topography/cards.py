@@ -86,7 +86,12 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValueError as error:  # of TOML, of the text's encoding, of an integer of thousands of digits
+    except UnicodeDecodeError as error:
+        line = 1 + error.object[: error.start].count(b"\n")
+        where = f"line {line} holds a byte that is no UTF-8"
+        found = "it is in UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else where
+        raise InputError(f"{path}: is no {wanted}: {found}: expected a text in UTF-8") from error
+    except ValueError as error:  # of TOML, of an integer of thousands of digits
         raise InputError(f"{path}: is no {wanted}: {error}") from error
     except RecursionError as error:
         raise InputError(f"{path}: is no {wanted}: it is nested too deeply") from error

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from pathlib import Path
+from statistics import mode
 from typing import TextIO
 
 from roughvisc.errors import InputError
@@ -60,6 +61,8 @@ def _rewritten(lines: list[str]) -> list[str]:
     if all(lines[number].rstrip().endswith(split[number][0]) for number in matrix):  # a separator ends every row
         split = [(between, values[: max(len(values) - 1, 1)]) for between, values in split]
     first, (separator, last) = matrix[0], split[matrix[-1]]
+    width = mode(len(split[number][1]) for number in matrix)
+    whole = [number for number in matrix if len(split[number][1]) == width]
     rows = {number for number, (_, values) in enumerate(split) if values == ["nan"] * len(last)}.union(matrix)
     cells = [value for number in matrix for value in split[number][1] if "," in value or "." in value]
     mark = decimal_mark(cells or [found[2] for line in lines for found in _LENGTH.finditer(line)], separator)
@@ -70,9 +73,14 @@ def _rewritten(lines: list[str]) -> list[str]:
             continue
         plain = [value if value == "nan" else plain_number(value, mark) for value in values]
         odd = [value for value, found in zip(values, plain, strict=True) if found is None]
-        broken = len(odd) < len(values) == len(last) and (between != " " or number > first) and line[:1] != "#"
-        if odd and (number in rows or broken):
-            raise InputError(f"line {number + 1}: found {odd[0]!r} among numbers ({line[:60]!r}): {expected}")
+        # a damaged row is not to be left out as other text is: the map would be a row shorter
+        inside = number not in rows and whole[0] < number < whole[-1] and bool(line.strip())
+        as_wide = len(odd) < len(values) == len(last) and (between != " " or number > first)
+        mostly = len(values) - len(odd) >= max(3, width / 2, len(odd) + 1)
+        broken = line[:1] != "#" and (inside or (bool(odd) and (as_wide or mostly)))
+        if broken or (odd and number in rows):
+            found = repr(odd[0]) if odd else f"{len(values)} of {width} values"
+            raise InputError(f"line {number + 1}: found {found} among numbers ({line[:60]!r}): {expected}")
         if number in rows:
             lines[number] = " ".join(map(str, plain))
         else:

@@ -192,6 +192,27 @@ def test_matrix__with_a_broken_row_is_refused_and_not_read_without_it(rows, foun
         assert f"line 2: found {found!r} among numbers" in refusal(path, unit="um", spacing=1e-6)
 
 
+@pytest.mark.parametrize("separator", [";", ",", "\t", " "])
+@pytest.mark.parametrize(
+    ("line", "broken", "found"),
+    [
+        (3, lambda row: f"{row}1.5{row}", "1.5"),  # two rows run together, a number with two points between them
+        (2, lambda row: row[:20] + "\x01\x7f#?" + row[24:], "line 2"),
+        (2, lambda row: "***", "'***'"),
+        (2, lambda row: "\x10bad", "bad"),
+        (1, lambda row: f"0.1x{row[3:]}", "0.1x"),
+    ],
+)
+def test_matrix__with_a_damaged_row_of_another_length_is_refused(separator, line, broken, found, tmp_path):
+    rows = [separator.join(f"{x + 0.1 * y:.3f}" for x in range(8)) for y in range(5)]
+    rows[line - 1] = broken(rows[line - 1])
+    path = tmp_path / "scan.csv"
+    path.write_text("# made\n" + "\n".join(rows) + "\n")
+    message = refusal(path, unit="um", spacing=1e-6)
+    assert f"line {line + 1}: found" in message
+    assert found.replace("line 2", f"line {line + 1}") in message
+
+
 def test_matrix__of_which_a_row_is_missing_as_a_whole_keeps_it(tmp_path):
     for name, row in (("scan.csv", ";;;"), ("scan.txt", "nan nan nan nan")):
         separator = row[0] if row[0] == ";" else " "

@@ -36,9 +36,9 @@ from roughvisc.study.storage.store import (
     result_path,
     set_aside,
     torn_files,
-    warn_once,
     write_result,
 )
+from roughvisc.study.storage.trust import warn_once
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
 

@@ -24,9 +24,10 @@ from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of, warn_of
 from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import UNSEALED, is_writable, require_writable
+from roughvisc.study.storage.store import is_writable, require_writable
 from roughvisc.study.storage.sweep_log import LOG, log_file
 from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.trust import UNSEALED
 from roughvisc.study.storage.versions import upgrade_note
 
 if TYPE_CHECKING:

@@ -99,11 +99,36 @@ def _lines(path: Path) -> tuple[str, list[tuple[int, list[str]]]]:
         raise InputError(f"{path}: cannot be read as a CSV file: {error}") from error
     kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     separator = next((mark for mark in (";", "\t", ",") if kept and mark in kept[0][1]), ",")
-    rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
+    rows, spread = separated(path, kept, separator)
+    below = spread - {line for line, _ in rows[:1]}  # a heading may go over lines
+    if below:
+        raise several_lines(path, min(below))
+    return separator, [(i, [cell.strip() for cell in row]) for i, row in rows]
+
+
+def separated(
+    path: Path, lines: Sequence[tuple[int, str]], separator: str
+) -> tuple[list[tuple[int, list[str]]], set[int]]:
+    """Rows of cells with the number of the line that each begins on, and of those that go over several lines.
+
+    A quotation mark that is not closed makes one row of all that follows, which is for the caller to allow or refuse.
+    """
+    reader = csv.reader((line for _, line in lines), delimiter=separator, skipinitialspace=True)
+    rows, spread, before = [], set(), 0
     try:
-        return separator, [(i, [cell.strip() for cell in row]) for (i, _), row in zip(kept, rows, strict=False)]
+        for cells in reader:
+            first, before, taken = lines[before][0], reader.line_num, reader.line_num - before
+            rows.append((first, cells))
+            if taken > 1:
+                spread.add(first)
     except csv.Error as error:  # a cell without end
         raise InputError(f"{path}: cannot be read as a table: {error}") from error
+    return rows, spread
+
+
+def several_lines(path: Path, line: int) -> InputError:
+    """What to tell of a row of numbers that goes over several lines."""
+    return InputError(f"{path}, line {line}: found a quotation mark that is not closed there: expected a row a line")
 
 
 def _from_heading(

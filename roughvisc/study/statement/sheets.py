@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.study.statement.columns import separated, several_lines
 from roughvisc.topography.readers import regular
 from roughvisc.topography.text_numbers import decimal_mark, plain_number, read_text
 from roughvisc.units import is_quantity, quantity
@@ -63,12 +63,15 @@ def read_sheet(
         If the file cannot be read, a column or its unit is not found, or a cell is no number; the line is named.
     """
     path = Path(path)
-    separator, rows = _rows(path)
+    separator, rows, spread = _rows(path)
     at, places = _heading(path, rows, wanted)
-    below = at + 1 < len(rows) and not any(_is_number(_cell(rows[at + 1][1], place)) for place in places.values())
+    below = at + 1 < len(rows) and _tells_units(path, rows[at + 1], places, wanted)
     data = rows[at + 1 + below :]
     if not data:
         raise InputError(f"{path}: holds no rows below the heading in line {rows[at][0]}: expected numbers")
+    for line, _ in rows[at + 1 :]:
+        if line in spread:
+            raise several_lines(path, line)
     width = len(rows[at][1])
     for line, row in data:
         if any(row[width:]) or (separator == " " and len(row) != width):
@@ -89,8 +92,9 @@ def read_sheet(
     return columns, [line for line, _ in data]
 
 
-def _rows(path: Path) -> tuple[str, list[Row]]:
-    """What separates the cells, and rows of cells with their line numbers, without blank lines and comments."""
+def _rows(path: Path) -> tuple[str, list[Row], set[int]]:
+    """What separates the cells; rows of cells with their line numbers, without blank lines and comments; and the
+    numbers of those that go over several lines, as headings may."""
     try:
         regular(path)
         text = read_text(path)
@@ -103,16 +107,25 @@ def _rows(path: Path) -> tuple[str, list[Row]]:
     separator = next((mark for mark in (";", "\t") if mark in last), ",")
     blanks = last.split()
     if separator == "," and len(blanks) > 1 and all(_NUMBER.fullmatch(cell) for cell in blanks):
-        return " ", [(i, line.split()) for i, line in kept]
-    rows = csv.reader((line for _, line in kept), delimiter=separator, skipinitialspace=True)
-    try:
-        return separator, [(i, row) for (i, _), row in zip(kept, rows, strict=False)]
-    except csv.Error as error:  # a cell without end
-        raise InputError(f"{path}: cannot be read as a table: {error}") from error
+        return " ", [(i, line.split()) for i, line in kept], set()
+    return separator, *separated(path, kept, separator)
 
 
 def _cell(row: Sequence[str], place: int) -> str:
     return row[place].strip() if place < len(row) else ""
+
+
+def _tells_units(path: Path, row: Row, places: Mapping[str, int], wanted: Mapping[str, Wanted]) -> bool:
+    """Whether the row below the heading holds units, or nothing; what holds neither them nor numbers is refused."""
+    line, cells = row
+    found = {key: _cell(cells, place) for key, place in places.items()}
+    if any(map(_is_number, found.values())):
+        return False
+    for key, cell in found.items():
+        if cell and not is_quantity(f"1 {cell.strip('[]() ')}", wanted[key].unit):
+            expected = f"expected a number for {key}, or a unit of its kind below the heading"
+            raise InputError(f"{path}, line {line}: found {cell!r}: {expected}")
+    return any(found.values()) or not any(map(str.strip, cells))
 
 
 def _is_number(cell: str) -> bool:

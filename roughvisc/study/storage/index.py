@@ -25,15 +25,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.seal import seal, unsealed
-from roughvisc.study.storage.store import (
-    NETCDF,
-    UNSEALED,
-    require_whole,
-    result_files,
-    result_path,
-    warn_once,
-    whole_file,
-)
+from roughvisc.study.storage.store import NETCDF, result_files, result_path, whole_file
+from roughvisc.study.storage.trust import UNSEALED, require_whole, warn_once
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
 

@@ -6,6 +6,7 @@ xarray's own engine reads under that lock, but opens and closes files outside it
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 import netCDF4
@@ -15,6 +16,28 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
+
+from roughvisc.errors import InputError
+from roughvisc.study.storage.trust import require_whole
+
+
+def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
+    """Part of a variable of a result, as it is stored.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, gone, or holds no such variable.
+    """
+    require_whole(Path(path))
+    try:
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            return np.asarray(file[name][key])
+    except (OSError, RuntimeError, LookupError) as error:
+        raise InputError(
+            f"{path}: its {name} cannot be read ({error}): the file is damaged; run its study again"
+        ) from error
 
 
 class ResultBackend(BackendEntrypoint):
@@ -55,6 +78,4 @@ class _Field(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        with NETCDF, netCDF4.Dataset(self.path) as file:
-            file.set_auto_maskandscale(False)
-            return np.asarray(file[self.name][key])
+        return read_variable(self.path, self.name, key)

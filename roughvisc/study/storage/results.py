@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.index import LATEST, NETCDF, Entry, index_of, save_index
+from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
 from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
-from roughvisc.study.storage.store import no_results, warn_once
+from roughvisc.study.storage.reading import read_variable
+from roughvisc.study.storage.store import no_results
+from roughvisc.study.storage.trust import warn_once
 from roughvisc.study.storage.versions import counted_versions, version_of
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.rows import VOCABULARIES
@@ -212,18 +214,9 @@ def _lazy(folder: Path, entries: Sequence[Entry], name: str, dtype: str) -> Any:
 
 def _read(path: NDArray[Any], variable: str, frames: int, block_id: tuple[int, ...] = ()) -> NDArray[Any]:
     """One block, from its file."""
-    import netCDF4
-
     start = block_id[1] * frames if frames else 0
-    try:
-        with NETCDF, netCDF4.Dataset(path.item()) as file:
-            file.set_auto_mask(False)
-            found = file[variable][start : start + frames] if frames else file[variable][:]
-    except (OSError, RuntimeError, LookupError) as error:
-        raise InputError(
-            f"{path.item()}: its {variable} cannot be read ({error}): the file is damaged; run its study again"
-        ) from error
-    return np.asarray(found)[np.newaxis]
+    key = slice(start, start + frames) if frames else slice(None)
+    return read_variable(path.item(), variable, key)[np.newaxis]
 
 
 def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.DataTree:

@@ -25,7 +25,8 @@ from roughvisc.labels import annotate
 from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
 from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
-from roughvisc.study.storage.seal import flaw, is_sealed, seal
+from roughvisc.study.storage.seal import seal
+from roughvisc.study.storage.trust import is_news, require_whole
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
@@ -37,14 +38,6 @@ log = logging.getLogger("roughvisc")
 
 #: What every result says of itself, whatever else it says.
 _FIRST_ATTRIBUTES = {"Conventions": "CF-1.11", "result_format": RESULT_FORMAT}
-#: What is wrong with a result that has no checksum.
-UNSEALED = (
-    "has no checksum: another program has changed it, or an early version of roughvisc has written it; "
-    "whether its values are those that were computed cannot be said"
-)
-#: Files, as they were, and messages that were logged of them.
-_warned: set[tuple[Path, tuple[int, ...], str]] = set()
-
 #: Free space below which a write that failed is put down to a full disk. [bytes]
 _NEARLY_FULL = 1 << 20
 
@@ -283,49 +276,10 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     return plain
 
 
-def require_whole(path: Path) -> bool:
-    """Refuse a result whose bytes are not those that were written; warn of one that nothing can be said of.
-
-    Returns
-    -------
-    bool
-        Whether the result has a checksum, which it then matches.
-    """
-    try:
-        found, sealed = flaw(path), is_sealed(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a result") from error
-    if found:
-        raise InputError(
-            f"{path}: is damaged: {found}: the run that it is the result of sets it aside and computes it anew"
-        )
-    if not sealed:
-        warn_once(path, f"{path}: {UNSEALED}")
-    return sealed
-
-
-def warn_once(path: Path, message: str) -> None:
-    """Log a warning about a file, once as long as the file is as it is."""
-    if _is_news(path, message):
-        log.warning("%s", message)
-
-
-def _is_news(path: Path, message: str) -> bool:
-    """Whether nothing has said this of the file as it is now; from now on something has."""
-    try:
-        found = path.stat()
-        stamp = (found.st_ino, found.st_size, found.st_mtime_ns)
-    except OSError:
-        stamp = ()
-    before = len(_warned)
-    _warned.add((path.absolute(), stamp, message))
-    return len(_warned) > before
-
-
 def set_aside(path: Path, problem: str) -> None:
     """Give what is no whole result another name, by which nobody takes it for one, and say why."""
     aside = path.with_name(f"{path.name}.damaged")
-    news = _is_news(path, problem)
+    news = is_news(path, problem)
     os.replace(path, aside)
     if news:
         log.warning("%s; it is set aside as %s, and computed anew", problem, aside.name)

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.store import no_results, open_result, require_whole, result_files, whole_file
+from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.study.storage.trust import require_whole
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables.rows import rows_of

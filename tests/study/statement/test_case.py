@@ -257,7 +257,8 @@ def test_material__relaxation_from_csv(study, tmp_path):
         ),
         (
             'model = "tabulated"\nfile = "falling.csv"\nnoise = "1 %"',
-            "material: table row 1: compliance 1 1/Pa at 1 s is 50.00% below an earlier row, noise is 0.01: expected "
+            "material.file: {folder}/falling.csv: table row 1: compliance 1 1/Pa at 1 s is 50.00% below an earlier "
+            "row, noise is 0.01: expected "
             "an ascending compliance, or a larger noise",
         ),
         (
@@ -370,6 +371,8 @@ def test_program__table_from_csv(study, tmp_path, rows):
         ("0, 0\n1, nan", "line 2: found 'nan': expected a number for load"),
         ("0, 0\n1", "line 2: found 1 columns: expected a number for load"),
         ("", "holds no rows: expected columns time, load"),
+        ("0, 0\n1, -2\n2, 3", "load, table row 1: found -2.0: expected a number in N"),
+        ("0, 0\n2, 1\n1, 3", "table row 2: time 1.0 s after 2.0 s: expected ascending times"),
     ],
 )
 def test_program__table_from_bad_csv(study, tmp_path, rows, found):
@@ -377,6 +380,20 @@ def test_program__table_from_bad_csv(study, tmp_path, rows, found):
     message = refusal(study(BALL.split("[[program]]")[0] + '[[program]]\ntable = "history.csv"'))
     assert message.startswith(f"program.0.table: {tmp_path / 'history.csv'}")
     assert found in message
+
+
+@pytest.mark.parametrize(
+    ("rows", "found"),
+    [
+        ("0.1, 3\n1, -2\n10, 1", "modulus, table row 1: found -2.0: expected a number in Pa"),
+        ("0.1, 3\n1, 2\n0.5, 1", "table row 2: time 0.5 after 1: expected ascending time"),
+        ("0.1, 3", "table has 1 of time, 1 of modulus: expected as many, at least two"),
+    ],
+)
+def test_material__table_from_bad_csv(study, tmp_path, rows, found):
+    (tmp_path / "relaxation.csv").write_text(rows)
+    message = refusal(study(with_material('model = "relaxation_table"\nfile = "relaxation.csv"')))
+    assert message.startswith(f"material.file: {tmp_path / 'relaxation.csv'}: {found}")
 
 
 #: what is changed in BALL  =>  into what, and the message: ``|`` begins a line of it, ``| -`` one of several problems
@@ -535,6 +552,19 @@ def test_read_study__refuses_a_file_that_is_not_there(study, tmp_path):
     assert refusal(tmp_path / "bad.toml").startswith("is no valid TOML: Invalid value (at end of document)")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     assert refusal(tmp_path / "binary.toml").startswith("is no valid TOML")
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        ('title = "a"\r\nsize = "5 µm"\n'.encode("cp1252"), "line 2 holds a byte that is no UTF-8: expected a text"),
+        ('title = "a"'.encode("utf-16"), "it is in UTF-16: expected a text in UTF-8"),
+    ],
+)
+def test_read_study__names_what_is_no_utf_8(tmp_path, content, found):
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    assert refusal(path).startswith(f"is no valid TOML: {found}")
 
 
 def test_read_study__refuses_a_program_of_another_kind(study):

@@ -88,6 +88,9 @@ def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
         ("t [s],F [N]\n0,0\n1,-1", NAMES, "count compression negative? Then factor = -1"),
         ("t [s],F [N]\n1,0\n2,1", {"time": "t", "load": "F", "start": 0.5}, "in order from 1 to 2 s"),
         ("t [s],F [N]", NAMES, "holds no rows below the heading in line 1"),
+        ("t [s],F [N]\nx0,y0\n1,0.2\n2,0.3", NAMES, "line 2: found 'x0': expected a number for time, or a unit of its"),
+        ("t [s],F [N],n\n,,7\n1,0.2,8\n2,0.3,9", NAMES, "line 2: found '': expected a number for time"),
+        ("t [s],F\n,m\n0,0\n1,0.2", NAMES, "line 2: found 'm': expected a number for load, or a unit of its kind"),
     ],
 )
 def test_bad_tables__are_named(tmp_path, text, keys, found):

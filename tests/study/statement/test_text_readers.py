@@ -195,6 +195,31 @@ def test_columns__that_could_be_other_numbers_are_refused(text, found, tmp_path)
     assert found in str(refused.value)
 
 
+@pytest.mark.parametrize("text", ['time [s];load [N];note\n0;0;a\n1;2;"b\n2;3;c\n3;4;d\n', '0;0\n1;"2\n2;3\n3;4\n'])
+def test_quotation_mark_that_is_not_closed__loses_no_rows(text, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    at = 3 if "note" in text else 2
+    expected = rf"table\.csv, line {at}: found a quotation mark that is not closed there: expected a row a line"
+    with pytest.raises(InputError, match=expected):
+        read_columns(path, {"time": "s", "load": "N"})
+    if at == 3:
+        with pytest.raises(InputError, match=expected):
+            rv.read_program(path)
+        path.write_text('time;load;note\ns;N;"\n0;0;a\n1;2;b\n2;3;"\n3;4;c\n')  # units, and rows after them
+        with pytest.raises(InputError, match=expected.replace("line 3", "line 2")):
+            rv.read_program(path)
+
+
+def test_heading_over_two_lines__is_one(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text('made;by\n"Time\n[s]";"Load\n[N]"\n0;0\n1;2\n1;x\n')
+    with pytest.raises(InputError, match=r"line 7: found 'x': expected a number for load"):
+        rv.read_program(path)
+    path.write_text('"Time\n[s]";"Load\n[N]"\n0;0\n1;2\n')
+    assert rv.read_program(path) == rv.Program.table([0, 1], [0, 2])
+
+
 @pytest.mark.parametrize(
     ("text", "found"),
     [

@@ -1,5 +1,6 @@
 """Seals: a result whose bytes are not those that were written is named, set aside and computed anew."""
 
+import os
 import shutil
 import struct
 import zlib
@@ -16,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.storage import store
+from roughvisc.study.storage import trust
 from roughvisc.study.storage.seal import flaw, is_sealed, unsealed
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.verify import verify
@@ -60,25 +61,25 @@ def test_changed_by_another_program__is_served_with_one_warning(tmp_path, caplog
     with xr.open_dataset(rewritten, decode_timedelta=False) as ds:
         whole = ds.load()
     whole.to_netcdf(rewritten)
-    both = {f"{one}: {store.UNSEALED}" for one in (changed, rewritten)}
+    both = {f"{one}: {trust.UNSEALED}" for one in (changed, rewritten)}
 
     def warned_by(act):
         caplog.clear()
         act()
         return [one.getMessage() for one in caplog.records if "has no checksum" in one.getMessage()]
 
-    assert warned_by(lambda: open_result(changed)) == [f"{changed}: {store.UNSEALED}"]
+    assert warned_by(lambda: open_result(changed)) == [f"{changed}: {trust.UNSEALED}"]
     assert open_result(changed).force.values.tolist() == [7.0, 7.0, 7.0]
     assert warned_by(lambda: run(cases[0], out, progress=False)) == []
-    assert warned_by(lambda: run(cases[1], out, progress=False)) == [f"{rewritten}: {store.UNSEALED}"]
+    assert warned_by(lambda: run(cases[1], out, progress=False)) == [f"{rewritten}: {trust.UNSEALED}"]
     assert warned_by(lambda: rv.open_results(out)) == []
-    store._warned.clear()  # another process, which reads the index
+    trust._warned.clear()  # another process, which reads the index
     said = warned_by(lambda: [rv.open_results(out), rv.open_results(out, ragged=True)])
     assert (len(said), set(said)) == (2, both)
     capfd.readouterr()
     sweep(cases, out, workers=0, progress=False)
     first = capfd.readouterr().err
-    assert first == f"roughvisc: {changed} and 1 more: {store.UNSEALED}\n"
+    assert first == f"roughvisc: {changed} and 1 more: {trust.UNSEALED}\n"
     status, said, err = invoke("verify", out)
     assert (status, said) == (0, "2 of 2 files whole, 2 of them without a checksum\n")
     assert set(err.splitlines()) == {f"roughvisc: {one}" for one in both}
@@ -165,8 +166,39 @@ def test_open_results__names_the_file_whose_chunk_is_broken(tmp_path):
     for at in range(8000, len(content) - 24, 16):  # behind the heads, of which the library keeps its own checksums
         content[at] ^= 255
     path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"{path.name}: is damaged: its bytes are not those that were written"):
+        results["pressure"].compute(scheduler="sync")
+    path.write_bytes(content[:-24])  # without its checksum
     with pytest.raises(InputError, match=rf"{path.name}: its pressure cannot be read .*: the file is damaged"):
         results["pressure"].compute(scheduler="sync")
+
+
+@pytest.mark.parametrize("kept", [True, False], ids=["time of change kept", "time of change new"])
+def test_fields__are_held_against_the_checksum_when_they_are_read(tmp_path, kept):
+    """Of a file that was damaged since it was opened, or since the index of its folder was made."""
+    path = write_result(hertz_creep((6, 5), 3).assign_attrs(case="{}", case_key="0" * 16), tmp_path / f"{'0' * 16}.nc")
+    whole = rv.open_results(tmp_path).load()
+    single, several, times = open_result(path), rv.open_results(tmp_path), path.stat()
+    content = bytearray(path.read_bytes())
+    at = content.index(whole["pressure"].values[0, 2].tobytes())
+    content[at + 6] ^= 8  # a number a little larger, which nothing but the checksum tells of
+    path.write_bytes(content)
+    if kept:  # a disk that forgets tells nobody
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    for read in (single.load, several.load):
+        with pytest.raises(InputError, match=rf"{path.name}: is damaged: its bytes are not those that were written"):
+            read()
+    if kept:
+        with pytest.raises(InputError, match=rf"{path.name}: is damaged"):
+            rv.open_results(tmp_path).load()
+
+
+def test_fields__of_a_file_that_lost_its_checksum_since_are_warned_of(tmp_path, caplog):
+    path = write_result(hertz_creep((6, 5), 3), tmp_path / "result.nc")
+    opened = open_result(path)
+    path.write_bytes(path.read_bytes()[:-24])
+    opened.load()
+    assert f"{path}: {trust.UNSEALED}" in caplog.text
 
 
 def test_verify__names_what_is_damaged(tmp_path, invoke):

@@ -10,7 +10,7 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationInfo, WrapValidator, create_model, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, create_model, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.halfspace.kernel import Kernel
@@ -20,7 +20,7 @@ from roughvisc.mechanics.materials.temperature import shifted
 from roughvisc.study.statement.body import BASE, body
 from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, optional, shown
-from roughvisc.study.statement.schema.section import Section, nearest, refuse
+from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.study.statement.schema.temperature import shift_factor
 from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
@@ -268,7 +268,14 @@ def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, V
         name = data["model"]
         if not isinstance(name, str) or name not in sections:
             raise refuse("model", f"found {shown(name)}, which is no known model{nearest(name, sections)}")
-        return sections[name].model_validate(_with_columns(data, info), context=info.context)
+        stated = _with_columns(data, info)
+        try:
+            return sections[name].model_validate(stated, context=info.context)
+        except ValidationError as error:
+            if stated is data:
+                raise
+            columns = {key: column.name for key, column in COLUMNS[name].items()}
+            raise of_file(located(data["file"], info), columns, error, "file") from None
 
     return pick
 

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, WrapValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    WrapValidator,
+    model_validator,
+)
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import Program
@@ -15,7 +24,7 @@ from roughvisc.mechanics.stepping.words import INSTEAD
 from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, shown, word_or
-from roughvisc.study.statement.schema.section import Section, close
+from roughvisc.study.statement.schema.section import Section, close, of_file
 
 LOAD = measured("N", least=0, instead=INSTEAD["load"])
 APPROACH = measured("m", instead=INSTEAD["approach"])
@@ -220,17 +229,25 @@ def _recorded(value: Any, control: Control, info: ValidationInfo) -> dict[str, A
 def _rows(quantity: Control, unit: str) -> Any:
     """Check of a ``table``: the name of a file becomes its times and values, so that a case is whole in itself."""
 
-    def read(value: Any, info: ValidationInfo) -> Any:
+    def read(value: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
         if isinstance(value, dict) and "file" in value:
-            return _recorded(value, quantity, info)
+            return check(_recorded(value, quantity, info))
         if isinstance(value, str):
-            times, values = read_columns(located(value, info), {"time": "s", quantity: unit})
-            return {"times": times, "values": values}
+            path = located(value, info)
+            times, values = read_columns(path, {"time": "s", quantity: unit})
+            try:
+                rows = check({"times": times, "values": values})
+                Program.table(times, values, quantity)
+            except ValidationError as error:
+                raise of_file(path, {"times": "time", "values": quantity}, error) from None
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
+            return rows
         if not isinstance(value, dict | Section):
             raise InputError(f"found {shown(value)}: expected the path of a CSV file, or a table with times and values")
-        return value
+        return check(value)
 
-    return BeforeValidator(read)
+    return WrapValidator(read)
 
 
 class LoadRows(Section):

@@ -42,6 +42,25 @@ def refuse(key: str, sentence: str) -> ValidationError:
     return ValidationError.from_exception_data("study", [_problem(sentence, (key,))])
 
 
+def of_file(path: str, columns: Mapping[str, str], error: ValidationError, key: str = "") -> ValidationError:
+    """The problems of a table whose columns were read from a file: those of columns, and of the whole, are the file's.
+
+    ``columns`` are keys and their names in the file, ``key`` is the one that names the file. Rows count from 0, as they
+    do where a row is named elsewhere.
+    """
+    told = []
+    for one in error.errors():
+        loc = one["loc"]
+        sentence = str(one["ctx"]["error"]) if one["type"] == "value_error" else one["msg"]
+        if loc and loc[0] in columns:
+            row = f", table row {loc[1]}" if len(loc) > 1 else ""
+            sentence = f"{columns[str(loc[0])]}{row}: {sentence}"
+        if not loc or loc[0] in columns:
+            loc, sentence = (key,) if key else (), f"{path}: {sentence}"
+        told.append(_problem(sentence, loc, one["input"]))
+    return ValidationError.from_exception_data("study", told)
+
+
 def close(word: str, known: Iterable[str]) -> str:
     """``"; did you mean 'load'?"``, empty where nothing comes near."""
     near = difflib.get_close_matches(str(word), list(known), n=1)
