@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import Program, Segment
 
+#: Times that differ by less, in lengths of the program, are one.
+_ROUNDING = 1e-12
 #: In a hold the first of them lies no later than this part of it. [-]
 _FIRST = 1e-3
 
@@ -18,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[float, ...] | None:
-    """Times to keep, ascending, snapped to the program's corners. [s]
+    """Times to keep, ascending, snapped to the program's corners; those that differ by rounding alone are one. [s]
 
     Parameters
     ----------
@@ -37,13 +39,14 @@ def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[f
     duration = program.duration
     listed = spread_times(program, times) if isinstance(times, int) else np.unique(np.asarray(times, dtype=float))
     corners = np.array(program.corners)
-    kept = []
+    kept: list[float] = []
     for value in listed:
         nearest = float(corners[np.argmin(np.abs(corners - value))])
-        snapped = nearest if abs(nearest - value) <= 1e-12 * duration else float(value)
+        snapped = nearest if abs(nearest - value) <= _ROUNDING * duration else float(value)
         if not 0 <= snapped <= duration:
             raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
-        kept.append(snapped)
+        if not kept or snapped - kept[-1] > _ROUNDING * duration:
+            kept.append(snapped)
     return tuple(kept)
 
 

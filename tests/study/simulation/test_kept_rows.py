@@ -317,3 +317,13 @@ def test_rows__keep_nothing_of_larger_arrays():
     kept = store.arrays(1)
     assert kept["source_pressure"] is kept["pressure"]
     assert kept["source"].base is None
+
+
+def test_times__that_differ_by_rounding_alone_are_one():
+    """A step from one to the other has no length; each of the others is a row, at the time that was asked for."""
+    ball = rv.sphere(0.01, (1e-4, 9e-5), (12, 9))
+    program = rv.Program().load(1e-3, over=1.0)
+    third = 1.0 / 3.0
+    times = [third, np.nextafter(third, 1.0), third + 1e-9, 1.0 - 1e-13, 1.0]
+    ds = rv.simulate(ball, rv.kelvin_voigt(1e6, 1e5), program, times=times, edge="accept", progress=False)
+    np.testing.assert_array_equal(ds.time, [third, third + 1e-9, 1.0])
