@@ -124,7 +124,7 @@ def _work(kind, seed, first, last, real):
 
     with tempfile.TemporaryDirectory() as folder:
         for outcome in examined(kind, seed, announced(), folder, *([real] if kind == "scans" and real else [])):
-            print(json.dumps(dataclasses.asdict(outcome)), file=said, flush=True)
+            print(json.dumps(dataclasses.asdict(outcome)).replace(folder, "FOLDER"), file=said, flush=True)
 
 
 def listed(kind, outcome):
@@ -148,7 +148,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     for kind, (_, count, _) in KINDS.items():
         parser.add_argument(f"--{kind}", type=int, default=count, metavar="N", help=f"how many; by default {count}")
-    parser.add_argument("--real", metavar="FOLDER", help="of real scans; by default ../shared/scans where it is there")
+    parser.add_argument("--real", metavar="FOLDER", help="of scans of real instruments")
     parser.add_argument("--report", metavar="FILE", help="where mutants with other values, and faults, are listed")
     parser.add_argument("--only", metavar="KIND:NUMBER", help="one mutant, in this process")
     parser.add_argument("--worker", nargs=3, metavar=("KIND", "FIRST", "LAST"), help=argparse.SUPPRESS)
