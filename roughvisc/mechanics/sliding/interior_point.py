@@ -41,6 +41,8 @@ _FORCING = 0.3
 _LOOSEST, _STATED = 0.5, 0.05
 # Vectors after which GMRES restarts, and in all.
 _RESTART, _MOST_VECTORS = 60, 300
+# A vector of which less is left beside the others is made orthogonal once more.
+_LEFT = 0.1
 # Part of the way to the border of the feasible set.
 _INSIDE = 0.995
 # Least separation at the start, over the range of the gap.
@@ -257,11 +259,14 @@ def gmres(
         for k in range(_RESTART):
             vector = operator(preconditioner(basis[k].reshape(right.shape))).ravel()
             count += 1
-            for _ in range(2):  # Gram and Schmidt twice
+            length = math.inf
+            while True:  # Gram and Schmidt, once more where little is left
                 along = np.einsum("ki,i->k", basis[: k + 1], vector)
                 vector -= np.einsum("ki,k->i", basis[: k + 1], along)
                 triangle[: k + 1, k] += along
-            length = float(np.sqrt(np.sum(vector**2)))
+                before, length = length, float(np.sqrt(np.einsum("i,i->", vector, vector)))
+                if before < math.inf or length > _LEFT * float(np.sqrt(np.sum(along**2))):
+                    break
             for i, (cosine, sine) in enumerate(turns):
                 a, b = triangle[i, k], triangle[i + 1, k]
                 triangle[i, k], triangle[i + 1, k] = cosine * a + sine * b, cosine * b - sine * a
@@ -275,4 +280,6 @@ def gmres(
         weights = np.linalg.solve(triangle[: k + 1, : k + 1], left[: k + 1])
         change = np.einsum("ki,k->i", basis[: k + 1], weights).reshape(right.shape)
         solution += preconditioner(change)
+        if abs(left[k + 1]) <= enough or count >= _MOST_VECTORS:
+            return solution, count
         residual = right - operator(solution)

@@ -128,8 +128,10 @@ class Sliding:
         self._skew = np.asarray(1j * skew, dtype=np.complex128)
         softest = np.abs(self.response).max()
         acts = self.response != 0
-        #: Pressure over displacement of each wave; of those without displacement as of the softest. [Pa/m]
-        self.stiffness = np.divide(1.0, self.response, where=acts, out=np.full(acts.shape, 1 / softest, complex))
+        # Pressure over displacement of each wave; of those without displacement as of the softest. [Pa/m]
+        stiffness = np.divide(1.0, self.response, where=acts, out=np.full(acts.shape, 1 / softest, complex))
+        stiffest = float(np.abs(stiffness).max())
+        self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
         self.cell_area = dx * dy
@@ -143,8 +145,11 @@ class Sliding:
         return self._filtered(pressure, self.response)
 
     def full_contact(self, displacement: Array) -> Array:
-        """Pressure of a displacement of all of the surface. [Pa]"""
-        return self._filtered(displacement, self.stiffness)
+        """Pressure of a displacement of all of the surface, to single precision: it is for a preconditioner. [Pa]"""
+        symbol, unit = self._stiffness
+        largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
+        found = fft.rfft2((displacement / largest).astype(np.float32)) * symbol
+        return largest * unit * np.asarray(fft.irfft2(found, s=self.shape, overwrite_x=True), dtype=np.float64)
 
     def lagging(self, pressure: Array) -> Array:
         """Slope along x of the displacement out of phase. [-]"""
