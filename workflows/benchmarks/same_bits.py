@@ -46,7 +46,9 @@ def scenes():
         "punch": lambda: rv.simulate(rv.flat_punch(5e-4, 2e-3, (25, 27)), zener, ramp, **few),
         "rough, periodic": lambda: rv.simulate(rough, zener, light, **periodic),
         "rough, free": lambda: rv.simulate(rough, prony, ramp, edge="accept", **few),
-        "growing": lambda: rv.simulate(rv.sphere(1e-2, 1e-3, (13, 15)), prony, at_rest.load(0.1, over=0).hold(2.0), **few),
+        "growing": lambda: rv.simulate(
+            rv.sphere(1e-2, 1e-3, (13, 15)), prony, at_rest.load(0.1, over=0).hold(2.0), **few
+        ),
         "unloading": lambda: rv.simulate(ball, zener, triangle, **few),
         "approach": lambda: rv.simulate(ball, prony, up_and_down, **few),
         "no compliance at once": lambda: rv.simulate(ball, soft, ramp, **few),

@@ -16,7 +16,7 @@ from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trajectory, Trial
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def trial_at_rest(scene: Scene, state: State) -> Trial:
 
 def attempt(
     scene: Scene,
-    state: State,
+    state: Trajectory,
     control: Control,
     value: float,
     length: float,
@@ -127,8 +127,8 @@ def predicted(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[flo
     return alpha, carried, scene.halfspace.displacement(carried)
 
 
-def committed(scene: Scene, state: State, trial: Trial) -> State:
-    """State after an accepted trial."""
+def advanced(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
+    """What a trial changes of a trajectory, once it is accepted."""
     now = trial.instant
     assert now.unit_displacement is not None
     acts_on = scene.memory.acts_on
@@ -138,8 +138,6 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
     if acts_on == "both":  # held once
         now = replace(now, contact=Sparse.of(field[0]), unit_displacement=field[1])
-    touching = now.force > 0
-    assert state.now.unit_displacement is not None
     spent = energy_after(scene, state, trial)
     if spent is None:
         assert trial.displacement is not None
@@ -147,24 +145,33 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
         work = state.work + work_between(scene, state, now.pressure, displacement, jumped=state.unresolved)
     else:
         displacement, work = NO_FIELD, spent.stored + spent.dissipated
+    return {
+        "now": now,
+        "displacement": displacement,
+        "before": state.now if trial.length > 0 else None,
+        "memory": memory,
+        "work": work,
+        "energy": spent,
+        "unresolved": False,
+    }
+
+
+def committed(scene: Scene, state: State, trial: Trial) -> State:
+    """State after an accepted trial."""
+    changes = advanced(scene, state, trial)
+    now, work = changes["now"], changes["work"]
     return replace(
         state,
-        now=now,
-        displacement=displacement,
-        before=state.now if trial.length > 0 else None,
-        memory=memory,
+        **changes,
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         largest_work=max(state.largest_work, abs(work)),
-        contact_since=state.contact_since if touching and state.now.force > 0 else state.now.time,
-        work=work,
-        energy=spent,
-        unresolved=False,
+        contact_since=state.contact_since if now.force > 0 and state.now.force > 0 else state.now.time,
         pace=state.pace.seeing(),
     )
 
 
-def energy_after(scene: Scene, state: State, trial: Trial) -> energy.Energy | None:
+def energy_after(scene: Scene, state: Trajectory, trial: Trial) -> energy.Energy | None:
     """Energies at the end of a step; None where the memory is no series."""
     if state.energy is None:
         return None
@@ -187,7 +194,7 @@ def energy_after(scene: Scene, state: State, trial: Trial) -> energy.Energy | No
     )
 
 
-def work_while_held(state: State, trial: Trial) -> float | None:
+def work_while_held(state: Trajectory, trial: Trial) -> float | None:
     """Work of a step in which the load or the approach is held, exactly; None where neither is. [J]
 
     Where surfaces touch, their displacement follows the approach: the work is the integral of the force over it,
@@ -203,7 +210,7 @@ def work_while_held(state: State, trial: Trial) -> float | None:
     return None
 
 
-def work_between(scene: Scene, state: State, pressure: Array, displacement: Array, jumped: bool = False) -> float:
+def work_between(scene: Scene, state: Trajectory, pressure: Array, displacement: Array, jumped: bool = False) -> float:
     """Work of the pressure on the displacement from a state to the next. [J]
 
     Where surfaces touch that is the force on the approach; cells that touch in a part of the step count by that part
@@ -250,7 +257,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     )
 
 
-def displacement_after(scene: Scene, state: State, trial: Trial, length: float = 0.0, rule: Rule = "right") -> Sum:
+def displacement_after(scene: Scene, state: Trajectory, trial: Trial, length: float = 0.0, rule: Rule = "right") -> Sum:
     """Total displacement after a trial that has led to a state, or leads so much farther. [m], [s]"""
     if trial.displacement is not None:
         return Sum.whole(trial.displacement)
@@ -267,5 +274,9 @@ def segment_number(state: State) -> int:
 
 def restarted(scene: Scene, state: State, suggestion: float) -> State:
     """State from which nothing is extrapolated."""
-    memory = scene.memory.restart(state.memory)
-    return replace(state, before=None, pace=state.pace.after_event(suggestion), memory=memory)
+    return replace(state, pace=state.pace.after_event(suggestion), **without_past(scene, state))
+
+
+def without_past(scene: Scene, state: Trajectory) -> dict[str, Any]:
+    """What changes of a trajectory from which nothing is to be extrapolated."""
+    return {"before": None, "memory": scene.memory.restart(state.memory)}

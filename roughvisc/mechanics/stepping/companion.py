@@ -7,7 +7,7 @@ Energies are sums over the steps, whose error follows the second order closely: 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +17,28 @@ from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.attempt import (
+    advanced,
     attempt,
-    committed,
     displacement_after,
-    restarted,
     segment_number,
     with_cost,
+    without_past,
 )
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.domain import is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_CONTACT, Guess, Instant, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import (
+    NO_CONTACT,
+    Guess,
+    Held,
+    Instant,
+    Scene,
+    State,
+    Step,
+    Through,
+    Trajectory,
+    Trial,
+)
 from roughvisc.mechanics.stepping.tangential import tangential_force
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -49,10 +60,19 @@ _STATED_SOFT, _STATED_SOFT_ENERGY = 1.05, 1.2
 _ENTERED = 0.3
 
 
-def bare(state: State) -> State:
-    """A companion's state without what it is never asked for, so that it holds few fields."""
-    before = None if state.before is None else replace(state.before, contact=NO_CONTACT, unit_displacement=None)
-    return replace(state, before=before)
+def behind(state: State, accepted: State) -> State:
+    """An accepted state whose companion waits where it was, at the state before if they were one till then."""
+    companion = state.companion
+    if companion is None:
+        companion = _bare(Trajectory(**{part.name: getattr(state, part.name) for part in fields(Trajectory)}))
+    return replace(accepted, companion=companion, behind=1)
+
+
+def _bare(companion: Trajectory) -> Trajectory:
+    """Without what a companion is never asked for, so that it holds few fields."""
+    before = companion.before
+    before = None if before is None else replace(before, contact=NO_CONTACT, unit_displacement=None)
+    return replace(companion, before=before)
 
 
 def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
@@ -83,7 +103,7 @@ def beside(now: Instant, companion: Instant | None = None, together: Instant | N
 
 
 def difference(
-    scene: Scene, step: Step, companion: State, moved: Sum, earlier: Sparse | None, asked: bool
+    scene: Scene, step: Step, companion: Trajectory, moved: Sum, earlier: Sparse | None, asked: bool
 ) -> Uncertainty:
     """What is stated of a step, from where its companion is at the same time.
 
@@ -93,7 +113,7 @@ def difference(
         What is prescribed.
     step : Step
         The step.
-    companion : State
+    companion : Trajectory
         Its companion after a step of its own.
     moved : Sum
         Displacement after that step. [m]
@@ -163,7 +183,7 @@ def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Arr
     return abs(fine - tangential_force(scene.halfspace, pressure, displacement, slide))
 
 
-def _energies(state: State) -> tuple[float, float]:
+def _energies(state: Trajectory) -> tuple[float, float]:
     """Stored and dissipated. [J]"""
     return (0.0, 0.0) if state.energy is None else (state.energy.stored, state.energy.dissipated)
 
@@ -189,53 +209,82 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[i
     return sum(inside for inside, _ in found), sum(outside for _, outside in found)
 
 
-def caught_up(
-    scene: Scene,
-    state: State,
-    segment: Segment,
-    guess: Guess,
-    rule: Rule | None = None,
-) -> tuple[State, Trial] | None:
-    """State whose companion has come to the same instant by one step, and that step; None if it outgrew the grid.
+def followed(
+    scene: Scene, state: State, segment: Segment, guess: Guess, rule: Rule | None = None
+) -> tuple[State, Trial | None] | None:
+    """State whose companion, if it has one, has come to the same instant by one step, and that step.
 
-    ``guess`` is where the companion may be, as of :func:`beside`; it is used up.
+    None if that outgrew the grid. ``guess`` is where the companion may be, as of :func:`beside`; it is used up.
     """
     companion = state.companion
-    assert companion is not None
+    if companion is None:
+        return state, None
     time = state.now.time
     length = time - companion.now.time
-    value = segment.value(time - companion.began, companion.start)
+    value = segment.value(time - state.began, companion.start)
     rule = rule or rule_for(scene, companion, length, _GROWTH)
     trial = attempt(scene, companion, segment.control, value, length, rule, _SHARE, guess)
     trial = replace(trial, instant=replace(trial.instant, time=time))
     if is_outgrown(scene, trial.instant):
         return None
-    followed = committed(scene, companion, trial)
+    return caught_up(scene, state, companion, trial), trial
+
+
+def caught_up(scene: Scene, state: State, companion: Trajectory, trial: Trial) -> State:
+    """State whose companion has accepted a step to the same instant."""
+    changes = advanced(scene, companion, trial)
     if companion.unresolved:
-        followed = restarted(scene, followed, 0.0)
-    return replace(with_cost(state, trial), companion=bare(followed), behind=0), trial
+        changes |= without_past(scene, replace(companion, **changes))
+    return replace(with_cost(state, trial), companion=_bare(replace(companion, **changes)), behind=0)
 
 
 def compared(
-    scene: Scene, step: Step, companion_trial: Trial, earlier: Sparse | None = None, asked: bool = True
+    scene: Scene, step: Step, companion_trial: Trial | None, earlier: Sparse | None = None, asked: bool = True
 ) -> Step:
-    """A step with what its companion says of it."""
+    """A step with what its companion says of it, if it has taken one."""
     companion = step.state.companion
-    assert companion is not None
+    if companion is None or companion_trial is None:
+        return step
     moved = displacement_after(scene, companion, companion_trial)
     return stating(step, difference(scene, step, companion, moved, earlier, asked))
-
-
-def of_a_pair(waiting: Step, step: Step) -> Step:
-    """The first step of a pair, with what is stated of it by the second."""
-    companion = waiting.state.companion  # it waits where the pair began
-    if companion is None:
-        return waiting
-    first, second = waiting.shown.time - companion.now.time, step.shown.time - waiting.shown.time
-    part = first**3 / (first**3 + second**3)  # of what both add to the energies, which steps do by their cube
-    return replace(waiting, uncertainty=waiting.uncertainty.or_worse(step.uncertainty, part))
 
 
 def stating(step: Step, uncertainty: Uncertainty) -> Step:
     """The step, with what is stated of it."""
     return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty))
+
+
+def in_pairs(steps: Held) -> Through:
+    """The same steps; the first of a pair is held till the companion has told of both, with the second one.
+
+    Not so where it is neither kept nor the first after an event, whose error is none that the one before told, and
+    where the grid is about to grow.
+    """
+    first = None
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as end:
+            return end.value
+        if first is not None:
+            yield first if step is None else _of_a_pair(first, step)
+            first = None
+        if step is not None and step.state.behind and _is_held(step):
+            first = step
+        elif step is not None:
+            yield step
+        del step  # its fields are not needed while the next one is computed
+
+
+def _is_held(step: Step) -> bool:
+    companion = step.state.companion
+    return step.scene.keeps(step.shown.time) or (companion is not None and companion.before is None)
+
+
+def _of_a_pair(first: Step, second: Step) -> Step:
+    """The first step of a pair, with what is stated of it by the second."""
+    companion = first.state.companion
+    assert companion is not None  # it waits where the pair began
+    lengths = first.shown.time - companion.now.time, second.shown.time - first.shown.time
+    part = lengths[0] ** 3 / (lengths[0] ** 3 + lengths[1] ** 3)  # of what both add to the energies, by their cubes
+    return replace(first, uncertainty=first.uncertainty.or_worse(second.uncertainty, part))

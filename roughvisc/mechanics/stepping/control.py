@@ -10,7 +10,7 @@ import math
 from roughvisc.mechanics.fields.passes import apart
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Rule
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trial
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
 # Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
 _SHARE = 0.5
@@ -118,7 +118,7 @@ def _first_length(scene: Scene, state: State, segment: Segment, event: float) ->
     return length
 
 
-def rule_for(scene: Scene, state: State, length: float, growth: float = _GROWTH) -> Rule:
+def rule_for(scene: Scene, state: Trajectory, length: float, growth: float = _GROWTH) -> Rule:
     """Piecewise-linear pressure where it does not ring, else the damped two-step rule or its start.
 
     ``growth`` is the largest ratio of a step to the one before with which the two-step rule is taken.

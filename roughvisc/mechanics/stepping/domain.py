@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from roughvisc.errors import EdgeContactError
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import padded
 from roughvisc.mechanics.stepping.attempt import predicted
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory
 
 # The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
 _BEYOND = 1.05
@@ -54,11 +56,11 @@ def enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
     if larger is None:
         raise edge_error(scene, time)
     scene, offset = larger
-    return scene, _on_larger(scene, state, offset)
+    return scene, state.with_each(partial(_on_larger, scene, offset))
 
 
-def _on_larger(scene: Scene, state: State, offset: tuple[int, int]) -> State:
-    """State on a larger grid, in which the present one begins at a cell; its companion too."""
+def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict[str, Any]:
+    """What changes of a trajectory on a larger grid, in which the present one begins at a cell."""
     shape = scene.halfspace.shape
     memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
 
@@ -73,5 +75,4 @@ def _on_larger(scene: Scene, state: State, offset: tuple[int, int]) -> State:
     unit_displacement = scene.halfspace.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement
-    companion = None if state.companion is None else _on_larger(scene, state.companion, offset)
-    return replace(state, now=now, displacement=displacement, before=before, memory=memory, companion=companion)
+    return {"now": now, "displacement": displacement, "before": before, "memory": memory}

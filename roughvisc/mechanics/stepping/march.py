@@ -25,8 +25,9 @@ from roughvisc.mechanics.stepping.attempt import (
     step_of,
     trial_at_rest,
     with_cost,
+    without_past,
 )
-from roughvisc.mechanics.stepping.companion import bare, beside, caught_up, compared, of_a_pair, sharpened, stating
+from roughvisc.mechanics.stepping.companion import behind, beside, compared, followed, in_pairs, sharpened, stating
 from roughvisc.mechanics.stepping.control import (
     error_limit,
     estimate,
@@ -39,7 +40,7 @@ from roughvisc.mechanics.stepping.control import (
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.events import entering, jump, next_event
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
@@ -87,7 +88,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         else:
             through = (_through if segment.slide is None else through_slide)(scene, state, segment)
             del state  # nor are its
-            scene, state = yield from _without_jumps(through)
+            scene, state = yield from _without_jumps(in_pairs(through))
 
 
 def _without_jumps(steps: Through) -> Through:
@@ -104,43 +105,42 @@ def _without_jumps(steps: Through) -> Through:
         del step, state
 
 
-def _through(scene: Scene, state: State, segment: Segment) -> Through:
+def _through(scene: Scene, state: State, segment: Segment) -> Held:
     """Accepted steps through a segment; the last one has entered the next segment. In the end scene and state.
 
-    Steps go in pairs: the companion takes both as one, and the first is yielded when that has said how far it is off.
+    Steps go in pairs: the companion takes both as one. The first step after an event extrapolates from nothing; it is
+    accepted when the second one is, and both are rolled back together.
     """
     end = scene.program.corners[state.segment + 1]
-    waiting: list[Step] = []  # the first step of a pair
-    base = state  # where the pair began
+    first: Step | None = None  # after an event
+    base = state  # before it
     while state.now.time < end:
         event = next_event(scene, state, end)
         closing = _closing(scene, state, segment, event)
         if closing > state.now.time:
-            while waiting:
-                yield waiting.pop()
+            if first is not None:
+                yield first
+                first = None
+            yield None
             step = _carried_apart(scene, state, segment, closing, end)
-            scene, base = step.scene, step.state
-            state = step.state
+            scene, state = step.scene, step.state
             if state.now.time in (event, end):
                 yield step
             continue
         trial, error = _tried(scene, state, segment, event, end)
         state = with_cost(state, trial)
         outgrown = is_outgrown(scene, trial.instant)
-        unjudged = bool(waiting) and base.before is None  # nothing to extrapolate from: judged and rolled back
-        shown = unjudged and scene.keeps(waiting[0].shown.time)
+        shown = first is not None and scene.keeps(first.shown.time)
         if not outgrown and _too_long(scene, state, segment, trial, error, shown):
-            start, length = (base, state.now.time - base.now.time) if unjudged else (state, trial.length)
-            state = _shortened(scene, start, state, segment, trial, error, length)
-            if unjudged:
-                waiting.clear()
+            start, length = (state, trial.length) if first is None else (base, state.now.time - base.now.time)
+            state, first = _shortened(scene, start, state, segment, trial, error, length), None
             del trial
             continue
-        alone = state.behind == 0 and trial.instant.time < end
+        single = state.behind == 0 and trial.instant.time < end
         fresh = state.before is None and scene.time_step is None
         judged = None
         if not outgrown:
-            waits = scene.remembers and alone
+            waits = scene.remembers and single
             accepted, guess = _accepted(scene, state, trial, error, waits), None
             if state.companion is not None and not waits:
                 guess = beside(accepted.now, state.companion.now, state.before if state.behind else None)
@@ -148,21 +148,19 @@ def _through(scene: Scene, state: State, segment: Segment) -> Through:
                     state = base = _without_fields(state)
             judged = _judged(scene, state, accepted, segment, trial, guess)
             del accepted, guess
+        if first is not None:
+            yield first
+            first = None
         if judged is None:  # the grid is too small for this step, or for the companion's
-            while waiting:
-                yield waiting.pop()
+            yield None
             scene, state = enlarged(scene, state, trial.instant.time)
-            base = state
             continue
-        while waiting:
-            yield of_a_pair(waiting.pop(), judged)
-        if alone and (fresh or (scene.remembers and scene.keeps(judged.shown.time))):
-            waiting.append(judged)
-            base = state if fresh else judged.state
+        base, state = state, judged.state
+        if fresh and single:
+            first = judged
         else:
-            base = judged.state
+            base = state
             yield judged
-        state = judged.state
         del trial, judged  # their fields are not needed while the next step is computed
     return scene, state
 
@@ -226,7 +224,7 @@ def _accepted(scene: Scene, state: State, trial: Trial, error: float, waits: boo
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
     accepted = replace(accepted, pace=state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
     if waits:
-        accepted = replace(accepted, companion=bare(state) if state.companion is None else state.companion, behind=1)
+        accepted = behind(state, accepted)
     # the first short step stands for a jump
     return restarted(scene, accepted, trial.length) if state.unresolved else accepted
 
@@ -245,20 +243,20 @@ def _judged(
     """
     time, companion_trial = trial.instant.time, None
     if guess is not None:
-        found = caught_up(scene, accepted, segment, guess)
+        found = followed(scene, accepted, segment, guess)
         if found is None:
             return None
         accepted, companion_trial = found
-    if time == scene.program.corners[state.segment + 1]:
+    end = scene.program.corners[state.segment + 1]
+    if time == end:
         accepted = entering(scene, accepted)
     step = step_of(scene, accepted, trial)
-    asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
     if companion_trial is None:
         return step
     assert state.companion is not None
+    asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
     step = compared(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
-        end = scene.program.corners[state.segment + 1]
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
         return replace(step, state=sharpened(scene, state, step.state, ahead))
     return stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
@@ -273,7 +271,7 @@ def _touched(scene: Scene, state: State, time: float) -> float:
 def _carried_apart(scene: Scene, state: State, segment: Segment, until: float, end: float) -> Step:
     """One exact step without contact; the companion takes the same."""
     while state.behind:
-        found = caught_up(scene, state, segment, beside(state.now))
+        found = followed(scene, state, segment, beside(state.now))
         if found is None:
             scene, state = enlarged(scene, state, state.now.time)
         else:
@@ -281,17 +279,15 @@ def _carried_apart(scene: Scene, state: State, segment: Segment, until: float, e
     value = segment.value(until - state.began, state.start)
     trial = attempt(scene, state, segment.control, value, until - state.now.time, "linear")
     trial = replace(trial, instant=replace(trial.instant, time=until))
-    carried = restarted(scene, committed(scene, with_cost(state, trial), trial), 0.0)
-    companion_trial = None
-    if carried.companion is not None:
-        apart = carried.companion.now.force == 0
-        found = caught_up(scene, carried, segment, beside(carried.now), "linear" if apart else "right")
-        if found is None:  # the companion is in contact, beyond the grid
-            return _carried_apart(*enlarged(scene, state, until), segment, until, end)
-        carried, companion_trial = found
-        assert carried.companion is not None
-        carried = replace(carried, companion=restarted(scene, carried.companion, 0.0))
+    carried = committed(scene, with_cost(state, trial), trial)
+    in_contact = carried.companion is not None and carried.companion.now.force > 0
+    found = followed(scene, carried, segment, beside(carried.now), "right" if in_contact else "linear")
+    if found is None:  # the companion is in contact, beyond the grid
+        return _carried_apart(*enlarged(scene, state, until), segment, until, end)
+    carried, companion_trial = found
+    carried = carried.with_each(partial(without_past, scene))
+    carried = replace(carried, pace=carried.pace.after_event())
     if until == end:
         carried = entering(scene, carried)
     step = step_of(scene, carried, trial)
-    return step if companion_trial is None or not scene.keeps(until) else compared(scene, step, companion_trial)
+    return compared(scene, step, companion_trial) if scene.keeps(until) else step

@@ -180,8 +180,8 @@ class Instant:
 
 
 @dataclass(frozen=True)
-class State:
-    """All that a march needs to go on: a plain value.
+class Trajectory:
+    """A history at its present instant, as steps of some length give it.
 
     Attributes
     ----------
@@ -192,55 +192,24 @@ class State:
         the energies give that. [m]
     memory : object
         State of the memory at the present instant.
-    segment : int
-        Index of the segment of the program.
-    began, start : float
-        Time at which the segment began [s], and the value of what it controls then [N or m].
-    largest_force, largest_approach, largest_work : float
-        So far. [N], [m], [J]
-    contact_since : float
-        Time at which the surfaces last came into contact. [s]
+    start : float
+        Value at the start of the segment of what it controls. [N or m]
     work : float
         Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
     energy : Energy or None
         What of it is stored and what is dissipated; None where the memory is no series of exponentials.
-    companion : State or None
-        The same march with steps twice as long, as far as it has come; None while it is no other than this one.
-    behind : int
-        Accepted steps since the companion was last at the present instant.
-    uncertainty : Uncertainty
-        As of then.
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
-    slid : Slid or None
-        How far the profile has slid; None before any slide.
-    pace : Pace
-        How long the next step should be.
-    iterations, convolutions : int
-        Spent so far, rejected steps included.
     """
 
     now: Instant
     displacement: Array
     memory: Any
     before: Instant | None = None
-    segment: int = 0
-    began: float = 0.0
     start: float = 0.0
-    largest_force: float = 0.0
-    largest_approach: float = 0.0
-    largest_work: float = 0.0
-    contact_since: float = 0.0
     work: float = 0.0
     energy: Energy | None = None
-    companion: State | None = None
-    behind: int = 0
-    uncertainty: Uncertainty = field(default_factory=Uncertainty)
     unresolved: bool = False
-    slid: Slid | None = None
-    pace: Pace = field(default_factory=Pace)
-    iterations: int = 0
-    convolutions: int = 0
 
     def extrapolated(self, length: float) -> tuple[Array, bool]:
         """Pressure a step ahead by the last two, cut at zero, and whether it was; the last where there is no other.
@@ -277,6 +246,54 @@ class State:
         """Of a step's length to that of the last one."""
         assert self.before is not None
         return length / (self.now.time - self.before.time)
+
+
+@dataclass(frozen=True)
+class State(Trajectory):
+    """All that a march needs to go on: a plain value.
+
+    Attributes
+    ----------
+    segment : int
+        Index of the segment of the program.
+    began : float
+        Time at which the segment began. [s]
+    largest_force, largest_approach, largest_work : float
+        So far. [N], [m], [J]
+    contact_since : float
+        Time at which the surfaces last came into contact. [s]
+    companion : Trajectory or None
+        The same history in steps twice as long, as far as it has come; None while it is no other than this one.
+    behind : int
+        Accepted steps since the companion was last at the present instant.
+    uncertainty : Uncertainty
+        As of then.
+    slid : Slid or None
+        How far the profile has slid; None before any slide.
+    pace : Pace
+        How long the next step should be.
+    iterations, convolutions : int
+        Spent so far, rejected steps included.
+    """
+
+    segment: int = 0
+    began: float = 0.0
+    largest_force: float = 0.0
+    largest_approach: float = 0.0
+    largest_work: float = 0.0
+    contact_since: float = 0.0
+    companion: Trajectory | None = None
+    behind: int = 0
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    slid: Slid | None = None
+    pace: Pace = field(default_factory=Pace)
+    iterations: int = 0
+    convolutions: int = 0
+
+    def with_each(self, change: Callable[[Trajectory], dict[str, Any]]) -> State:
+        """The state with what changes of its own trajectory, and of its companion's."""
+        companion = self.companion and replace(self.companion, **change(self.companion))
+        return replace(self, **change(self), companion=companion)
 
 
 @dataclass(frozen=True)
@@ -393,3 +410,5 @@ class Trial:
 
 #: Steps through a part of a program, and the scene and the state in which they end.
 Through = Generator[Step, None, tuple[Scene, State]]
+#: The same, with None before the grid may grow: who holds a step back is to let it go.
+Held = Generator[Step | None, None, tuple[Scene, State]]

@@ -9,17 +9,18 @@ cells at once, and tells what the length of the steps leaves unknown: that falls
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, step_of, with_cost
-from roughvisc.mechanics.stepping.companion import bare, beside, compared, of_a_pair, stating
+from roughvisc.mechanics.stepping.companion import behind, beside, caught_up, compared, stating
 from roughvisc.mechanics.stepping.control import rule_for
 from roughvisc.mechanics.stepping.events import entering
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Guess, Instant, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial
 from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
@@ -28,8 +29,10 @@ from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 _SHARE = 0.3
 _COMPANION_SHARE = 2.5
 
+Moved = TypeVar("Moved", bound=Trajectory)
 
-def through_slide(scene: Scene, state: State, segment: Segment) -> Through:
+
+def through_slide(scene: Scene, state: State, segment: Segment) -> Held:
     """Accepted steps through a slide; the last one has entered the next segment. In the end scene and state.
 
     Parameters
@@ -49,17 +52,11 @@ def through_slide(scene: Scene, state: State, segment: Segment) -> Through:
         raise InputError("a profile slides with periodic boundaries alone: expected boundary = 'periodic'")
     cells = segment.slide.cells(scene.halfspace.spacing)
     end, length = scene.program.corners[state.segment + 1], segment.duration / cells
-    waiting: list[Step] = []  # the first step of a pair, till the companion has told
     while state.now.time < end:
         taken = round((state.now.time - state.began) / length)
         step = _further(scene, state, segment, instant(state.began, end, taken + 1, cells), length)
-        while waiting:
-            yield of_a_pair(waiting.pop(), step)
         state = step.state
-        if state.behind and scene.keeps(state.now.time):
-            waiting.append(step)
-        else:
-            yield step
+        yield step
         del step
     return scene, state
 
@@ -68,15 +65,21 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     """The step over the next cell, with what the companion says of it where it has come along."""
     assert segment.slide is not None
     end = scene.program.corners[state.segment + 1]
-    guess = beside(state.now)
-    trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, guess)
-    accepted = _accepted(scene, with_cost(state, trial), segment.slide, trial, 1)
+    trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, beside(state.now))
+    moved = _moved(scene, state, segment.slide, 1)
+    # the step before is kept as the profile saw it
+    accepted = replace(committed(scene, with_cost(moved, trial), trial), before=state.now)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
+    if state.unresolved:
+        accepted = restarted(scene, accepted, 0.0)
     companion_trial, earlier = None, state.companion
     if scene.remembers and state.behind == 0 and arrival < end:
-        accepted = replace(accepted, companion=bare(state) if earlier is None else earlier, behind=1)
+        accepted = behind(state, accepted)
     elif earlier is not None:
-        accepted, companion_trial = _followed(scene, accepted, state, segment, length)
+        cells = state.behind + 1
+        guess = beside(accepted.now, earlier.now, state.before if state.behind else None)
+        companion_trial = _tried(scene, earlier, segment, arrival, length, cells, _COMPANION_SHARE * _SHARE, guess)
+        accepted = caught_up(scene, accepted, _moved(scene, earlier, segment.slide, cells), companion_trial)
     if arrival == end:
         accepted = entering(scene, accepted)
     step = step_of(scene, accepted, trial)
@@ -92,7 +95,7 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
 
 def _tried(
     scene: Scene,
-    state: State,
+    state: Trajectory,
     segment: Segment,
     arrival: float,
     length: float,
@@ -102,32 +105,11 @@ def _tried(
 ) -> Trial:
     """A step over so many cells, each of which takes a length. [s]"""
     assert segment.slide is not None
-    value = segment.value(arrival - state.began, state.start)
+    value = segment.value(arrival, state.start)  # it is held
     body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
     stated = cells == 1 and scene.keeps(arrival)
     trial = attempt(scene, body, segment.control, value, cells * length, rule, share, guess, stated=stated)
     return replace(trial, instant=replace(trial.instant, time=arrival), slides=True)
-
-
-def _accepted(scene: Scene, state: State, slide: Slide, trial: Trial, cells: int) -> State:
-    """State after a step; the one before is kept as the profile saw it."""
-    accepted = committed(scene, _moved(scene, state, slide, cells), trial)
-    accepted = replace(accepted, before=state.now)
-    return restarted(scene, accepted, 0.0) if state.unresolved else accepted
-
-
-def _followed(scene: Scene, accepted: State, state: State, segment: Segment, length: float) -> tuple[State, Trial]:
-    """State whose companion has come to the same instant by one step, and that step."""
-    companion = accepted.companion
-    assert companion is not None
-    assert segment.slide is not None
-    cells = state.behind + 1
-    together = state.before if state.behind else None
-    guess = beside(accepted.now, companion.now, together)
-    share = _COMPANION_SHARE * _SHARE
-    trial = _tried(scene, companion, segment, accepted.now.time, length, cells, share, guess)
-    followed = bare(_accepted(scene, companion, segment.slide, trial, cells))
-    return replace(with_cost(accepted, trial), companion=followed, behind=0), trial
 
 
 def _path(scene: Scene, state: State, accepted: State, slide: Slide) -> Slid:
@@ -145,7 +127,7 @@ def _sharpened(step: Step, earlier: Uncertainty) -> Slid | None:
     return None if slid is None else replace(slid, work=slid.work - added)
 
 
-def _moved(scene: Scene, state: State, slide: Slide, cells: int) -> State:
+def _moved(scene: Scene, state: Moved, slide: Slide, cells: int) -> Moved:
     """State of the body as it lies under the profile when that has moved by so many cells."""
 
     def moved(one: Instant) -> Instant:

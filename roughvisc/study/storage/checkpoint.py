@@ -22,7 +22,7 @@ from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.pace import Pace
-from roughvisc.mechanics.stepping.scene import Instant, State, Step
+from roughvisc.mechanics.stepping.scene import Instant, State, Step, Trajectory
 from roughvisc.mechanics.stepping.slide import Slid
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
@@ -37,7 +37,7 @@ log = logging.getLogger("roughvisc")
 _SHARE = 0.05
 #: Between two libraries in the account of what a run was computed with.
 _THEN = "; then "
-_KINDS = (State, Pace, Slid, Instant, Sparse, Uncertainty, Energy, ModesState, HistoryState, Block)
+_KINDS = (State, Trajectory, Pace, Slid, Instant, Sparse, Uncertainty, Energy, ModesState, HistoryState, Block)
 _TYPES = {kind.__name__: kind for kind in _KINDS}
 
 
