@@ -46,6 +46,11 @@ class Certificate:
         """Whether there is nothing more to find."""
         return self.converged or self.hopeless
 
+    @property
+    def bound(self) -> float:
+        """On the relative error of the pressure in the energy norm; zero of no pressure."""
+        return math.sqrt(2 * max(self.duality_gap, 0.0) / self.energy) if self.energy > 0 else 0.0
+
 
 def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array) -> tuple[Certificate, Array | None]:
     """Judge a pressure.

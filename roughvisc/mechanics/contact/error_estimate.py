@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,11 +11,17 @@ from roughvisc.mechanics.contact.certificate import Certificate
 from roughvisc.mechanics.contact.full_contact import stiffness
 from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.fields import passes
 
-# Error of a first guess that is good enough, over its relative duality gap: 1 in the median, 7 in one of fifty.
-_UNIMPROVED = 3.5
 # Safety factor of the estimated error elsewhere: without it, one estimate in fifty is below 0.8 of the true error.
 _CAUTION = 1.25
+
+
+class Asked(NamedTuple):
+    """L1 norm of the change that a preconditioned step asked for, but for the scale, and the duality gap then."""
+
+    change: float
+    duality_gap: float
 
 
 def estimated_error(
@@ -23,7 +30,7 @@ def estimated_error(
     contact: Cells,
     displacement: Array,
     certificate: Certificate,
-    asked: tuple[float, float] | None,
+    asked: Asked | None,
 ) -> float:
     """Estimated relative L1 error of the pressure.
 
@@ -37,24 +44,36 @@ def estimated_error(
         Cells that carry pressure, as flat indices.
     certificate : Certificate
         Of this pressure.
-    asked : tuple of float, or None
-        L1 norm of the change that the last preconditioned step asked for, but for the scale, and the duality gap then;
-        None where there was no such step.
+    asked : Asked or None
+        By the last preconditioned step; None where there was no such step.
     """
     if certificate.hopeless:
         return math.inf
-    # In full contact with periodic boundaries the energy is that of the pressure's variation alone. Over that of a flat
-    # surface, which is nothing but rounding, an error would be any number.
-    full = not problem.definite and contact.size == pressure.size
-    if full or not problem.sees_load:
+    if not certificate.energy > 0 and asked is None:
+        return 0.0
+    # a first guess that is good enough may be far off in few cells: its gap falls with the square of what is amiss
+    if asked is None or not is_measured(problem, contact):
         return _of_next_step(problem, pressure, contact, displacement, certificate.level)
-    duality_gap = max(certificate.duality_gap, 0.0)
-    if asked is None:
-        return _UNIMPROVED * duality_gap / certificate.energy if certificate.energy > 0 else 0.0
-    # what the last preconditioned step asked for, less as the bound has fallen since
-    change_asked, duality_gap_then = asked
-    relative = change_asked / problem.influence.scale / float(pressure.sum())
-    return _CAUTION * relative * math.sqrt(duality_gap / duality_gap_then)
+    return error_left(problem, pressure, certificate, asked)
+
+
+def is_measured(problem: Problem, contact: Cells) -> bool:
+    """Whether what a step asks for tells the error.
+
+    In full contact with periodic boundaries the energy is that of the pressure's variation alone. Over that of a flat
+    surface, which is nothing but rounding, an error would be any number.
+    """
+    return problem.sees_load and (problem.definite or contact.size < problem.gap.size)
+
+
+def error_left(problem: Problem, pressure: Array, certificate: Certificate, asked: Asked) -> float:
+    """What the last preconditioned step asked for, less as the bound has fallen since, over the pressure."""
+    load = passes.total(pressure.reshape(-1), problem.influence.threads)
+    if not load > 0:
+        return math.inf
+    relative = asked.change / problem.influence.scale / load
+    fallen = max(certificate.duality_gap, 0.0) / asked.duality_gap if asked.duality_gap > 0 else 1.0
+    return _CAUTION * relative * math.sqrt(fallen)
 
 
 def _of_next_step(problem: Problem, pressure: Array, contact: Cells, displacement: Array, level: float) -> float:

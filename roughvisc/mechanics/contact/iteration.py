@@ -8,6 +8,7 @@ a :class:`Search` how the next step is chosen, a :class:`Step` what it is conjug
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +24,7 @@ from roughvisc.mechanics.contact.descent import (
     minimum_along,
     projected_gradient,
 )
-from roughvisc.mechanics.contact.error_estimate import estimated_error
+from roughvisc.mechanics.contact.error_estimate import Asked, error_left, estimated_error, is_measured
 from roughvisc.mechanics.contact.full_contact import approach_under_load, carries_excess
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.problem import Problem
@@ -41,6 +42,8 @@ _SHRINKAGE, _GROWTH, _GROWTH_IF_CUT = 0.3, 3.0, 1.3
 # Steps are convolved in single precision on so many cells, from so many times the tolerance: some four steps pay for
 # the convolution in double precision that follows them (measured: 0.6 of the time of one in double).
 _SINGLE_FROM, _FAR = 96**2, 30.0
+# Where the error of the pressure is asked for, a duality gap of so many times its tolerance will do.
+_SLACK = 10.0
 
 
 @dataclass(frozen=True)
@@ -101,16 +104,31 @@ def solved(
     *,
     max_iterations: int,
     estimate_error: bool,
+    error_tolerance: float | None,
 ) -> ContactState:
     """Iterate from a first guess, which is used up, until the certificate settles the problem."""
     iterate = _first(problem, start, start_displacement)
     search = Search(1 / problem.influence.scale)
     previous: Step | None = None  # to conjugate to
-    asked: tuple[float, float] | None = None  # change of the pressure asked for, at which duality gap
+    asked: Asked | None = None
+    measured = estimate_error or error_tolerance is not None
+
+    def is_enough(certificate: Certificate, iterate: Iterate) -> bool:
+        if error_tolerance is None or not is_measured(problem, iterate.contact):
+            return certificate.settled
+        if certificate.hopeless or (certificate.energy > 0 and certificate.bound <= error_tolerance):
+            return True
+        return (
+            asked is not None
+            and certificate.duality_gap <= _SLACK * problem.tolerance * certificate.energy
+            and error_left(problem, iterate.pressure, certificate, asked) <= error_tolerance
+        )
+
     for iteration in range(max_iterations + 1):
         last = iteration == max_iterations
-        iterate, certificate, separation = _certified(problem, iterate, last)
-        if certificate.settled or last:
+        iterate, certificate, separation = _certified(problem, iterate, is_enough, last)
+        settled = is_enough(certificate, iterate)
+        if settled or last:
             break
         if carries_excess(problem, iterate.contact):
             iterate, previous = _without_excess(iterate), None
@@ -131,10 +149,16 @@ def solved(
                 certificate.energy,
                 step_length=search.step_length,
                 previous=previous,
-                measured=estimate_error,
+                measured=measured,
             )
             del free
-            asked = (trial.asked, certificate.duality_gap) if estimate_error else None
+            first, asked = asked is None, Asked(trial.asked, certificate.duality_gap) if measured else None
+            if first and is_enough(certificate, iterate):  # what is asked of the first guess is little
+                settled = not iterate.approximate
+                if settled:
+                    break
+                iterate, previous = _exact(problem, iterate), None
+                continue
         if not trial.slope < 0:  # no descent
             if search.spacer and not iterate.approximate:
                 break  # the projected gradient does not descend either: this is the minimum, to rounding
@@ -146,7 +170,8 @@ def solved(
     error = math.nan
     if estimate_error:
         error = estimated_error(problem, iterate.pressure, iterate.contact, iterate.displacement, certificate, asked)
-    return _result(problem, iterate, certificate, iteration, error)
+    converged = certificate.converged or (settled and not certificate.hopeless)
+    return _result(problem, iterate, replace(certificate, converged=converged), iteration, error)
 
 
 def _first(problem: Problem, start: Array | None, start_displacement: Array | None) -> Iterate:
@@ -166,11 +191,13 @@ def _exact(problem: Problem, iterate: Iterate) -> Iterate:
     return Iterate(iterate.pressure, displacement, iterate.contact, approximate=False)
 
 
-def _certified(problem: Problem, iterate: Iterate, last: bool) -> tuple[Iterate, Certificate, Array | None]:
+def _certified(
+    problem: Problem, iterate: Iterate, is_enough: Callable[[Certificate, Iterate], bool], last: bool
+) -> tuple[Iterate, Certificate, Array | None]:
     """The iterate, its certificate, which is never accepted of an approximate displacement, and its separation."""
     while True:
         certificate, separation = certify(problem, iterate.pressure, iterate.contact, iterate.displacement)
-        if not (iterate.approximate and (certificate.settled or last)):
+        if not (iterate.approximate and (last or is_enough(certificate, iterate))):
             return iterate, certificate, separation
         del separation  # a field less while the pressure is convolved anew
         iterate = _exact(problem, iterate)
@@ -243,8 +270,6 @@ def _result(
     load, approach = passes.total(pressure.reshape(-1), problem.influence.threads), certificate.level
     if problem.load is not None:
         approach = approach_under_load(problem, pressure, iterate.contact, displacement, certificate.level)
-    duality_gap, energy = max(certificate.duality_gap, 0.0), certificate.energy
-    bound = math.sqrt(2 * duality_gap / energy) if energy > 0 else 0.0
     threads = problem.influence.threads
     passes.multiply(pressure, problem.unit, threads)
     passes.multiply(displacement, problem.length, threads)
@@ -253,7 +278,7 @@ def _result(
         displacement=displacement,
         approach=approach * problem.length + problem.lowest,
         load=load * problem.unit,
-        bound=bound,
+        bound=certificate.bound,
         converged=certificate.converged,
         iterations=iterations,
         convolutions=problem.influence.convolutions,

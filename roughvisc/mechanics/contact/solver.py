@@ -35,6 +35,7 @@ def solve_contact(
     max_iterations: int = 1000,
     overwrite: bool = False,
     estimate_error: bool = False,
+    error_tolerance: float | None = None,
 ) -> ContactState:
     """Contact state under given load or given approach.
 
@@ -64,6 +65,10 @@ def solve_contact(
     estimate_error : bool
         Whether to estimate the error of the pressure. It costs nothing, but under given approach with periodic
         boundaries two applications of the preconditioner.
+    error_tolerance : float, optional
+        On the estimated error of the pressure. The state counts as converged where that is met, and the relative
+        duality gap is within 10 times its tolerance; in full contact, and under given approach, with periodic
+        boundaries by the duality gap alone.
 
     Returns
     -------
@@ -88,7 +93,14 @@ def solve_contact(
         if load is not None and present is None and (start is None or not passes.any_positive(start)):
             start, start_displacement = coarse_guess(halfspace, gap, load), None
         problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
-        return solved(problem, start, start_displacement, max_iterations=max_iterations, estimate_error=estimate_error)
+        return solved(
+            problem,
+            start,
+            start_displacement,
+            max_iterations=max_iterations,
+            estimate_error=estimate_error,
+            error_tolerance=error_tolerance,
+        )
 
 
 def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:

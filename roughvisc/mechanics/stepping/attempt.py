@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 # The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
 # as large in the median and 7 times as large in one of fifty (workflows/benchmarks/solver_error.py).
 _ALGEBRAIC = 0.03
+# Part of the tolerance that the solver's estimate of that error may take: it stops there, sooner or later.
+_SOLVED = 0.2
 _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure, in steps
 
 
@@ -81,6 +84,7 @@ def attempt(
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
         tolerance=max(_ALGEBRAIC * scene.tolerance * share, 1e-14),
+        error_tolerance=max(_SOLVED * scene.tolerance * math.sqrt(share), 1e-10),
         start=start,
         start_displacement=start_displacement,
         present=scene.present,

