@@ -54,10 +54,10 @@ STATED = 1.0
 # The same of a force that is not given, and of energies, from which a third of the difference is taken off.
 _STATED_FORCE, _STATED_ENERGY = 0.8, 0.5
 # The same where hardly any compliance is there at once: both marches then miss some part of each jump.
-_STATED_SOFT, _STATED_SOFT_ENERGY = 1.05, 1.2
-# Where hardly any compliance is there at once, pressure jumps in each cell that enters, and so much of it is in doubt
-# where a cell has entered within the companion's step.
-_ENTERED = 0.3
+_STATED_SOFT, _STATED_SOFT_ENERGY = 1.1, 1.2
+# Where hardly any compliance is there at once, pressure jumps in each cell that enters. In doubt are so many times the
+# pressure of cells that have entered within the companion's step, and of the mean pressure where cells are about to.
+_ENTERED, _ENTERING = 0.6, 2.5
 
 
 def behind(state: State, accepted: State) -> State:
@@ -133,7 +133,8 @@ def difference(
     (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
     entered, soft = 0.0, scene.is_soft(scene.program.duration)
     if earlier is not None and soft:
-        entered = _ENTERED * area * float(np.sum(fine.pressure, where=earlier.field() == 0))
+        entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))
+        entered += _ENTERING * outside * fine.force / max(fine.contact.count, 1)
     stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
     if soft:
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY

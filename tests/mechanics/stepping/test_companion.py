@@ -80,6 +80,7 @@ def matrix():
     cases = {}
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(attempt, "_ALGEBRAIC", 1e-6)
+        patched.setattr(attempt, "_SOLVED", 1e-4)
         for name in ("maxwell", "two_branches"):
             for what, program in PROGRAMS.items():
                 for surface, scene in SURFACES.items():
@@ -99,8 +100,9 @@ def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     assert np.mean(true <= TOLERANCE) >= 0.98
 
 
-def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on():
+def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on(monkeypatch):
     """Nothing is there at once, and creep takes all times: the first short step stands for the jump."""
+    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)
     soft = rv.Prony(0.0, 0.0, tuple(0.3 * 10.0 ** (0.3 * np.arange(-6, 1))), tuple(10.0 ** np.arange(-6, 1)))
     program = rv.Program().load(0.01, over=0).hold(2.0)
     found = kept(sphere(soft, program, tolerance=TOLERANCE))
@@ -112,7 +114,7 @@ def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on(
     stated, true = np.array(rows[1:]).T
     assert true.size > 20
     assert stated[0] > 0.25 * true[0]
-    assert np.mean(stated >= 0.8 * true) >= 0.95, stated / true
+    assert np.mean(stated >= 0.8 * true) >= 0.95, np.sort(stated / true)
 
 
 def test_force_error__is_nothing_where_the_load_is_given(matrix):

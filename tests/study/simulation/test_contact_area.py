@@ -44,6 +44,7 @@ def pulled(request):
     names = ("contact_area_solver_lower", "contact_area", "contact_area_solver_upper")
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(attempt, "_ALGEBRAIC", 1e-6)
+        patched.setattr(attempt, "_SOLVED", 1e-4)
         runs = {
             step: pressed(MATERIALS[request.param], PULLED, times=TIMES, time_step=step)
             for step in (0.1, 0.025, 1 / 80)
@@ -71,6 +72,7 @@ def test_interval__is_narrow_and_shrinks_with_the_steps(pulled):
 
 def test_elastic__leaves_no_cell_in_doubt_on_account_of_the_steps(monkeypatch):
     monkeypatch.setattr(attempt, "_ALGEBRAIC", 1e-6)  # nor on account of the solver
+    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)
     ds = pressed(rv.elastic(1.0), rv.Program().load(0.03, over=1.0).load(0.003, over=1.0), times=TIMES)
     assert np.array_equal(ds.contact_area_solver_lower, ds.contact_area)
     assert np.array_equal(ds.contact_area_solver_upper, ds.contact_area)
@@ -81,7 +83,7 @@ def test_interval__holds_what_the_contact_solver_leaves_in_doubt():
     loads = {"boundary": "periodic", "times": [1.0], "fields": (), "progress": False}
     found, true = (
         rv.simulate(scan, rv.elastic(1.0), rv.Program().load(0.06, over=1.0), tolerance=tolerance, **loads)
-        for tolerance in (1e-2, 1e-6)
+        for tolerance in (2e-2, 1e-6)
     )
     assert float(found.contact_area[-1]) != float(true.contact_area[-1]), "it is put to the test"
     assert found.contact_area_solver_lower[-1] <= true.contact_area[-1] <= found.contact_area_solver_upper[-1]

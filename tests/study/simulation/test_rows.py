@@ -90,20 +90,20 @@ def test_dent_left_by_a_load__is_as_uncertain_as_the_load_made_it():
 
 @pytest.mark.parametrize("control", ["approach", "load"])
 def test_steps_in_which_cells_enter__are_rows_unless_the_force_jumps_with_them(control):
-    steps = soft_steps(control)
+    steps = soft_steps(control, tolerance=5e-2)  # within three of which a cell may enter
     entered = np.array([np.any(step.state.now.pressure[step.state.before.pressure == 0] > 0) for step in steps])
     kept = np.array([keeps_its_word(step, 0.0) for step in steps])
     assert kept[~entered].any()
     assert kept[entered].any() == (control == "load")
 
 
-def soft_steps(control):
+def soft_steps(control, tolerance=1e-2):
     """Steps of a ball on a material that hardly gives way at once, by which pressure jumps with each cell."""
     shape = (33, 31)
     x, y = ((np.arange(n) - n // 2) * 0.1 for n in shape)
     gap, soft = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2), rv.zener(1.0, 0.01, 0.01)
     program = getattr(rv.Program(), control)({"approach": 0.1, "load": 5e-3}[control], over=1.0)
-    scene = Scene(HalfSpace(shape, (0.1, 0.1)), gap, soft, Modes(soft), program, tolerance=1e-2)
+    scene = Scene(HalfSpace(shape, (0.1, 0.1)), gap, soft, Modes(soft), program, tolerance=tolerance)
     return [step for step in march(scene) if step.state.before is not None]
 
 
