@@ -52,7 +52,7 @@ _GROWTH = 4.1
 #: order). Measured on workflows/benchmarks/accuracy.py: with 0.6, one row in fifteen was less accurate than stated.
 STATED = 1.0
 # The same of a force that is not given, and of energies, from which a third of the difference is taken off.
-_STATED_FORCE, _STATED_ENERGY = 0.8, 0.5
+_STATED_FORCE, _STATED_ENERGY = 0.8, 0.7
 # The same where hardly any compliance is there at once: both marches then miss some part of each jump.
 _STATED_SOFT, _STATED_SOFT_ENERGY = 1.1, 1.2
 # Where hardly any compliance is there at once, pressure jumps in each cell that enters. In doubt are so many times the
@@ -165,7 +165,7 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float) -> State:
     ahead : float
         What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
     """
-    used, earlier = (_used(scene, one) / ahead for one in (state, before))
+    used, earlier = (max(_used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before))
     return replace(state, pace=state.pace.sharpened(used, earlier))
 
 
@@ -175,6 +175,11 @@ def _used(scene: Scene, state: State) -> float:
     if scene.is_soft(scene.program.duration):  # pressure and force jump with every cell that enters
         unknown = replace(unknown, pressure=0.0, force=0.0)
     return unknown.relative(state.largest_force, state.largest_approach) / scene.tolerance
+
+
+def _used_by_work(scene: Scene, state: State) -> float:
+    """What is stated of the work, which does not fade, over the tolerance; half of it, as it is three times the error."""
+    return 0.5 * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
 
 
 def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Array) -> float:
