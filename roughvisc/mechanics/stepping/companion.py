@@ -153,7 +153,7 @@ def difference(
     )
 
 
-def sharpened(scene: Scene, before: State, state: State, ahead: float) -> State:
+def sharpened(scene: Scene, before: State, state: State, ahead: float, shown: bool) -> State:
     """State whose steps take from here on the part of the tolerance's share that what they have come to leaves them.
 
     Parameters
@@ -164,8 +164,14 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float) -> State:
         As of the last two instants at which the companion has told.
     ahead : float
         What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
+    shown : bool
+        Whether the pair is kept: the work counts at all times, what fades at kept ones.
     """
-    used, earlier = (max(_used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before))
+    used, earlier = (_used_by_work(scene, one) / ahead**2 for one in (state, before))
+    if shown:
+        used, earlier = (max(_used(scene, one) / ahead, work) for one, work in ((state, used), (before, earlier)))
+    elif used < 1:
+        return state
     return replace(state, pace=state.pace.sharpened(used, earlier))
 
 
@@ -178,7 +184,7 @@ def _used(scene: Scene, state: State) -> float:
 
 
 def _used_by_work(scene: Scene, state: State) -> float:
-    """What is stated of the work, which does not fade, over the tolerance; half of it, as it is three times the error."""
+    """Half of what is stated of the work, some three times its error, over the tolerance."""
     return 0.5 * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 from roughvisc.mechanics.fields.passes import apart
-from roughvisc.mechanics.hereditary.exponentials import STIFF, Rule
+from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes, Rule
+from roughvisc.mechanics.stepping.fading import fading
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
@@ -29,6 +30,8 @@ _LINEAR, _DAMPED = 4.2, 8.4
 _FASTEST, _EASY = 4.0, 0.02
 # What can be wrong by less than this part of the tolerance is not looked at.
 _NOT_SEEN = 0.01
+# Of a step's error, what does not fade counts: what it adds to the work, less its leading part.
+_NOT_FADING = 0.2
 # Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
 _ROUNDING = 1e-11
 
@@ -47,6 +50,20 @@ def retarded(scene: Scene, length: float) -> float:
     if final == 0:
         return 0.0
     return (max(final - scene.compliance(length), 0.0) + _crept_within(scene, length)) / final
+
+
+def counted(scene: Scene, state: State, length: float) -> float:
+    """Part of the error of a step's pressure that counts, at the next kept time or a later one. [-]"""
+    share, left = retarded(scene, length), scene.next_kept(state.now.time) - state.now.time
+    if not (math.isfinite(left) and isinstance(scene.memory, Modes) and is_gentle(scene)):
+        return share
+    weight = fading(scene.memory.material, scene.program.duration).weight(max(left, length), length)
+    return min(share, max(weight, _NOT_FADING * share))
+
+
+def is_gentle(scene: Scene) -> bool:
+    """Whether the material follows at once so far that no cell that enters makes the pressure jump."""
+    return scene.remembers and not scene.is_soft(scene.program.duration)
 
 
 def _crept_within(scene: Scene, length: float) -> float:
@@ -107,10 +124,10 @@ def _first_length(scene: Scene, state: State, segment: Segment, event: float) ->
     while length > SMALLEST_STEP * span:
         now = scene.compliance(length)
         crept = _crept_within(scene, length) / now * min(1.0, now / glassy - 1) if glassy else 0.0
-        if retarded(scene, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
+        if counted(scene, state, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
             break
         length /= 1.5
-    wrong = retarded(scene, length)
+    wrong = counted(scene, state, length)
     if state.now.force == 0:
         length = min(length, 2 * _allowed(scene, state) / wrong * (event - state.now.time)) if wrong else length
     if state.unresolved:
@@ -139,7 +156,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
         return math.nan
     if not scene.remembers:
         return 0.0
-    share = retarded(scene, trial.length)
+    share = counted(scene, state, trial.length)
     last = state.now.time - state.before.time
     ahead = max(1.0, growth(state, segment, trial.instant.time, event))
     soft = 1.0
@@ -162,10 +179,12 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     if segment.control == "approach":  # no force is negative
         ahead_of_it = max(ahead_of_it, 0.0)
     scalar_error = abs(found - ahead_of_it) / scale if scale > 0 else 0.0
-    fading = _fading(scene, state, trial, event)
+    faded = _faded(scene, state, trial, event)
     if segment.control == "approach":
-        scalar_error *= fading
-    return share * _error_constant(trial, last) * max(fading * pressure_error, scalar_error)
+        scalar_error *= faded
+    if segment.control == "load" and scene.times is not None and is_gentle(scene) and not _receding(state, trial):
+        scalar_error = 0.0  # while contact grows under a load the approach has none, whatever the steps
+    return share * _error_constant(trial, last) * max(faded * pressure_error, scalar_error)
 
 
 def _unresolved_approach(scene: Scene, now: Instant) -> float:
@@ -179,7 +198,7 @@ def _error_constant(trial: Trial, last: float) -> float:
     return trial.length / (6 * (trial.length + last)) if trial.rule == "linear" else 1 / 3
 
 
-def _fading(scene: Scene, state: State, trial: Trial, event: float) -> float:
+def _faded(scene: Scene, state: State, trial: Trial, event: float) -> float:
     """What an error in the pressure of a step counts for at the next kept time.
 
     Where hardly any compliance is there at once, each cell that enters makes the pressure jump. What a step gets

@@ -32,6 +32,7 @@ from roughvisc.mechanics.stepping.control import (
     error_limit,
     estimate,
     growth,
+    is_gentle,
     rule_for,
     shortest_step,
     step_length,
@@ -258,7 +259,7 @@ def _judged(
     step = compared(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
-        return replace(step, state=sharpened(scene, state, step.state, ahead))
+        return replace(step, state=sharpened(scene, state, step.state, ahead, asked or not is_gentle(scene)))
     return stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
 
 
