@@ -223,7 +223,8 @@ def test_lengths__are_neutral(scale):
         ball = rv.sphere(R * unit, SIZE * unit, SHAPE)
         runs.append(simulate(ball, ZENER, program, times=5, tolerance=1e-4))
     one, other = runs
-    assert int(one.convolutions.sum()) == int(other.convolutions.sum())
+    # an error that is at its limit, to rounding, costs an iteration more or less
+    assert int(one.convolutions.sum()) == pytest.approx(int(other.convolutions.sum()), rel=0.01)
     for name, power in (("pressure", 0), ("approach", 1), ("contact_area", 2), ("work", 3), ("gap", 1)):
         expected = one[name].values * scale**power
         # rounding of the coordinates, 1e-14 of the kernel, comes through 200 steps of chosen length

@@ -116,13 +116,13 @@ def solved(
     def is_enough(certificate: Certificate, iterate: Iterate) -> bool:
         if error_tolerance is None or not is_measured(problem, iterate.contact):
             return certificate.settled
-        if certificate.hopeless or (certificate.energy > 0 and certificate.bound <= error_tolerance):
+        if certificate.hopeless:
             return True
-        return (
-            asked is not None
-            and certificate.duality_gap <= _SLACK * problem.tolerance * certificate.energy
-            and error_left(problem, iterate.pressure, certificate, asked) <= error_tolerance
-        )
+        if not (certificate.energy > 0 and certificate.duality_gap <= _SLACK * problem.tolerance * certificate.energy):
+            return False
+        if certificate.bound <= error_tolerance:
+            return True
+        return asked is not None and error_left(problem, iterate.pressure, certificate, asked) <= error_tolerance
 
     for iteration in range(max_iterations + 1):
         last = iteration == max_iterations

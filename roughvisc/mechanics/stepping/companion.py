@@ -55,9 +55,9 @@ STATED = 1.0
 _STATED_FORCE, _STATED_ENERGY = 0.8, 0.7
 # The same where hardly any compliance is there at once: both marches then miss some part of each jump.
 _STATED_SOFT, _STATED_SOFT_ENERGY = 1.1, 1.2
-# Where hardly any compliance is there at once, pressure jumps in each cell that enters. In doubt are so many times the
-# pressure of cells that have entered within the companion's step, and of the mean pressure where cells are about to.
-_ENTERED, _ENTERING = 0.6, 2.5
+# There, pressure jumps in each cell that enters. In doubt are so many times the pressure of cells that have entered
+# within the companion's step, and of the mean pressure where cells are about to.
+_ENTERED, _ENTERING = 0.3, 2.5
 
 
 def behind(state: State, accepted: State) -> State:
@@ -184,8 +184,9 @@ def _used(scene: Scene, state: State) -> float:
 
 
 def _used_by_work(scene: Scene, state: State) -> float:
-    """Half of what is stated of the work, some three times its error, over the tolerance."""
-    return 0.5 * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
+    """What is stated of the work, over the tolerance, less as it is some times its error."""
+    part = 0.25 if scene.is_soft(scene.program.duration) else 0.5
+    return part * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
 
 
 def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Array) -> float:

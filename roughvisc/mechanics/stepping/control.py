@@ -31,7 +31,7 @@ _FASTEST, _EASY = 4.0, 0.02
 # What can be wrong by less than this part of the tolerance is not looked at.
 _NOT_SEEN = 0.01
 # Of a step's error, what does not fade counts: what it adds to the work, less its leading part.
-_NOT_FADING = 0.2
+_NOT_FADING = 0.35
 # Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
 _ROUNDING = 1e-11
 
@@ -124,10 +124,10 @@ def _first_length(scene: Scene, state: State, segment: Segment, event: float) ->
     while length > SMALLEST_STEP * span:
         now = scene.compliance(length)
         crept = _crept_within(scene, length) / now * min(1.0, now / glassy - 1) if glassy else 0.0
-        if counted(scene, state, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
+        if retarded(scene, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
             break
         length /= 1.5
-    wrong = counted(scene, state, length)
+    wrong = retarded(scene, length)
     if state.now.force == 0:
         length = min(length, 2 * _allowed(scene, state) / wrong * (event - state.now.time)) if wrong else length
     if state.unresolved:
@@ -156,7 +156,9 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
         return math.nan
     if not scene.remembers:
         return 0.0
-    share = counted(scene, state, trial.length)
+    # what contact leaves behind as it recedes does not fade as what stays in contact does
+    receding = _receding(state, trial)
+    share = retarded(scene, trial.length) if receding else counted(scene, state, trial.length)
     last = state.now.time - state.before.time
     ahead = max(1.0, growth(state, segment, trial.instant.time, event))
     soft = 1.0
@@ -182,7 +184,7 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     faded = _faded(scene, state, trial, event)
     if segment.control == "approach":
         scalar_error *= faded
-    if segment.control == "load" and scene.times is not None and is_gentle(scene) and not _receding(state, trial):
+    if segment.control == "load" and scene.times is not None and is_gentle(scene) and not receding:
         scalar_error = 0.0  # while contact grows under a load the approach has none, whatever the steps
     return share * _error_constant(trial, last) * max(faded * pressure_error, scalar_error)
 

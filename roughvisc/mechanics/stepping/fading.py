@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 # Ages at which the weight of a step is tabulated, over the shortest time of the material, and how many in a decade.
 _YOUNGEST, _PER_DECADE = 1e-4, 12
 # Part of what is allowed that the last step before a kept time may take by what it gets wrong of its own end.
-_LAST = 0.12
+_LAST = 0.06
 
 
 class Fading:
@@ -46,7 +46,8 @@ class Fading:
             weights = np.append(weights, series.fluidity)
         driven = np.sqrt(gains * weights / series.glassy)
         self._times, self._flows = times, bool(series.fluidity)
-        self._decays, basis = np.linalg.eigh(np.diag(rates) + np.outer(driven, driven))
+        decays, basis = np.linalg.eigh(np.diag(rates) + np.outer(driven, driven))
+        self._decays = np.maximum(decays, 0.0)  # it is no less than that, to rounding
         self._driven = driven @ basis
         self._read = basis.T * np.sqrt(weights / (gains * series.glassy))
         fastest = 1 / float(self._decays.max())
@@ -70,9 +71,11 @@ class Fading:
 
         Notes
         -----
-        The fewest steps that keep to what is allowed at a kept time err by what is allowed over
+        The fewest steps that keep to what is allowed at a kept time err by what is left of that over
         ``rho(theta)^(2/3) int_0^theta rho^(1/3)`` each, with the rate ``rho(t) = b exp(-S t) b`` at which an error
-        fades. What a step gets wrong of its own end does not follow from its mean error, and is asked for besides.
+        fades. What is left of it is not counted: it is taken as all. Steps that all use up what they may come to two
+        to four times as much, and those of a march stay well below that, since their lengths double at most. What a
+        step gets wrong of its own end does not follow from its mean error, and is asked for besides.
         """
         mean = float(np.interp(left, self._ages, self._weights))
         x = step / self._times
