@@ -12,6 +12,7 @@ from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import attempt, companion
 from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.simulation.rows import keeps_its_word
@@ -227,3 +228,38 @@ def test_material_that_relaxes_at_once__takes_the_steps_of_an_elastic_one(what):
     for name in ("force", "approach"):
         one, other = (np.array([getattr(rows[t], name) for t in TIMES]) for rows in (found, exact))
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-3 * other.max())
+
+
+def test_cell_that_may_enter__puts_the_mean_pressure_in_doubt_where_it_jumps(monkeypatch):
+    """It jumps on a solid that hardly gives way at once, and rises by and by on one that does."""
+    program, found = rv.Program().load(0.03, over=1.0), {}
+    for cells in (0, 2):
+        monkeypatch.setattr(companion, "_undecided", lambda *asked, cells=cells: (0, cells))
+        for name, material in (("jumps", rv.zener(1.0, 0.01, 0.01)), ("gentle", MATERIALS["zener"])):
+            steps = march(sphere(material, program, times=(1.0,), tolerance=TOLERANCE))
+            found[name, cells] = [step for step in steps if step.shown.time == 1.0][-1]
+    mean = found["jumps", 0].shown.force / found["jumps", 0].state.now.contact.count
+    more = found["jumps", 2].uncertainty.pressure - found["jumps", 0].uncertainty.pressure
+    assert more == pytest.approx(2.5 * 2 * mean, rel=1e-9)
+    assert more < found["jumps", 0].shown.force
+    assert found["gentle", 2].uncertainty.pressure == found["gentle", 0].uncertainty.pressure
+
+
+def test_work_in_doubt__shortens_steps_that_are_not_shown_too():
+    *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
+    scene, state = last.scene, replace(last.state, pace=Pace())
+
+    def doubtful(part):
+        return replace(state, uncertainty=Uncertainty(work=part * TOLERANCE * state.largest_work))
+
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 1.0, shown=False).pace.sharpness == 0.5
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(1.0), 1.0, shown=False).pace.sharpness == 1.0
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 2.0, shown=False).pace.sharpness == 1.0
+
+
+def test_what_fades__shortens_steps_where_it_is_shown():
+    *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
+    state = replace(last.state, pace=Pace())
+    far_off = replace(state, uncertainty=Uncertainty(pressure=2 * TOLERANCE * state.largest_force))
+    assert companion.sharpened(last.scene, state, far_off, 1.0, shown=True).pace.sharpness == 0.5
+    assert companion.sharpened(last.scene, state, far_off, 1.0, shown=False).pace.sharpness == 1.0
