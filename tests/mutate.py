@@ -33,7 +33,8 @@ ROOMS = {
     "contact": (("mechanics/contact",), ("mechanics/contact", "mechanics/test_contact.py")),
     "stepping": (
         tuple(f"mechanics/stepping/{name}.py" for name in (
-            "apart", "attempt", "companion", "control", "domain", "energy", "events", "fading", "march", "pace", "scene",
+            "apart", "attempt", "companion", "control", "domain", "energy", "events", "fading", "march", "pace",
+            "scene",
         )),
         ("mechanics/stepping", "study/storage/test_checkpoint.py", "test_convergence.py"),
     ),

@@ -56,7 +56,8 @@ _STATED_FORCE, _STATED_ENERGY = 0.8, 0.7
 # The same where hardly any compliance is there at once: both marches then miss some part of each jump.
 _STATED_SOFT, _STATED_SOFT_ENERGY = 1.1, 1.2
 # There, pressure jumps in each cell that enters. In doubt are so many times the pressure of cells that have entered
-# within the companion's step, and of the mean pressure where cells are about to.
+# within the companion's step, and of the mean pressure where cells are about to
+# and hardly any of the step's own compliance is there at once.
 _ENTERED, _ENTERING = 0.3, 2.5
 
 
@@ -134,7 +135,8 @@ def difference(
     entered, soft = 0.0, scene.is_soft(scene.program.duration)
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))
-        entered += _ENTERING * outside * fine.force / max(fine.contact.count, 1)
+        if companion.before is None or scene.is_soft(coarse.time - companion.before.time):
+            entered += _ENTERING * outside * fine.force / max(fine.contact.count, 1)
     stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
     if soft:
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
@@ -153,7 +155,7 @@ def difference(
     )
 
 
-def sharpened(scene: Scene, before: State, state: State, ahead: float, shown: bool) -> State:
+def sharpened(scene: Scene, before: State, state: State, ahead: float, left: float) -> State:
     """State whose steps take from here on the part of the tolerance's share that what they have come to leaves them.
 
     Parameters
@@ -164,14 +166,12 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float, shown: bo
         As of the last two instants at which the companion has told.
     ahead : float
         What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
-    shown : bool
-        Whether the pair is kept: the work counts at all times, what fades at kept ones.
+    left : float
+        Part of the error of the pressure that is left at the next kept time; that of the work does not fade.
     """
-    used, earlier = (_used_by_work(scene, one) / ahead**2 for one in (state, before))
-    if shown:
-        used, earlier = (max(_used(scene, one) / ahead, work) for one, work in ((state, used), (before, earlier)))
-    elif used < 1:
-        return state
+    used, earlier = (
+        max(left * _used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before)
+    )
     return replace(state, pace=state.pace.sharpened(used, earlier))
 
 

@@ -61,6 +61,16 @@ def counted(scene: Scene, state: State, length: float) -> float:
     return min(share, max(weight, _NOT_FADING * share))
 
 
+def remaining(scene: Scene, state: State) -> float:
+    """Part of the error of a state's pressure that is left at the next kept time. [-]"""
+    left = scene.next_kept(state.now.time) - state.now.time
+    if scene.keeps(state.now.time) or not (
+        math.isfinite(left) and isinstance(scene.memory, Modes) and is_gentle(scene)
+    ):
+        return 1.0
+    return fading(scene.memory.material, scene.program.duration).remaining(left)
+
+
 def is_gentle(scene: Scene) -> bool:
     """Whether the material follows at once so far that no cell that enters makes the pressure jump."""
     return scene.remembers and not scene.is_soft(scene.program.duration)
@@ -156,9 +166,10 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
         return math.nan
     if not scene.remembers:
         return 0.0
-    # what contact leaves behind as it recedes does not fade as what stays in contact does
-    receding = _receding(state, trial)
-    share = retarded(scene, trial.length) if receding else counted(scene, state, trial.length)
+    # what contact leaves behind as it recedes does not fade as what stays in contact does, and the second step after an
+    # event also judges the first one
+    receding, second = _receding(state, trial), state.before.time <= state.began
+    share = retarded(scene, trial.length) if receding or second else counted(scene, state, trial.length)
     last = state.now.time - state.before.time
     ahead = max(1.0, growth(state, segment, trial.instant.time, event))
     soft = 1.0

@@ -54,10 +54,14 @@ class Fading:
         decades = max(np.log10(duration / (_YOUNGEST * fastest)), 1.0)
         self._ages = np.geomspace(_YOUNGEST * min(fastest, duration), duration, int(_PER_DECADE * decades))
         rate = np.maximum(np.exp(-np.outer(self._ages, self._decays)) @ self._driven**2, 0.0)
-        root = np.cbrt(rate)
+        self._left, root = rate / float(self._driven @ self._driven), np.cbrt(rate)
         past = np.cumsum(0.5 * (root[1:] + root[:-1]) * np.diff(self._ages))
         weight = root**2 * np.append(0.0, past)
         self._weights = np.maximum.accumulate(weight[::-1])[::-1]  # at this kept time or a later one
+
+    def remaining(self, left: float) -> float:
+        """Part of an error of the pressure that is left after a time. [s]"""
+        return float(np.interp(left, self._ages, self._left))
 
     def weight(self, left: float, step: float) -> float:
         """Largest part of the error of a step that is left at a kept time.

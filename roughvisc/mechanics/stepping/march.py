@@ -32,7 +32,7 @@ from roughvisc.mechanics.stepping.control import (
     error_limit,
     estimate,
     growth,
-    is_gentle,
+    remaining,
     rule_for,
     shortest_step,
     step_length,
@@ -259,7 +259,9 @@ def _judged(
     step = compared(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
-        return replace(step, state=sharpened(scene, state, step.state, ahead, asked or not is_gentle(scene)))
+        return replace(
+            step, state=sharpened(scene, state, step.state, ahead, 1.0 if asked else remaining(scene, accepted))
+        )
     return stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
 
 

@@ -252,14 +252,14 @@ def test_work_in_doubt__shortens_steps_that_are_not_shown_too():
     def doubtful(part):
         return replace(state, uncertainty=Uncertainty(work=part * TOLERANCE * state.largest_work))
 
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 1.0, shown=False).pace.sharpness == 0.5
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(1.0), 1.0, shown=False).pace.sharpness == 1.0
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 2.0, shown=False).pace.sharpness == 1.0
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 1.0, left=0.01).pace.sharpness == 0.5
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(1.0), 1.0, left=0.01).pace.sharpness == 1.0
+    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 2.0, left=0.01).pace.sharpness == 1.0
 
 
 def test_what_fades__shortens_steps_where_it_is_shown():
     *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
     state = replace(last.state, pace=Pace())
     far_off = replace(state, uncertainty=Uncertainty(pressure=2 * TOLERANCE * state.largest_force))
-    assert companion.sharpened(last.scene, state, far_off, 1.0, shown=True).pace.sharpness == 0.5
-    assert companion.sharpened(last.scene, state, far_off, 1.0, shown=False).pace.sharpness == 1.0
+    assert companion.sharpened(last.scene, state, far_off, 1.0, left=1.0).pace.sharpness == 0.5
+    assert companion.sharpened(last.scene, state, far_off, 1.0, left=0.01).pace.sharpness == 1.0

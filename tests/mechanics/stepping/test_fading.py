@@ -97,3 +97,12 @@ def test_one_kept_time__costs_less_and_is_as_right_as_asked(name, what):
     assert off <= 1e-3 * exact.state.largest_force
     assert abs(last.work - exact.work) <= 1e-3 * exact.state.largest_work
     assert last.time_error <= 1e-3 * 1.5
+
+
+@pytest.mark.parametrize("name", SERIES)
+def test_error_of_the_pressure__is_left_as_a_kick_of_long_ago_is(name):
+    fading = Fading(SERIES[name], 10.0)
+    now = pressure_left(SERIES[name], 1.0, 1e-4, 1.0 + 1e-4)
+    for after in (0.0, 0.03, 0.3, 2.0):
+        later = pressure_left(SERIES[name], 1.0, 1e-4, 1.0 + 1e-4 + after)
+        assert fading.remaining(after) == pytest.approx(later / now, rel=0.05, abs=1e-3)

@@ -189,7 +189,7 @@ def test_approach__opens_and_closes_when_the_dent_has_recovered():
     assert at[11.15].shown.force > 0
     level = scene(material, program).gap
     for time in (3.15, 11.15):
-        assert np.min(level + at[time].displacement) - at[time].level > -1e-5 * at[time].level
+        assert np.min(level + at[time].displacement) - at[time].level > -5e-5 * at[time].level
 
 
 def test_hold_of_approach__relaxes_the_load():
