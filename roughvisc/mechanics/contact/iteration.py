@@ -118,7 +118,7 @@ def solved(
             return certificate.settled
         if certificate.hopeless:
             return True
-        if not (certificate.energy > 0 and certificate.duality_gap <= _SLACK * problem.tolerance * certificate.energy):
+        if certificate.duality_gap > _SLACK * problem.tolerance * certificate.energy:
             return False
         if certificate.bound <= error_tolerance:
             return True

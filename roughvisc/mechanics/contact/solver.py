@@ -63,8 +63,8 @@ def solve_contact(
     overwrite : bool
         Whether `gap`, `start` and `start_displacement` may be used up, which spares copies of them.
     estimate_error : bool
-        Whether to estimate the error of the pressure. It costs nothing, but under given approach with periodic
-        boundaries two applications of the preconditioner.
+        Whether to estimate the error of the pressure. It costs nothing, but an application of the preconditioner where
+        the first guess was good enough, in full contact, and under given approach with periodic boundaries.
     error_tolerance : float, optional
         On the estimated error of the pressure. The state counts as converged where that is met, and the relative
         duality gap is within 10 times its tolerance; in full contact, and under given approach, with periodic

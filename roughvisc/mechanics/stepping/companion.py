@@ -56,9 +56,12 @@ _STATED_FORCE, _STATED_ENERGY = 0.8, 0.7
 # The same where hardly any compliance is there at once: both marches then miss some part of each jump.
 _STATED_SOFT, _STATED_SOFT_ENERGY = 1.1, 1.2
 # There, pressure jumps in each cell that enters. In doubt are so many times the pressure of cells that have entered
-# within the companion's step, and of the mean pressure where cells are about to
-# and hardly any of the step's own compliance is there at once.
+# within the companion's step; and of the mean pressure for each cell that march and companion disagree on, where hardly
+# any of the step's own compliance is there at once.
 _ENTERED, _ENTERING = 0.3, 2.5
+# Part of what is stated of the work that counts where steps are shortened, since it is some times the error; and the
+# same where hardly any compliance is there at once.
+_USED_BY_WORK, _USED_BY_SOFT_WORK = 0.5, 0.25
 
 
 def behind(state: State, accepted: State) -> State:
@@ -169,6 +172,7 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float, left: flo
     left : float
         Part of the error of the pressure that is left at the next kept time; that of the work does not fade.
     """
+    # the work goes about as the square of what is prescribed
     used, earlier = (
         max(left * _used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before)
     )
@@ -184,8 +188,8 @@ def _used(scene: Scene, state: State) -> float:
 
 
 def _used_by_work(scene: Scene, state: State) -> float:
-    """What is stated of the work, over the tolerance, less as it is some times its error."""
-    part = 0.25 if scene.is_soft(scene.program.duration) else 0.5
+    """A part of what is stated of the work, over the tolerance."""
+    part = _USED_BY_SOFT_WORK if scene.is_soft(scene.program.duration) else _USED_BY_WORK
     return part * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
 
 
@@ -268,10 +272,10 @@ def stating(step: Step, uncertainty: Uncertainty) -> Step:
 
 
 def in_pairs(steps: Held) -> Through:
-    """The same steps; the first of a pair is held till the companion has told of both, with the second one.
+    """The same steps, the first of a pair held until the second one tells how far off both are.
 
-    Not so where it is neither kept nor the first after an event, whose error is none that the one before told, and
-    where the grid is about to grow.
+    Only a step that is kept or that follows an event is held; any other goes on at once with the error stated last.
+    Before the grid grows the step that is held goes on, since its fields are those of the smaller grid.
     """
     first = None
     while True:

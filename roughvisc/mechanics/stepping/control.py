@@ -9,7 +9,7 @@ import math
 
 from roughvisc.mechanics.fields.passes import apart
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes, Rule
-from roughvisc.mechanics.stepping.fading import fading
+from roughvisc.mechanics.stepping.fading import Fading, fading
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
@@ -54,21 +54,30 @@ def retarded(scene: Scene, length: float) -> float:
 
 def counted(scene: Scene, state: State, length: float) -> float:
     """Part of the error of a step's pressure that counts, at the next kept time or a later one. [-]"""
-    share, left = retarded(scene, length), scene.next_kept(state.now.time) - state.now.time
-    if not (math.isfinite(left) and isinstance(scene.memory, Modes) and is_gentle(scene)):
+    share, left, known = retarded(scene, length), _left(scene, state), _fading(scene)
+    if known is None or math.isinf(left):
         return share
-    weight = fading(scene.memory.material, scene.program.duration).weight(max(left, length), length)
-    return min(share, max(weight, _NOT_FADING * share))
+    return min(share, max(known.weight(max(left, length), length), _NOT_FADING * share))
 
 
 def remaining(scene: Scene, state: State) -> float:
     """Part of the error of a state's pressure that is left at the next kept time. [-]"""
-    left = scene.next_kept(state.now.time) - state.now.time
-    if scene.keeps(state.now.time) or not (
-        math.isfinite(left) and isinstance(scene.memory, Modes) and is_gentle(scene)
-    ):
+    left, known = _left(scene, state), _fading(scene)
+    if known is None or math.isinf(left) or scene.keeps(state.now.time):
         return 1.0
-    return fading(scene.memory.material, scene.program.duration).remaining(left)
+    return known.remaining(left)
+
+
+def _left(scene: Scene, state: State) -> float:
+    """Time till the next kept time, infinite if there is none. [s]"""
+    return scene.next_kept(state.now.time) - state.now.time
+
+
+def _fading(scene: Scene) -> Fading | None:
+    """How errors of the pressure fade; None where cells that enter make it jump, or the memory is no series."""
+    if not (isinstance(scene.memory, Modes) and is_gentle(scene)):
+        return None
+    return fading(scene.memory.material, scene.program.duration)
 
 
 def is_gentle(scene: Scene) -> bool:
