@@ -32,12 +32,12 @@ def neighbours(mask: Mask, periodic: bool, before: bool = False, beyond: bool = 
     >>> [seen.ravel().tolist() for seen in neighbours(np.array([[True], [False]]), False)][:2]
     [[False, True], [False, False]]
     """
-    for axis in (0, 1):
-        for shift, border, outside in ((1, 0, before), (-1, -1, beyond)):
-            seen = np.roll(mask, shift, axis)
-            if not periodic:
-                np.moveaxis(seen, axis, 0)[border] = outside
-            yield seen
+    for turned in (False, True):
+        own = mask.T if turned else mask
+        lower, upper = np.empty_like(own), np.empty_like(own)
+        lower[1:], lower[0] = own[:-1], own[-1] if periodic else before
+        upper[:-1], upper[-1] = own[1:], own[0] if periodic else beyond
+        yield from (lower.T, upper.T) if turned else (lower, upper)
 
 
 def faces_between(contact: Mask, free: Mask, periodic: bool, **outside: bool) -> int:

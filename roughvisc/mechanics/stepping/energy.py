@@ -13,6 +13,7 @@ step, and no convolution. For pressure that is linear in each step they are exac
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
-from roughvisc.mechanics.materials.prony import one_less_mean_decay
+from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,6 @@ def after_step(
     squared = own * crossed + after * beside + before * (own * energy.beside + before * first + after * both)
     if np.any(earlier):  # this rule takes nothing from p_n
         squared = squared + earlier * (own * energy.crossed + earlier * energy.earlier + after * behind)
-    x = step / np.array(memory.material.times)
     flowed = step * (first + both + last) / 3
     # the work of the mean pressure on the change of an element, less what it stores: <(p_n + p_n+1) / 2, z_n+1 - z_n>
     held = own * energy.beside + earlier * energy.lagged + before * first + after * both  # <p_n, z_n+1>
@@ -151,14 +151,15 @@ def after_step(
         lag = first - 2 * energy.beside + energy.own  # <w, w> with w = p_n - z_n; d = p_n+1 - p_n
         drift = both - first - ahead + energy.beside  # <w, d>
         change = last - 2 * both + first  # <d, d>
-        mean, twice = one_less_mean_decay(x), one_less_mean_decay(2 * x)
-        exact = weights * (x * (1 - twice) * lag + 2 * (twice - mean) * drift + _both_rises(x) * change)
+        of_lag, of_drift, of_change = _lost(memory.material, step)
+        exact = weights * (of_lag * lag + of_drift * drift + of_change * change)
+        quick = np.array(memory.material.times) < step
         if fresh:
-            unresolved += _PATH * float(np.sum(np.abs(lost - exact), where=x > 1))
+            unresolved += _PATH * float(np.sum(np.abs(lost - exact), where=quick))
         if rule == "linear":
-            lost = np.where(fresh & (x > 1), lost, exact)
+            lost = np.where(fresh & quick, lost, exact)
     if rule == "right":
-        lost = weights * x * (1 - one_less_mean_decay(2 * x)) * (last - 2 * ahead + energy.own)
+        lost = weights * _lost(memory.material, step)[0] * (last - 2 * ahead + energy.own)
         flowed = step * last
     elif jumped and rule != "linear":
         lost = weights * (beside - ahead - 0.5 * (squared - energy.own))
@@ -168,6 +169,14 @@ def after_step(
     if work is not None:
         dissipated, unresolved = work - (stored - energy.stored), energy.unresolved
     return Energy(stored, energy.dissipated + dissipated, unresolved, last, beside, ahead, squared, crossed, energy.own)
+
+
+@lru_cache(maxsize=8)
+def _lost(material: Prony, step: float) -> tuple[Array, Array, Array]:
+    """What elements lose in a step, over their compliance: factors of ``<w, w>``, ``<w, d>`` and ``<d, d>``."""
+    x = step / np.array(material.times)
+    mean, twice = one_less_mean_decay(x), one_less_mean_decay(2 * x)
+    return x * (1 - twice), 2 * (twice - mean), _both_rises(x)
 
 
 # (-1)^(k+1) (2 - 2^k) / (k+1)! for k >= 2: up to 0.3 the next term is below rounding

@@ -100,8 +100,10 @@ class Rows:
             "time": shown.time,
             "force": shown.force,
             "approach": shown.approach,
-            **stated(step, self.series_error),
-            **stated_area(step, contact, touching, area),
+            "work": step.work,
+            "stored_energy": step.stored,
+            "dissipated_energy": step.dissipated,
+            "time_error": step.time_error,
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
             "status": self._status(step, converged, contact),
@@ -113,6 +115,8 @@ class Rows:
             **self._mean_plane(shown.approach),
             **friction_row(step),
         }
+        if kept:
+            row |= stated(step, self.series_error) | stated_area(step, contact, touching, area)
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
         self._store.append({"row": row, "grid": grid, "kept": kept, "border": self.border}, _of_their_own(arrays))
 
@@ -124,7 +128,7 @@ class Rows:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
         height, kept = self._ground.height, self._kept()
         rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
-        columns = {name: np.array([rows[number][name] for number in kept]) for name in rows[0]}
+        columns = {name: np.array([rows[number][name] for number in kept]) for name in (rows[kept[0]] if kept else ())}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
         columns["nominal_pressure"] = columns["force"] / self._ground.nominal_area

@@ -65,7 +65,7 @@ def stated_area(step: Step, contact: NDArray[np.bool_], counted: float, area: fl
 
 
 def stated(step: Step, series_error: float) -> dict[str, float]:
-    """Work and energies of a step, and what is stated of its accuracy.
+    """What is stated of the accuracy of a step.
 
     Parameters
     ----------
@@ -101,11 +101,7 @@ def stated(step: Step, series_error: float) -> dict[str, float]:
     )
     carried = _SUMMED * solved + series_error
     return {
-        "work": step.work,
-        "stored_energy": step.stored,
-        "dissipated_energy": step.dissipated,
         "stated_error": relative,
-        "time_error": step.time_error,
         "residual": step.residual,
         "residual_bound": step.bound,
         "pressure_error": pressure,
