@@ -90,7 +90,11 @@ def orders(material, program, grid, counts):
 
 @pytest.mark.parametrize(
     "name",
-    ["maxwell", "zener_equal", *(pytest.param(n, marks=pytest.mark.long) for n in ("power_law", "two_branches"))],
+    [
+        "zener_equal",
+        pytest.param("maxwell", marks=pytest.mark.thorough),
+        *(pytest.param(n, marks=pytest.mark.long) for n in ("power_law", "two_branches")),
+    ],
 )
 @pytest.mark.parametrize("program", ["triangle", "jump"])
 @pytest.mark.parametrize("grid", [uniform, pytest.param(random, marks=pytest.mark.long)], ids=["uniform", "random"])
@@ -101,6 +105,7 @@ def test_instantaneous_compliance__second_order(name, program, grid):
     assert min(orders(MATERIALS[name], PROGRAMS[program], grid, counts)) > least
 
 
+@pytest.mark.thorough
 def test_power_law_through_a_jump__second_order_on_graded_steps():
     assert min(orders(MATERIALS["power_law"], PROGRAMS["jump"], graded, (16, 32, 64))) > 1.7
 
@@ -132,6 +137,6 @@ def test_no_instantaneous_compliance__approach_of_second_order_on_graded_steps(n
     assert orders(MATERIALS[name], PROGRAMS[program], graded, counts)[1] > 1.7
 
 
-@pytest.mark.parametrize("name", ["maxwell", "zener_equal", "kelvin_voigt"])
+@pytest.mark.parametrize("name", ["zener_equal", "kelvin_voigt", pytest.param("maxwell", marks=pytest.mark.thorough)])
 def test_opening_and_closing__approach_of_second_order(name):
     assert orders(MATERIALS[name], PROGRAMS["opening"], graded, (16, 32, 64))[1] > 1.7

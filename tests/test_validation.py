@@ -14,7 +14,9 @@ def radius_of(ds):
     return np.sqrt(ds.contact_area.values / np.pi)
 
 
-@pytest.mark.parametrize("cells", [129, pytest.param(257, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "cells", [pytest.param(129, marks=pytest.mark.thorough), pytest.param(257, marks=pytest.mark.long)]
+)
 def test_ting__triangle_of_load_on_a_sphere(cells):
     """Printed for R = 1, nu = 1/2: approach .43252 and .34843, radius .63283 and .47967, at t = 1.5 and 1.8."""
     sphere = rv.sphere(1.0, size=2.7, shape=(cells, cells - 2))

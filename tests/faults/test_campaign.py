@@ -127,6 +127,7 @@ def test_campaign__notices_a_row_that_is_lost(tmp_path, monkeypatch):
     assert any("rows served" in one for one in found)
 
 
+@pytest.mark.thorough
 def test_campaign__notices_a_checksum_that_is_not_looked_at(tmp_path, monkeypatch):
     found = planted(
         "scans",

@@ -345,7 +345,14 @@ def test_reduced_contact__growth_is_lee_radok(name, indenter):
         np.testing.assert_allclose(found.approach, exact.approach(times), rtol=tolerance)
 
 
-@pytest.mark.parametrize("name", ["maxwell", "zener", "zener stiff"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "zener",
+        pytest.param("maxwell", marks=pytest.mark.thorough),
+        pytest.param("zener stiff", marks=pytest.mark.thorough),
+    ],
+)
 @pytest.mark.parametrize("indenter", [SPHERE, cf.Cone(0.3)], ids=["sphere", "cone"])
 def test_reduced_contact__single_maximum_is_ting(name, indenter):
     times = [0.5, 1.2, 1.7, 1.9]

@@ -55,7 +55,9 @@ def one_by_one():
     return steps[-1].work
 
 
-@pytest.mark.parametrize("kept", [0, 50, 8])
+@pytest.mark.parametrize(
+    "kept", [8, pytest.param(0, marks=pytest.mark.thorough), pytest.param(50, marks=pytest.mark.thorough)]
+)
 def test_taps__are_all_found_and_work_as_in_single_cycles(kept, one_by_one):
     times = tuple((PERIOD / kept * np.arange(kept * CYCLES + 1)).tolist()) if kept else (CYCLES * PERIOD,)
     steps = list(march(sphere(tapping(CYCLES), times=times, tolerance=1e-3)))

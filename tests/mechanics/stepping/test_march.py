@@ -24,7 +24,14 @@ TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
 
 
 @pytest.mark.parametrize("program", [STEP_LOAD, TRIANGLE], ids=["step", "triangle"])
-@pytest.mark.parametrize("name", ["maxwell", "zener", "two_branches"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "zener",
+        pytest.param("maxwell", marks=pytest.mark.thorough),
+        pytest.param("two_branches", marks=pytest.mark.thorough),
+    ],
+)
 def test_fixed_steps__converge_at_second_order(name, program):
     def result(step):
         shown = final(march(scene(MATERIALS[name], program, time_step=step, tolerance=1e-10))).shown

@@ -21,7 +21,7 @@ def rough_profile(number):
     return height, float(rng.choice([1e-6, 1e-5]))
 
 
-@pytest.mark.parametrize("first", range(0, 60, 15))
+@pytest.mark.parametrize("first", [0, *(pytest.param(n, marks=pytest.mark.thorough) for n in (15, 30, 45))])
 def test_window__gives_the_contact_of_the_whole_domain(first):
     inside = 0
     for number in range(first, first + 15):

@@ -241,7 +241,7 @@ FOLLOWED = {
 }
 
 
-@pytest.mark.parametrize("name", FOLLOWED)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.thorough) if n == "soft" else n for n in FOLLOWED])
 def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
     material, program = FOLLOWED[name]
     settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "memory": "direct" if "direct" in name else "auto"}

@@ -167,8 +167,11 @@ def test_all_times__become_common_ones(tmp_path):
     "changes",
     [
         {},
-        {"surface__shape": [48, 44]},
-        {"surface": {"generate": "cone", "slope": 0.02, "size": [2e-3, 1.9e-3], "shape": [41, 38]}},
+        pytest.param({"surface__shape": [48, 44]}, marks=pytest.mark.thorough),
+        pytest.param(
+            {"surface": {"generate": "cone", "slope": 0.02, "size": [2e-3, 1.9e-3], "shape": [41, 38]}},
+            marks=pytest.mark.thorough,
+        ),
         {"program": [{"load": 0.05, "over": 0.1}, {"load": 0.1, "over": 0.1}]},
     ],
     ids=["33 x 31", "48 x 44", "cone", "ramps"],
