@@ -78,7 +78,7 @@ def run_notebook(path):
 
 def by_load(results):
     """One entry a case, named by its load."""
-    loads = results["program.0.load"].values
+    loads = results["program_0_load"].values
     surface = {"height": results.height} if "height" in results else {}
     drop = [name for name in results.coords if name not in ("time", "x", "y")]
     return {

@@ -13,7 +13,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity, shown
-from roughvisc.variables import FLAGS, OLDER_NAMES, RESULT_FORMAT, VARIABLES, Variable
+from roughvisc.variables import FLAGS, NAMES_OF_TODAY, OLDER_NAMES, RESULT_FORMAT, VARIABLES, Variable
 from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -149,13 +149,13 @@ def expect_current_names(dataset: xr.Dataset) -> None:
     Raises
     ------
     InputError
-        If its format is another than that of today.
+        If its format is one in which names have other meanings.
     """
     found = format_of(dataset.variables, dataset.attrs)
-    if found != RESULT_FORMAT:
+    if found < NAMES_OF_TODAY:
         raise InputError(
             f"the result is of format {found}, in which 'contact_area' and other names have another meaning than today "
-            f"(format {RESULT_FORMAT}): expected it as rv.open_result opens its file"
+            f"(from format {NAMES_OF_TODAY} on): expected it as rv.open_result opens its file"
         )
 
 

@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 PACKAGE = ROOT / "roughvisc"
 
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
-_LABELS = {"errors", "labels", "notebook", "variables", "units"}
+_LABELS = {"errors", "groups", "labels", "notebook", "variables", "units"}
 _STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
 _STORAGE = {*_STATEMENT, "study.statement", "mechanics.contact", "mechanics.hereditary", "mechanics.fields"}
 _SIMULATION = {
@@ -29,6 +29,7 @@ _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "variables": set(),
+    "groups": {"errors", "variables"},
     "labels": {"errors", "units", "variables"},
     "units": {"errors"},
     "notebook": set(),

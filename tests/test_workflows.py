@@ -25,7 +25,7 @@ def test_study__runs(path, tmp_path):
         ds = run(case, tmp_path, progress=False)
         assert float(ds.force[-1]) > 0
         assert (np.diff(ds.contact_area) >= 0).all(), "under a load that is held, the contact grows"
-        assert float(ds.time_error.max()) <= 1.1 * case.settings.solve.tolerance
+        assert float(ds.roughvisc.accuracy.time_error.max()) <= 1.1 * case.settings.solve.tolerance
         assert 0.01 < float(ds.contact_fraction[-1]) < 0.6
 
 
@@ -96,8 +96,9 @@ def test_friction__rises_and_falls_as_the_rubber_stiffens(tmp_path):
     assert (np.diff(friction[: most + 1]) > 0).all()
     assert (np.diff(friction[most:]) < 0).all()
     assert (np.diff(curve.contact_area) < 0).all(), "the area falls with the speed"
-    assert ((curve.last_octave_friction > 0) & (curve.last_octave_friction < 1)).all()
-    assert (curve.last_octave_area < 0).all(), "finer roughness takes area away"
+    accuracy = curve.roughvisc.accuracy
+    assert ((accuracy.last_octave_friction > 0) & (accuracy.last_octave_friction < 1)).all()
+    assert (accuracy.last_octave_area < 0).all(), "finer roughness takes area away"
 
 
 @pytest.mark.long
@@ -209,7 +210,8 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatc
     monkeypatch.syspath_prepend(str(FOLDER))
     seal = importlib.import_module("creeping_seal").main(tmp_path / "seal.png")
     assert (tmp_path / "seal.png").stat().st_size > 10_000
-    assert float(seal.time_error.max()) <= 1.1 * seal.tolerance  # what is stated is some three times the error
+    stated = float(seal.roughvisc.accuracy.time_error.max())
+    assert stated <= 1.1 * seal.tolerance  # what is stated is some three times the error
     rate = seal.leak_rate.values
     closed = rate == 0
     last = int(np.flatnonzero(~closed)[-1])

@@ -40,7 +40,7 @@ def main(folder=STUDY.parent / "results" / STUDY.stem, changes=None):
 def at_age(results, time):
     """The states of all cases at one age, as one Dataset along the loads."""
     return xr.concat(
-        [ds.drop_dims("step", errors="ignore").sel(time=[time]) for ds in results],
+        [ds.sel(time=[time]) for ds in results],
         "time",
         data_vars="minimal",
         coords="minimal",

@@ -26,7 +26,7 @@ def plot(result: Path, out: Path | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import no_results, open_result, result_files
+    from roughvisc.study.storage.store import no_results, result_files, whole_result
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
     from roughvisc.views.sweep_figures.files import cases_in, results_of, write_figure
@@ -42,7 +42,7 @@ def plot(result: Path, out: Path | None) -> None:
             say(console, "Figure", write_figure(trade(open_trade(path)), picture))
             continue
         stem, title = names.get(path, (path.stem, ""))
-        with open_result(path) as dataset:
+        with whole_result(path) as dataset:
             for figure in save_figures(dataset, out or path.parent, stem, title=title):
                 say(console, "Figure", figure)
     together = results_of(result) if len(paths) > 1 else None
@@ -98,7 +98,7 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.audit.given import from_options, of_study
-    from roughvisc.study.storage.store import no_results, open_result, result_files
+    from roughvisc.study.storage.store import no_results, result_files, whole_result
     from roughvisc.views.console.audit_table import audit_table
 
     given = from_options(stated).over(of_study(study) if study is not None else {})
@@ -107,7 +107,7 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
         raise no_results(result)
     console = Console()
     for path in paths:
-        with open_result(path) as dataset:
+        with whole_result(path) as dataset:
             console.print(audit_table(audited(dataset, **given.stated())))
 
 

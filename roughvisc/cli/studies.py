@@ -87,7 +87,7 @@ def _run_one(
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.execution.side_by_side import threads_each
     from roughvisc.study.progress import Bar
-    from roughvisc.study.storage.store import is_writable, open_result, require_writable, result_path
+    from roughvisc.study.storage.store import is_writable, require_writable, result_path, whole_result
     from roughvisc.study.storage.versions import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
@@ -103,7 +103,7 @@ def _run_one(
     with Bar(console, label, case.at) as bar:
         path = run_case(case, folder, progress=bar.reached, same_bits=same_bits, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
-    with open_result(path) as dataset:
+    with whole_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
         if plots:

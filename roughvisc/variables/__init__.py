@@ -11,17 +11,20 @@ import warnings
 from dataclasses import replace
 
 from roughvisc.variables.entry import Variable as Variable
-from roughvisc.variables.slides import SLIDES, STEPPED_IN_SLIDES
+from roughvisc.variables.slides import SLIDES
 from roughvisc.variables.spots import SPOTS
-from roughvisc.variables.transport import LEAK_MEANINGS, TRANSPORT
+from roughvisc.variables.transport import TRANSPORT
 
 #: How an accepted step ended; the values of ``status``, in order.
 STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
-#: Number of the meaning that the names below have; results state it in the attribute ``result_format``. Raised by
-#: whoever gives a name another meaning: :mod:`roughvisc.study.storage.formats` then reads what was written before.
-RESULT_FORMAT = 2
+#: Number of the meaning that the names below have, and of their groups; results state it in the attribute
+#: ``result_format``. Raised by whoever gives a name another meaning or another group:
+#: :mod:`roughvisc.study.storage.formats` then reads what was written before.
+RESULT_FORMAT = 3
+#: Format from which on names have the meaning that they have today; groups came with format 3.
+NAMES_OF_TODAY = 2
 #: Older names of variables, which may be given until release 0.1.0, and what they are called now.
 OLDER_NAMES = {"contact_area_corrected": "contact_area"}
 
@@ -33,7 +36,12 @@ _RUNS = ("setting",)
 VARIABLES: dict[str, Variable] = {
     # coordinates: with an attribute `axis` on x and y ParaView would wrap the surface on a sphere
     "time": Variable(
-        ("time",), "s", "time since the start of the program", "at a jump the right-hand state is kept", axis="T"
+        ("time",),
+        "s",
+        "time since the start of the program",
+        "at a jump the right-hand state is kept",
+        axis="T",
+        in_table="last",
     ),
     "x": Variable(("x",), "m", "position of the cell centre along x", axis="X"),
     "y": Variable(("y",), "m", "position of the cell centre along y", axis="Y"),
@@ -49,6 +57,7 @@ VARIABLES: dict[str, Variable] = {
         "height of the rigid profile, peaks up",
         "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
         short="height",
+        may_be_missing=True,
     ),
     "taper_x": Variable(
         ("x",),
@@ -73,6 +82,7 @@ VARIABLES: dict[str, Variable] = {
         "gap between the surfaces",
         "zero inside the contact; missing where the profile is absent",
         short="gap",
+        may_be_missing=True,
     ),
     "displacement": Variable(
         _FRAME,
@@ -89,6 +99,8 @@ VARIABLES: dict[str, Variable] = {
         "prescribed under load control, found under approach control",
         ancillary=("force_error",),
         short="force",
+        every_step=True,
+        in_table="last",
     ),
     "approach": Variable(
         _SERIES,
@@ -101,6 +113,8 @@ VARIABLES: dict[str, Variable] = {
         "(periodic) and mean_plane_separation (free space) do",
         ancillary=("approach_error",),
         short="approach",
+        every_step=True,
+        in_table="last",
     ),
     "nominal_pressure": Variable(
         _SERIES,
@@ -108,6 +122,7 @@ VARIABLES: dict[str, Variable] = {
         "nominal pressure",
         "force over the nominal area: that of the surface as given, absent cells included; of a tapered surface the "
         "integral of taper_x times taper_y over it",
+        in_table="last",
     ),
     "work": Variable(
         _SERIES,
@@ -118,12 +133,15 @@ VARIABLES: dict[str, Variable] = {
         "boundaries without the uniform displacement",
         ancillary=("work_error",),
         short="work",
+        every_step=True,
     ),
     "stored_energy": Variable(
         _SERIES,
         "J",
         "energy stored in the springs of the material",
         "exact for pressure linear in each step; missing where the memory is the direct history",
+        every_step=True,
+        may_be_missing=True,
     ),
     "dissipated_energy": Variable(
         _SERIES,
@@ -131,6 +149,8 @@ VARIABLES: dict[str, Variable] = {
         "energy dissipated in the material since the start",
         "exact for pressure linear in each step; missing where the memory is the direct history",
         ancillary=("dissipated_energy_error",),
+        every_step=True,
+        may_be_missing=True,
     ),
     "contact_area": Variable(
         _SERIES,
@@ -146,6 +166,8 @@ VARIABLES: dict[str, Variable] = {
             "grid_error_area",
         ),
         short="contact area",
+        every_step=True,
+        in_table="last",
     ),
     "contact_area_counted": Variable(
         _SERIES,
@@ -153,6 +175,7 @@ VARIABLES: dict[str, Variable] = {
         "area of the cells in contact",
         "the cells that carry pressure, counted; larger than contact_area, since cells at the edge count as a whole",
         short="contact area, counted",
+        every_step=True,
     ),
     "contact_fraction": Variable(
         _SERIES,
@@ -161,6 +184,8 @@ VARIABLES: dict[str, Variable] = {
         "contact_area over the area of the whole grid, absent cells included; on a tapered surface each cell counts by "
         "its weight, taper_x times taper_y, in both areas",
         short="contact fraction",
+        every_step=True,
+        in_table="last",
     ),
     "mean_gap": Variable(
         _SERIES,
@@ -169,6 +194,9 @@ VARIABLES: dict[str, Variable] = {
         "with periodic boundaries and no cells absent: the separation of the mean planes of both surfaces",
         ancillary=("approach_error",),
         short="mean gap",
+        every_step=True,
+        may_be_missing=True,
+        in_table="last",
     ),
     "mean_plane_separation": Variable(
         _SERIES,
@@ -178,16 +206,19 @@ VARIABLES: dict[str, Variable] = {
         "passed the other; not stated of an indenter that is known beyond its grid: its mean would be that of the grid",
         ancillary=("approach_error",),
         short="mean-plane separation",
+        every_step=True,
+        in_table="last",
     ),
     **SLIDES,
     # accuracy and cost
-    "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32"),
+    "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32", group="cost"),
     "convolutions": Variable(
         _SERIES,
         "1",
         "convolutions since the previous kept time",
         "displacements and preconditioner applications, each one forward and one inverse transform",
         dtype="int32",
+        group="cost",
     ),
     "stated_error": Variable(
         _SERIES,
@@ -195,43 +226,76 @@ VARIABLES: dict[str, Variable] = {
         "stated relative error: the largest of pressure (L1), force and approach",
         "sum of what time steps, contact solver and series leave, over the largest force and the largest approach so "
         "far; comparable to the tolerance; the grid's part is stated apart",
+        may_be_missing=True,
+        in_table="largest",
     ),
     "time_error": Variable(
         _SERIES,
         "1",
         "part of the error that is due to time steps",
         "from the difference to a companion march in steps twice as long; over what is largest so far",
+        group="accuracy",
+        every_step=True,
+        may_be_missing=True,
+        in_table="largest",
     ),
     "residual": Variable(
         _SERIES,
         "1",
         "part of the error that is due to the contact solver",
         "estimated error of the pressure (L1), over its sum",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="largest",
     ),
     "residual_bound": Variable(
         _SERIES,
         "1",
         "bound on the relative error of the pressure, in the energy norm, left by the contact solver",
         "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
+        group="accuracy",
+        may_be_missing=True,
     ),
     "pressure_error": Variable(
-        _SERIES, "1", "stated error of the pressure", "its absolute values summed (L1), over the largest force so far"
+        _SERIES,
+        "1",
+        "stated error of the pressure",
+        "its absolute values summed (L1), over the largest force so far",
+        group="accuracy",
+        may_be_missing=True,
     ),
-    "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),
-    "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero where the approach is prescribed"),
-    "work_error": Variable(_SERIES, "J", "stated error of the work"),
-    "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy"),
+    "force_error": Variable(
+        _SERIES, "N", "stated error of the force", "zero where the force is prescribed", group="accuracy"
+    ),
+    "approach_error": Variable(
+        _SERIES,
+        "m",
+        "stated error of the approach",
+        "zero where the approach is prescribed",
+        group="accuracy",
+        may_be_missing=True,
+    ),
+    "work_error": Variable(_SERIES, "J", "stated error of the work", group="accuracy", may_be_missing=True),
+    "dissipated_energy_error": Variable(
+        _SERIES, "J", "stated error of the dissipated energy", group="accuracy", may_be_missing=True
+    ),
     "contact_area_lower": Variable(
         _SERIES,
         "m^2",
         "lower bound in practice on the contact area",
         "contact_area_solver_lower less the error of the grid: grid_error_area times the largest contact area",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
     ),
     "contact_area_upper": Variable(
         _SERIES,
         "m^2",
         "upper bound in practice on the contact area",
         "contact_area_solver_upper and the error of the grid: grid_error_area times the largest contact area",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
     ),
     "contact_area_solver_lower": Variable(
         _SERIES,
@@ -239,6 +303,9 @@ VARIABLES: dict[str, Variable] = {
         "lower bound on the contact area that this grid gives",
         "the contact area without the cells that time steps and contact solver leave in doubt; without the error of "
         "the grid, which is mostly larger",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
     ),
     "contact_area_solver_upper": Variable(
         _SERIES,
@@ -246,6 +313,9 @@ VARIABLES: dict[str, Variable] = {
         "upper bound on the contact area that this grid gives",
         "the contact area with the cells that time steps and contact solver leave in doubt; without the error of the "
         "grid, which is mostly larger",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
     ),
     "grid_error": Variable(
         _SERIES,
@@ -254,15 +324,20 @@ VARIABLES: dict[str, Variable] = {
         "from the same history on cells twice and four times as long (grid convergence index), and from the force on "
         "cells at the contact's edge; the pressure over the largest force; of a scan it holds what roughness its "
         "coarser copies have lost",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="largest",
     ),
     "grid_error_area": Variable(
         _SERIES,
         "1",
         "bound in practice on the error of the contact area due to the grid, over the largest contact area",
         "as grid_error, and from the number of faces at the contact's edge",
+        group="accuracy",
+        may_be_missing=True,
     ),
-    "status": Variable(_SERIES, "", "how the step ended", dtype="int8"),
-    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time"),
+    "status": Variable(_SERIES, "", "how the step ended", dtype="int8", every_step=True, meanings=STATUS_MEANINGS),
+    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time", group="cost"),
     # derived from a result: see roughvisc.views.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
@@ -390,10 +465,8 @@ def current_name(name: str) -> str:
     return OLDER_NAMES[name]
 
 
-#: What is known of any contact.
-STATE = ("force", "approach", "contact_area", "contact_area_counted", "contact_fraction", "mean_gap")
-#: What is known of every accepted step, also between the kept times; the contact solver's error is estimated at these.
-STEPPED = (*STATE, "mean_plane_separation", "work", "stored_energy", "dissipated_energy", "time_error", "status")
+#: Histories of every accepted step, also of those between the kept times.
+STEPPED = tuple(name for name, variable in VARIABLES.items() if variable.every_step)
 
 
 def of_step(name: str) -> str:
@@ -404,11 +477,10 @@ def of_step(name: str) -> str:
 def _over_steps(name: str) -> Variable:
     """The same variable over the accepted steps."""
     one = VARIABLES[name]
-    return replace(
-        one, dims=("step",), axis="", ancillary=tuple(of_step(other) for other in one.ancillary if other in STEPPED)
-    )
+    stated = tuple(of_step(other) for other in one.ancillary if other in STEPPED)
+    return replace(one, dims=("step",), axis="", ancillary=stated, group="steps", in_table="")
 
 
-VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED, *STEPPED_IN_SLIDES)}
+VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
 #: Variables whose values are words, and these in order.
-FLAGS = {"status": STATUS_MEANINGS, of_step("status"): STATUS_MEANINGS, "leak_status": LEAK_MEANINGS}
+FLAGS = {name: variable.meanings for name, variable in VARIABLES.items() if variable.meanings}

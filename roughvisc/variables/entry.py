@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
 class Variable:
-    """One entry of the vocabulary: what a variable is, how it is written, and which others state its error.
+    """One entry of the vocabulary: all that is said of a variable anywhere.
 
-    ``short`` is what it is called where there is no room for ``long_name``. ``axis`` is the axis that a coordinate
-    lies on.
+    Attributes
+    ----------
+    dims, units, long_name, comment, dtype
+        As they stand in a result's file.
+    ancillary : tuple of str
+        Variables that state its error.
+    short : str
+        What it is called where there is no room for `long_name`.
+    axis : str
+        The axis that a coordinate lies on.
+    group : {"", "accuracy", "cost", "steps"}
+        Group of the file that holds it; empty: the root, which holds what a user wants first.
+    may_be_missing : bool
+        Whether NaN says that a value is missing: a fill value is declared of no other variable.
+    every_step : bool
+        Whether it is known of every accepted step, also between the kept times.
+    in_table : {"", "last", "largest"}
+        What the table of a sweep has of each case: its value in the last row, or its largest one.
+    meanings : tuple of str
+        Of the values 0, 1, ... of a flag.
     """
 
     dims: tuple[str, ...]
@@ -22,6 +40,11 @@ class Variable:
     ancillary: tuple[str, ...] = ()
     short: str = ""
     axis: str = ""
+    group: Literal["", "accuracy", "cost", "steps"] = ""
+    may_be_missing: bool = False
+    every_step: bool = False
+    in_table: Literal["", "last", "largest"] = ""
+    meanings: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

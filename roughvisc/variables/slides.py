@@ -13,6 +13,8 @@ SLIDES: dict[str, Variable] = {
         "distance slid since the start",
         "along the path, whatever its direction; in whole cells of the grid",
         short="sliding distance",
+        every_step=True,
+        in_table="last",
     ),
     "friction_force": Variable(
         _SERIES,
@@ -22,6 +24,8 @@ SLIDES: dict[str, Variable] = {
         "before the first one against that",
         ancillary=("friction_force_error",),
         short="friction force",
+        every_step=True,
+        in_table="last",
     ),
     "friction_force_across": Variable(
         _SERIES,
@@ -31,12 +35,15 @@ SLIDES: dict[str, Variable] = {
         "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards; "
         "in a hold by the same slide as friction_force",
         short="force across the motion",
+        every_step=True,
+        in_table="last",
     ),
     "slope_friction_force": Variable(
         _SERIES,
         "N",
         "friction force by pressure times slope of the profile",
         "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
+        may_be_missing=True,
     ),
     "friction_coefficient": Variable(
         _SERIES,
@@ -44,12 +51,17 @@ SLIDES: dict[str, Variable] = {
         "friction coefficient",
         "friction_force over force: without shear at the interface; missing while the surfaces are apart",
         short="friction coefficient",
+        every_step=True,
+        may_be_missing=True,
+        in_table="last",
     ),
     "friction_force_error": Variable(
         _SERIES,
         "N",
         "stated error of the friction force",
         "of steps of one cell, by a companion march in steps of two; the rest of the grid's error comes on top",
+        group="accuracy",
+        may_be_missing=True,
     ),
     "friction_work": Variable(
         _SERIES,
@@ -57,14 +69,6 @@ SLIDES: dict[str, Variable] = {
         "work of the friction force since the start",
         "by the balance of energy: what the body has stored and dissipated in slides, less the work of the normal "
         "force; the integral of friction_force over sliding_distance checks it",
+        every_step=True,
     ),
 }
-
-#: What of them is known of every accepted step.
-STEPPED_IN_SLIDES = (
-    "sliding_distance",
-    "friction_force",
-    "friction_force_across",
-    "friction_coefficient",
-    "friction_work",
-)

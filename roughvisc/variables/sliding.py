@@ -4,21 +4,35 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from roughvisc.variables import STATE, VARIABLES, Variable
+from roughvisc.variables import VARIABLES, Variable
 
-_OF_SLIDING = {"pressure", "gap", *STATE, "nominal_pressure", "iterations", "status", "wall_time"}
+#: What steady sliding has in common with a history over time.
+_SHARED = (
+    "pressure",
+    "gap",
+    "force",
+    "nominal_pressure",
+    "approach",
+    "contact_area",
+    "contact_area_counted",
+    "contact_fraction",
+    "mean_gap",
+    "iterations",
+    "status",
+    "wall_time",
+)
 
 
 def _over_speed(name: str) -> Variable:
     """The same variable over the speeds of steady sliding."""
     one = VARIABLES[name]
-    return replace(one, dims=tuple("speed" if dim == "time" else dim for dim in one.dims), ancillary=())
+    dims = tuple("speed" if dim == "time" else dim for dim in one.dims)
+    return replace(one, dims=dims, ancillary=(), every_step=False)
 
 
 SLIDING: dict[str, Variable] = {
     **{name: VARIABLES[name] for name in ("x", "y", "height", "filled", "taper_x", "taper_y")},
-    **{name: _over_speed(name) for name in sorted(_OF_SLIDING)},
-    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed"),
+    "speed": Variable(("speed",), "m/s", "sliding speed", short="speed", in_table="last"),
     "reduced_speed": Variable(
         ("speed",),
         "m/s",
@@ -33,6 +47,8 @@ SLIDING: dict[str, Variable] = {
         "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
         ancillary=("friction_residual", "grid_error_friction"),
         short="friction coefficient",
+        may_be_missing=True,
+        in_table="last",
     ),
     "friction_force": Variable(
         ("speed",),
@@ -41,6 +57,7 @@ SLIDING: dict[str, Variable] = {
         "the power that the material dissipates, over the speed",
         ancillary=("friction_residual", "grid_error_friction"),
         short="friction force",
+        in_table="last",
     ),
     "friction_force_across": Variable(
         ("speed",),
@@ -49,21 +66,28 @@ SLIDING: dict[str, Variable] = {
         "positive to the left of the motion, 90 degrees counter-clockwise from it with x to the right and y upwards: "
         "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards",
         short="force across the motion",
+        in_table="last",
     ),
     "slope_friction_force": Variable(
         ("speed",),
         "N",
         "friction force by pressure times slope of the profile",
         "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
+        may_be_missing=True,
     ),
+    **{name: _over_speed(name) for name in _SHARED},
     "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
     "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
-    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32"),
+    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32", group="cost"),
     "pressure_residual": Variable(
-        ("speed",), "1", "error of the pressure that the iteration leaves", "estimated, L1, over the load"
+        ("speed",),
+        "1",
+        "error of the pressure that the iteration leaves",
+        "estimated, L1, over the load",
+        in_table="largest",
     ),
     "friction_residual": Variable(
-        ("speed",), "1", "error of the friction that the iteration leaves", "estimated, relative"
+        ("speed",), "1", "error of the friction that the iteration leaves", "estimated, relative", in_table="largest"
     ),
     "persson_friction_coefficient": Variable(
         ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
@@ -75,13 +99,31 @@ SLIDING: dict[str, Variable] = {
         "bound in practice on the relative error of friction due to the grid",
         "from the same speed on cells twice and four times as long (grid convergence index); of a scan it holds what "
         "roughness its coarser copies have lost",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
     ),
     "grid_error_area": Variable(
         ("speed",),
         "1",
         "bound in practice on the relative error of the contact area due to the grid",
         "as grid_error_friction, and from the number of faces at the contact's edge",
+        group="accuracy",
+        may_be_missing=True,
     ),
-    "last_octave_friction": Variable(("speed",), "1", "part of the friction that the shortest octave of waves adds"),
-    "last_octave_area": Variable(("speed",), "1", "part of the contact area that the shortest octave of waves adds"),
+    "last_octave_friction": Variable(
+        ("speed",),
+        "1",
+        "part of the friction that the shortest octave of waves adds",
+        group="accuracy",
+        may_be_missing=True,
+        in_table="last",
+    ),
+    "last_octave_area": Variable(
+        ("speed",),
+        "1",
+        "part of the contact area that the shortest octave of waves adds",
+        group="accuracy",
+        may_be_missing=True,
+    ),
 }

@@ -24,6 +24,7 @@ def _of(kind: str, units: str) -> dict[str, Variable]:
             _MEANT,
             ancillary=(f"{name}_error",),
             short=f"{kind} conductance",
+            in_table="last",
         ),
         f"{name}_error": Variable(
             _SERIES,

@@ -18,6 +18,7 @@ TRANSPORT: dict[str, Variable] = {
         "with the pressure drop over the length of the map along the flow; zero where leak_status says closed",
         ancillary=("leak_rate_solver_lower", "leak_rate_solver_upper", "leak_status"),
         short="leak rate",
+        in_table="last",
     ),
     "leak_rate_solver_lower": Variable(
         _SERIES,
@@ -38,6 +39,7 @@ TRANSPORT: dict[str, Variable] = {
         "closed: no path through the gap connects the two sides; cells that share only a corner are apart. "
         "not_certified: the bounds are more than 1e-6 of the leak rate apart",
         dtype="int8",
+        meanings=LEAK_MEANINGS,
     ),
     "transmissivity": Variable(
         _SERIES,
@@ -46,6 +48,7 @@ TRANSPORT: dict[str, Variable] = {
         "leak rate times viscosity over the pressure gradient and the width across the flow: the cube of a parallel "
         "gap over 12; independent of the fluid",
         short="transmissivity",
+        in_table="last",
     ),
     "hydraulic_aperture": Variable(
         _SERIES,
@@ -53,6 +56,7 @@ TRANSPORT: dict[str, Variable] = {
         "hydraulic aperture: the parallel gap that leaks as much",
         "the cube root of 12 times the transmissivity; independent of the fluid",
         short="hydraulic aperture",
+        in_table="last",
     ),
     "flux": Variable(
         _FRAME,

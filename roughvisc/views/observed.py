@@ -17,7 +17,7 @@ from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import held
-from roughvisc.study.storage.store import open_result, require_writable, result_path, write_result
+from roughvisc.study.storage.store import require_writable, result_path, whole_result, write_result
 from roughvisc.study.storage.table import write_table
 from roughvisc.views.observables.tables import asked
 
@@ -81,7 +81,7 @@ def observe(
 def _add(case: Case, path: Path) -> bool:
     """Add to one file what it lacks; whether it lacked anything."""
     wanted: Mapping[str, Any] = case.settings.observe.stated()
-    with open_result(path) as result:
+    with whole_result(path) as result:
         before = json.loads(result.attrs.get(OBSERVED, "{}"))
         lacking = {name: values for name, values in wanted.items() if before.get(name) != values}
         if not lacking:

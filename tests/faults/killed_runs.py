@@ -22,7 +22,7 @@ from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.execution.watch import Silence
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.store import open_result, result_files
+from roughvisc.study.storage.store import result_files, whole_result
 from roughvisc.study.storage.tidy import tidy
 from roughvisc.study.storage.verify import verify
 
@@ -63,7 +63,7 @@ def _values(folder):
     """Every variable but the wall time of all that counts as a result in a folder."""
     found = {}
     for path in result_files(folder):
-        with open_result(path) as ds:
+        with whole_result(path) as ds:
             found[path.name] = ds.drop_vars("wall_time").load()
     return found
 

@@ -12,12 +12,13 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.execution.watch import Silence
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.seal import _SEAL
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.verify import verify
 
 _TEXT = BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -40,7 +41,7 @@ def prepare(folder):
     rv.open_results(folder / "whole", cases=cases)  # so that the index is there
     wanted = {}
     for case in cases:
-        with open_result(folder / "whole" / f"{case.key}.nc") as ds:
+        with whole_result(folder / "whole" / f"{case.key}.nc") as ds:
             wanted[case.key] = ds.load()
     return folder / "whole", cases, wanted
 
@@ -106,7 +107,7 @@ def _through(door, out, case, cases, damage):
     """Values by key, as one of the doors serves them."""
     path = out / f"{case.key}.nc"
     if door == "open_result before":
-        with open_result(path) as ds:
+        with whole_result(path) as ds:
             damage()
             return {case.key: ds.load()}
     if door == "open_results before":
@@ -115,7 +116,7 @@ def _through(door, out, case, cases, damage):
         return _by_key(results.load())
     damage()
     if door == "open_result":
-        with open_result(path) as ds:
+        with whole_result(path) as ds:
             return {case.key: ds.load()}
     if door == "open_results":
         return _by_key(rv.open_results(out).load())
@@ -123,7 +124,7 @@ def _through(door, out, case, cases, damage):
         return _by_key(rv.open_results(out, cases=cases).load())
     if door == "ragged":
         tree = rv.open_results(out, cases="all", ragged=True).load()
-        return {key: node.to_dataset() for key, node in tree.children.items()}
+        return {key: whole_of(node.to_dataset()) for key, node in tree.children.items()}
     if door == "verify":
         for verdict in verify(out):
             if verdict.flaw or not verdict.sealed:
@@ -135,6 +136,7 @@ def _through(door, out, case, cases, damage):
 
 
 def _by_key(results):
+    results = whole_of(results)
     return {str(key): results.isel(case=i) for i, key in enumerate(results["case_key"].values)}
 
 

@@ -31,6 +31,14 @@ from accuracy_cases import case
 
 import roughvisc as rv
 
+try:
+    from roughvisc.groups import whole_of as whole
+except ImportError:  # a checkout whose results have no groups
+
+    def whole(dataset):
+        return dataset
+
+
 SHARPER = 30
 QUANTITIES = ("total", "pressure", "approach", "force", "work")
 #: The same of the references that are checked, over that of the references.
@@ -149,6 +157,7 @@ def timed(drawn, tolerance, times):
     ds = rv.simulate(
         drawn.height, drawn.material, drawn.program, progress=lambda now, end: steps.append(now), **settings
     )
+    ds = whole(ds)
     ds.attrs |= {"steps": len(steps), "cpu": round(time.process_time() - began, 3)}
     return ds
 

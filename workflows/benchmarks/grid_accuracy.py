@@ -92,9 +92,9 @@ def _row(ds, pressure, approach, area):
         "pressure": float(pressure),
         "approach": abs(float(approach)),
         "true": max(float(pressure), abs(float(approach))),
-        "stated": float(ds.grid_error[0]),
+        "stated": float(ds.roughvisc.accuracy.grid_error[0]),
         "true_area": abs(found / area - 1),
-        "stated_area": float(ds.grid_error_area[0]),
+        "stated_area": float(ds.roughvisc.accuracy.grid_error_area[0]),
     }
 
 

@@ -14,8 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-#: Variables and attributes that differ between runs of one program.
-LEFT_OUT = ("wall_time", "roughvisc_version", "history", "source")
+try:
+    from roughvisc.groups import whole_of as whole
+except ImportError:  # a checkout whose results have no groups
+
+    def whole(dataset):
+        return dataset
+
+
+#: Variables and attributes that differ between runs of one program; and a number of the steps that is no result.
+LEFT_OUT = ("wall_time", "roughvisc_version", "history", "source", "result_format", "step")
 
 
 def scenes():
@@ -71,7 +79,7 @@ def computed(names, path):
     for name, scene in scenes().items():
         if names and name not in names:
             continue
-        dataset = scene()
+        dataset = whole(scene())
         values = {key: np.asarray(dataset[key].values) for key in dataset.variables if key not in LEFT_OUT}
         told = {f"attribute {key}": value for key, value in dataset.attrs.items() if key not in LEFT_OUT}
         results[name] = values | told

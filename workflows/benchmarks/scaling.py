@@ -21,7 +21,7 @@ def run(name, surface, material, program, **settings):
     took, _ = seconds(press, 3 if surface.size < 1024**2 else 1)  # minutes: once
     with profiled() as profile:
         ds = press()
-    steps, iterations = program.duration / settings["time_step"], int(ds.iterations.sum())
+    steps, iterations = program.duration / settings["time_step"], int(ds.roughvisc.cost.iterations.sum())
     beside = (1 - profile.share("transforms")) * profile.whole
     return {
         "case": name,
@@ -30,7 +30,7 @@ def run(name, surface, material, program, **settings):
         "seconds_per_step": took / steps,
         "transform_share": profile.share("transforms"),
         "vector_share": profile.share("vector work of the solver"),
-        "convolutions": int(ds.convolutions.sum()),
+        "convolutions": int(ds.roughvisc.cost.convolutions.sum()),
         "iterations": iterations,
         "beside_over_scipy": beside / (iterations * iteration_by_scipy(surface, settings.get("boundary", "free"))),
         "peak_fields": peak / (8 * surface.size),

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.mechanics.materials.protocol import complete
@@ -105,6 +106,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         If it is no result of one case over time.
     """
     _check(dataset)
+    dataset = whole_of(dataset)
     case = Case.from_json(dataset.attrs["case"]) if "case" in dataset.attrs else None
     attrs = _with_the_case(dataset.attrs, case)
     force = dataset["force"].values

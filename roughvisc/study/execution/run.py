@@ -31,11 +31,11 @@ from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import (
     is_writable,
-    open_result,
     require_writable,
     result_path,
     set_aside,
     torn_files,
+    whole_result,
     write_result,
 )
 from roughvisc.study.storage.trust import warn_once
@@ -134,7 +134,7 @@ def compute(
     transforms = transform_library() if keeper is None else keeper.latest.transforms
     provenance = _provenance(case, rows_of(dataset), dataset.attrs.pop("history", ""), transforms)
     dataset.attrs = provenance | dataset.attrs | scan
-    return dataset.assign_coords(labels_of_case(json.loads(case.to_json()), case.key))
+    return dataset.assign_coords(labels_of_case(json.loads(case.to_json())))
 
 
 @contextmanager
@@ -294,7 +294,7 @@ def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
     """Whether a file is the whole result of a case, and on request of the transforms that are here."""
     if not path.exists() or _problem(case, path):
         return False
-    with open_result(path) as dataset:
+    with whole_result(path) as dataset:
         made_with = str(dataset.attrs.get("transforms", ""))
     if made_with != transform_library():
         warn_once(path, f"{path}: {other_transforms([made_with])}")
@@ -305,7 +305,7 @@ def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
 def _problem(case: Case, path: Path) -> str:
     """Why a file is not the whole result of a case; empty if it is."""
     try:
-        with open_result(path) as dataset:
+        with whole_result(path) as dataset:
             found = dataset.attrs.get("case_key")
     except InputError as error:
         return str(error)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.groups import whole_of
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
 from roughvisc.study.statement.case import Case, read_study
@@ -76,7 +77,7 @@ def run(
 
         path = run_on(client, case, folder.absolute(), progress, same_bits, threads)
     dataset = open_result(path)
-    complaint = unconverged(dataset)
+    complaint = unconverged(whole_of(dataset))
     if complaint:
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
     return dataset

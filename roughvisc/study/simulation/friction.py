@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.groups import root_of
 from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.sheet import Base
 from roughvisc.mechanics.materials.models import Material
@@ -122,7 +123,7 @@ def friction(
         grid_error=grid_error,
         kernel=body(complete(material), thickness, base),
     )
-    return rub(height, material, curve, settings, progress=progress).assign_attrs(title="Steady sliding")
+    return root_of(rub(height, material, curve, settings, progress=progress).assign_attrs(title="Steady sliding"))
 
 
 def rub(

@@ -26,7 +26,6 @@ from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.topography.grid import TAPER
 from roughvisc.variables import RESULT_FORMAT, STATUS_MEANINGS, STEPPED, of_step
-from roughvisc.variables.slides import STEPPED_IN_SLIDES
 
 #: A row that states more than so many tolerances is none where every step is kept and the row is not asked for.
 _AT_MOST = 3.0
@@ -135,9 +134,8 @@ class Rows:
         stamp = columns.pop("time")
         variables: dict[str, Any] = {name: (("time",), values) for name, values in columns.items()}
         if len(kept) < len(rows):
-            for name in ("time", *(name for name in (*STEPPED, *STEPPED_IN_SLIDES) if name in columns)):
+            for name in ("time", *(name for name in STEPPED if name in columns)):
                 variables[of_step(name)] = (("step",), np.array([row[name] for row in rows]))
-            variables["step"] = (("step",), np.arange(len(rows)))
         for name in self._settings.fields:
             frames = self._store.stacked(partial(self._frame, name), kept, (height.shape[0], height.shape[1]))
             variables[name] = (("time", "x", "y"), frames)

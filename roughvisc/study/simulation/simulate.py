@@ -12,6 +12,7 @@ import xarray as xr
 from scipy import fft
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.groups import root_of
 from roughvisc.labels import annotate
 from roughvisc.mechanics.fields.reuse import reused
 from roughvisc.mechanics.halfspace.kernel import Kernel
@@ -160,7 +161,7 @@ def simulate(
         grid_error=grid_error,
         kernel=body(material, thickness, base, kernel),
     )
-    return press(height, material, program, settings, progress=progress, threads=threads)
+    return root_of(press(height, material, program, settings, progress=progress, threads=threads))
 
 
 def press(

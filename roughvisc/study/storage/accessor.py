@@ -1,7 +1,7 @@
-"""The accessor ``ds.roughvisc``: what is derived from a result, and its figures, as methods of the Dataset.
+"""The accessor ``ds.roughvisc``: groups of a result, what is derived from it, and its figures.
 
 ``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
-Whatever opens or makes a result registers it. It imports nothing but xarray: the function is imported when asked for.
+Whatever opens or makes a result registers it. Each function is imported when it is asked for.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from importlib import import_module
 from typing import Any
 
 import xarray as xr
+
+from roughvisc.groups import group_of
 
 #: Before the name of a figure.
 _PLOT = "plot_"
@@ -33,6 +35,21 @@ class ResultAccessor:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
+
+    @property
+    def steps(self) -> xr.Dataset:
+        """Histories of every accepted step, over ``step``."""
+        return group_of(self._dataset, "steps")
+
+    @property
+    def accuracy(self) -> xr.Dataset:
+        """Stated errors of the rows, the parts of them, and bounds of the contact area."""
+        return group_of(self._dataset, "accuracy")
+
+    @property
+    def cost(self) -> xr.Dataset:
+        """Iterations and convolutions since the row before, and the time since the start."""
+        return group_of(self._dataset, "cost")
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # what notebooks and copies ask every object for

@@ -8,36 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from roughvisc.variables import of_step
+from roughvisc.variables.rows import VOCABULARIES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_MAY_BE_MISSING = frozenset({"height", "gap", "grid_error", "grid_error_area", "grid_error_friction"}) | {
-    "last_octave_friction",
-    "last_octave_area",
-    "stated_error",
-    "time_error",
-    "residual",
-    "residual_bound",
-    "pressure_error",
-    "approach_error",
-    "stored_energy",
-    "dissipated_energy",
-    "work_error",
-    "dissipated_energy_error",
-    "contact_area_lower",
-    "contact_area_upper",
-    "contact_area_solver_lower",
-    "contact_area_solver_upper",
-    "friction_coefficient",
-    "friction_force_error",
-    "slope_friction_force",
-}
 #: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
 #: algorithm states no accuracy, the direct history no energies; of steps between kept times the mean gap is not known
 #: over a grid that has grown since.
-MAY_BE_MISSING = _MAY_BE_MISSING | {of_step(name) for name in (*_MAY_BE_MISSING, "mean_gap")}
+MAY_BE_MISSING = {name for known in VOCABULARIES.values() for name, one in known.items() if one.may_be_missing}
 #: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
 #: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
 #: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.

@@ -4,7 +4,7 @@ The attribute ``result_format`` of a result is a number that says which meaning 
 :data:`roughvisc.variables.RESULT_FORMAT` today. Results of format 1 have no number. In them ``contact_area`` is the
 count of cells; ``contact_fraction``, ``contact_area_lower`` and ``contact_area_upper`` belong to that count; and
 ``contact_area_corrected`` is the corrected area. ``leak_rate_lower`` and ``leak_rate_upper`` are bounds by the flow
-solver.
+solver. Files of format 2 have no groups: all their variables are at the root.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate, format_of
-from roughvisc.variables import RESULT_FORMAT, of_step
+from roughvisc.variables import NAMES_OF_TODAY, RESULT_FORMAT, of_step
 from roughvisc.variables.rows import VOCABULARIES, rows_of
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def current_histories(histories: Mapping[str, Array], attributes: Mapping[Any, A
     InputError
         If the result's format is none that this version can read, or the histories are no numbers of one length.
     """
-    if format_of(histories, attributes) == RESULT_FORMAT:
+    if format_of(histories, attributes) >= NAMES_OF_TODAY:
         return dict(histories)
     found = {name: values for name, values in histories.items() if name not in FORMER_NAMES}
     for prefix in _PREFIXES:
@@ -107,8 +107,11 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
 
     if "quantity" in dataset.coords:
         return _current_trade(dataset)
-    if format_of(dataset.variables, dataset.attrs) == RESULT_FORMAT:
+    found = format_of(dataset.variables, dataset.attrs)
+    if found == RESULT_FORMAT:
         return dataset
+    if found >= NAMES_OF_TODAY:
+        return dataset.assign_attrs(result_format=RESULT_FORMAT)
     former = [name for name in FORMER_NAMES if name in dataset.variables]
     read = {name: dataset[name].values for name in (*former, "grid_error_area") if name in dataset.variables}
     known = VOCABULARIES[rows_of(dataset.variables)]
@@ -127,7 +130,7 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
 def _current_trade(dataset: xr.Dataset) -> xr.Dataset:
     """A trade whose quantities have the names of today."""
     names = [str(name) for name in dataset["quantity"].values]
-    if format_of(names, dataset.attrs) == RESULT_FORMAT:
+    if format_of(names, dataset.attrs) >= NAMES_OF_TODAY:
         return dataset
     return dataset.assign_coords(quantity=[_RENAMED.get(name, name) for name in names]).assign_attrs(
         result_format=RESULT_FORMAT

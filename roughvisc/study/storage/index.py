@@ -27,14 +27,14 @@ from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.seal import seal, unsealed
 from roughvisc.study.storage.store import NETCDF, result_files, result_path, whole_file
 from roughvisc.study.storage.trust import UNSEALED, require_whole, warn_once
-from roughvisc.variables import RESULT_FORMAT
-from roughvisc.variables.rows import RESIDUALS, VOCABULARIES, Rows, rows_of
+from roughvisc.variables import RESULT_FORMAT, of_step
+from roughvisc.variables.rows import VOCABULARIES, Rows, rows_of
 
 log = logging.getLogger("roughvisc")
 
 INDEX, LATEST = ".index.npz", ".latest.json"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 4
+_LAYOUT = 5
 #: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
@@ -140,7 +140,7 @@ def read_entry(path: Path) -> Entry:
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-            stored = {name: file[name][:] for name in _STORED if name in file.variables}
+            stored = _histories(file)
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
@@ -152,12 +152,22 @@ def read_entry(path: Path) -> Entry:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     along = rows_of(histories)
-    absent = [name for name in (along, "force", "status", RESIDUALS[along]) if name not in histories]
+    absent = [name for name in (along, "force", "status") if name not in histories]
     if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
     kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)} | {"result_format": RESULT_FORMAT}
     return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float), sealed)
+
+
+def _histories(file: Any) -> dict[str, NDArray[Any]]:
+    """Histories of a result by their names in the package; in files of former versions they are all at the root."""
+    found = {name: file[name][:] for name in _STORED if name in file.variables}
+    for group, members in file.groups.items():
+        prefix = of_step("") if group == "steps" else ""
+        names = {f"{prefix}{name}": variable for name, variable in members.variables.items()}
+        found |= {name: names[name][:] for name in _HISTORIES if name in names and name not in found}
+    return found
 
 
 def _is_table(text: Any) -> bool:

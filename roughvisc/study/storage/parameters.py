@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.study.statement.schema.units import unit_of
-from roughvisc.variables import VARIABLES
 
 #: Coordinate that holds the key of the case.
 CASE_KEY = "case_key"
@@ -52,20 +51,16 @@ def labels_of(
     return labels
 
 
-def labels_of_case(case: Mapping[str, Any], key: str) -> dict[str, Label]:
-    """Scalar coordinates of one result: the key of its case, and what was varied in it.
+def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
+    """Scalar coordinates of one result: what was varied in it.
 
     Parameters
     ----------
     case : mapping
         The case in JSON.
-    key : str
-        Its key.
     """
     varied = {name: values[0] for name, values in parameters_of([case]).items()}
-    return {CASE_KEY: ((), np.asarray(key), VARIABLES[CASE_KEY].attributes())} | labels_of(
-        {name: np.asarray(value) for name, value in varied.items()}, case
-    )
+    return labels_of({name: np.asarray(value) for name, value in varied.items()}, case)
 
 
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:

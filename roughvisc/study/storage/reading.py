@@ -18,6 +18,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
 from roughvisc.errors import InputError
+from roughvisc.groups import carrying
 from roughvisc.study.storage.trust import require_whole
 
 
@@ -41,7 +42,7 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
 
 
 class ResultBackend(BackendEntrypoint):
-    """Fields over x and y are read when they are asked for, all else at once."""
+    """Fields over x and y are read when they are asked for, all else at once; the root carries the groups."""
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """As xarray's engine ``netcdf4`` opens it, durations as plain numbers."""
@@ -49,11 +50,17 @@ class ResultBackend(BackendEntrypoint):
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
-            variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
-            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-        decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
-        texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
-        return decoded.assign_coords(texts).drop_vars(drop_variables or (), errors="ignore")
+            root, groups = _dataset(path, file), {name: _dataset(path, one) for name, one in file.groups.items()}
+        return carrying(root.drop_vars(drop_variables or (), errors="ignore"), groups)
+
+
+def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
+    """The variables of a file, or of a group of it."""
+    variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
+    attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+    decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
+    texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
+    return decoded.assign_coords(texts)
 
 
 def _variable(path: str, stored: netCDF4.Variable) -> xr.Variable:

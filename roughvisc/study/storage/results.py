@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.groups import root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
@@ -82,7 +83,7 @@ def open_results(out, *, cases="last", ragged=False):
     Examples
     --------
     >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
-    >>> results.set_index(case=["program.0.load", "surface.seed"]).unstack().contact_area  # doctest: +SKIP
+    >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack().contact_area  # doctest: +SKIP
     """
     folder = Path(out).absolute()
     index = index_of(folder)
@@ -155,15 +156,12 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
                 variables[name] = (dims, _lazy(folder, entries[:1], name, dtype)[0])
     coords = {first.along: first.histories[first.along], "x": first.x, "y": first.y}
     dataset = xr.Dataset(variables, coords=coords, attrs=_attributes(entries))
-    if "step" in dataset.dims:
-        dataset = dataset.assign_coords(step=np.arange(dataset.sizes["step"]))
     dataset = annotate(dataset)
     keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
     versions = np.array([version_of(entry.attributes) for entry in entries])
     keys[VERSION] = (("case",), versions, VARIABLES[VERSION].attributes())
     labels = labels_of(parameters, first.case, ("case",))
-    dotted = {attributes["long_name"]: (dims, values, attributes) for dims, values, attributes in labels.values()}
-    return dataset.assign_coords(keys | dotted | labels)
+    return root_of(dataset.assign_coords(keys | labels))
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -21,7 +21,8 @@ import netCDF4
 import numpy as np
 
 from roughvisc.errors import FolderError, InputError
-from roughvisc.labels import annotate
+from roughvisc.groups import group_of, groups_of, root_of, split, whole_of
+from roughvisc.labels import annotate, format_of
 from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
 from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
@@ -141,8 +142,8 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Parameters
     ----------
     dataset : xarray.Dataset
-        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Fields that are read from elsewhere
-        when they are asked for are read and written a chunk at a time.
+        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates; of a root, its groups too. Fields
+        that are read from elsewhere when they are asked for are read and written a chunk at a time.
     path : path
         The file to write; one of that name is replaced.
     precision : float, optional
@@ -169,17 +170,14 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
-    dataset = _in_characters(_with_labels_named(annotate(to_current(dataset))))
+    parts = split(annotate(to_current(whole_of(dataset))))
+    parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
     with whole_file(path) as temporary:
         try:
             with _new_file(temporary) as file:
-                with NETCDF:
-                    file.setncatts(_FIRST_ATTRIBUTES | plain_attributes(dataset.attrs))
-                    for dimension, size in dataset.sizes.items():
-                        file.createDimension(str(dimension), size)
                 # all are declared before any is written: each change of mode would write the file's metadata anew
-                declared = [_declare(file, str(name), v, precision) for name, v in dataset.variables.items()]
-                for written, variable in zip(declared, dataset.variables.values(), strict=True):
+                declared = [pair for group, part in parts.items() for pair in _declared(file, group, part, precision)]
+                for written, variable in declared:
                     _write(written, variable)
             seal(temporary)
         except (
@@ -192,6 +190,20 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             number = errno.ENOSPC if full else errno.EIO
             raise OSError(number, os.strerror(number), str(path)) from error
     return Path(path)
+
+
+def _declared(
+    file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None
+) -> Iterator[tuple[netCDF4.Variable, xr.Variable]]:
+    """The variables of the root or of a group as they are declared in the file, and what is to be written to them."""
+    with NETCDF:
+        place = file.createGroup(group) if group else file
+        place.setncatts(plain_attributes(part.attrs) if group else _FIRST_ATTRIBUTES | plain_attributes(part.attrs))
+        for dimension, size in part.sizes.items():
+            if dimension not in file.dimensions:  # the root's are the groups' too
+                place.createDimension(str(dimension), size)
+    for name, variable in part.variables.items():
+        yield _declare(place, str(name), variable, precision), variable
 
 
 def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
@@ -287,7 +299,7 @@ def set_aside(path: Path, problem: str) -> None:
         log.info("%s: is set aside as %s, and computed anew", path, aside.name)
 
 
-def open_result(path: str | Path) -> xr.Dataset:
+def open_result(path: str | Path, *, group: str = "") -> xr.Dataset:
     """Open a result; its fields are read when they are asked for, in whatever thread or process.
 
     Its bytes are held against the checksum that they were written with first, which takes some 0.3 s for 1 GB. A file
@@ -297,17 +309,32 @@ def open_result(path: str | Path) -> xr.Dataset:
     ----------
     path : path
         A file written by :func:`write_result`.
+    group : {"", "steps", "accuracy", "cost"}
+        What of it: the root, which holds surface, fields and histories at the kept times; every accepted step, over
+        ``step``; stated errors with their parts, and bounds of the area; what the rows have cost. A root carries the
+        others as ``ds.roughvisc.steps``, ``ds.roughvisc.accuracy`` and ``ds.roughvisc.cost``.
 
     Returns
     -------
     xarray.Dataset
-        Times are plain numbers in seconds.
+        Times are plain numbers in seconds. Files of former versions have the names and groups of today.
 
     Raises
     ------
     InputError
-        If the file is absent, is no NetCDF file, is damaged, or holds something else.
+        If the file is absent, is no NetCDF file, is damaged, or holds something else; or if there is no such group.
     """
+    root = _stored(path)
+    return group_of(root, group) if group else root
+
+
+def whole_result(path: str | Path) -> xr.Dataset:
+    """The same with all groups in one Dataset, as the package has it inside."""
+    return whole_of(_stored(path))
+
+
+def _stored(path: str | Path) -> xr.Dataset:
+    """Root of a result, which carries its groups."""
     import xarray as xr
 
     path = Path(path)
@@ -323,7 +350,8 @@ def open_result(path: str | Path) -> xr.Dataset:
             f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
     try:
-        dataset = to_current(dataset)
+        if format_of(dataset.variables, dataset.attrs) < RESULT_FORMAT:
+            dataset = root_of(to_current(dataset))
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
     found = _foreign(dataset)
@@ -339,9 +367,10 @@ def _foreign(dataset: xr.Dataset) -> str:
     if absent := [name for name in NEEDED[rows] if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
     known = VOCABULARIES[rows]
-    for name, variable in dataset.variables.items():
-        if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
-            return f"holds {name} as {variable.dtype}"
+    for part in (dataset, *groups_of(dataset).values()):
+        for name, variable in part.variables.items():
+            if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
+                return f"holds {name} as {variable.dtype}"
     if odd := [name for name in NEEDED[rows] if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):

@@ -27,50 +27,9 @@ log = logging.getLogger("roughvisc")
 
 CASES = "cases.csv"
 #: What the table has of one row of each case: of the last time, or of the speed at which friction is largest.
-_TOLD: dict[Rows, tuple[str, ...]] = {
-    "time": (
-        "time",
-        "force",
-        "nominal_pressure",
-        "approach",
-        "contact_area",
-        "contact_area_lower",
-        "contact_area_upper",
-        "contact_area_solver_lower",
-        "contact_area_solver_upper",
-        "contact_fraction",
-        "mean_gap",
-        "mean_plane_separation",
-        "sliding_distance",
-        "friction_force",
-        "friction_force_across",
-        "friction_coefficient",
-        "leak_rate",
-        "transmissivity",
-        "hydraulic_aperture",
-        "thermal_conductance",
-        "electrical_conductance",
-    ),
-    "speed": (
-        "speed",
-        "friction_coefficient",
-        "friction_force",
-        "friction_force_across",
-        "force",
-        "nominal_pressure",
-        "approach",
-        "contact_area",
-        "contact_fraction",
-        "mean_gap",
-        "grid_error_friction",
-        "last_octave_friction",
-    ),
-}
+_TOLD = {rows: [n for n, one in known.items() if one.in_table == "last"] for rows, known in VOCABULARIES.items()}
 #: What it has the largest value of.
-_LARGEST: dict[Rows, tuple[str, ...]] = {
-    "time": ("stated_error", "time_error", "residual", "grid_error"),
-    "speed": ("pressure_residual", "friction_residual"),
-}
+_LARGEST = {rows: [n for n, one in known.items() if one.in_table == "largest"] for rows, known in VOCABULARIES.items()}
 _ROWS_IN_WORDS: dict[Rows, str] = {"time": "times", "speed": "speeds"}
 
 

@@ -71,9 +71,10 @@ def _unreadable(path: Path) -> str:
 
     try:
         with NETCDF, netCDF4.Dataset(path) as file:
-            for variable in file.variables.values():
-                for first in range(0, len(variable), 16) if variable.ndim else ():
-                    variable[first : first + 16]
+            for group in (file, *file.groups.values()):
+                for variable in group.variables.values():
+                    for first in range(0, len(variable), 16) if variable.ndim else ():
+                        variable[first : first + 16]
     except (OSError, RuntimeError, LookupError, AttributeError, ValueError) as error:
         return f"it cannot be read: {error}"
     return ""

@@ -17,7 +17,7 @@ from roughvisc.study.cost.stages import stages_of
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.store import open_result, result_path, write_result
+from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
 from roughvisc.topography.grid import nominal_area
 
@@ -143,7 +143,7 @@ class Bench:
             raise NotRun(text) from error
         if complaint := unconverged(dataset):
             raise NotRun(complaint)
-        with open_result(self._path) as kept:
+        with whole_result(self._path) as kept:
             dataset = kept.load()
         return Run(dataset, took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
 

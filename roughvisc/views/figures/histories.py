@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -190,6 +191,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
     """
     require(dataset, "time")
+    dataset = whole_of(dataset)
     steps = over_steps(dataset)
     if persson:
         theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))

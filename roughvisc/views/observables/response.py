@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.labels import describe
 from roughvisc.variables import STEPPED, of_step
-from roughvisc.variables.slides import STEPPED_IN_SLIDES
 from roughvisc.views.observables.derived import along_time, need
 
 
@@ -36,7 +36,8 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     need(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
-    names = [name for name in (*STEPPED, *STEPPED_IN_SLIDES) if name in dataset]
+    dataset = whole_of(dataset)
+    names = [name for name in STEPPED if name in dataset]
     if of_step("time") not in dataset:
         return dataset[names]
     steps = dataset[[of_step(name) for name in names if of_step(name) in dataset]]

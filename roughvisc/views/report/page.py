@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.store import no_results, open_result, result_files, whole_file
+from roughvisc.study.storage.store import no_results, result_files, whole_file, whole_result
 from roughvisc.study.storage.trust import require_whole
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
@@ -139,7 +139,7 @@ def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
         require(source, rows_of(source), "x", "y")
         yield source
     else:
-        with open_result(source) as dataset:
+        with whole_result(source) as dataset:
             yield dataset
 
 
@@ -205,7 +205,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
 
 def _order(source: Path) -> tuple[Any, ...]:
     """Cases by what was varied in them, numbers by size."""
-    with open_result(source) as dataset:
+    with whole_result(source) as dataset:
         case = json.loads(dataset.attrs.get("case", "{}"))
     values = (case.get("varied") or {}).values()
     numbers = ((0, value, "") if isinstance(value, int | float) else (1, 0.0, str(value)) for value in values)

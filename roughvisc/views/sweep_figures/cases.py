@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.parameters import identifier
@@ -193,13 +194,14 @@ def cases_of(results: Any) -> Cases:
         If they are something else, or one case only.
     """
     if isinstance(results, xr.DataTree):
-        members = [_histories(node.to_dataset()) for node in results.children.values()]
+        members = [_histories(whole_of(node.to_dataset())) for node in results.children.values()]
         scalars = [str(name) for member in members for name in member.coords if not member[name].dims]
         names = dict.fromkeys(name for name in scalars if name not in _NO_PARAMETERS)
         columns = {name: [member[name] for member in members if name in member.coords] for name in names}
         columns = {name: found for name, found in columns.items() if len(found) == len(members)}
         parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
+        results = whole_of(results)
         held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "speed", "step"}]
         table = results[held].load()
         members = [table.isel(case=i) for i in range(results.sizes["case"])]

@@ -4,8 +4,8 @@ import time
 
 import pytest
 from click.testing import CliRunner
+from support import run_whole
 
-import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.study.execution.profile import REST, Profile, profiled
@@ -41,7 +41,7 @@ def study(tmp_path):
 def test_profile__sums_up_to_the_whole_and_counts_the_transforms(study, tmp_path):
     original = HalfSpace.displacement
     with profiled() as profile:
-        ds = rv.run(study, tmp_path / "out", progress=False)
+        ds = run_whole(study, tmp_path / "out", progress=False)
         assert HalfSpace.displacement is not original
     assert HalfSpace.displacement is original
     assert sum(profile.seconds.values()) == pytest.approx(profile.whole)

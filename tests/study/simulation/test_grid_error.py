@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
+from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, run_whole, simulate_whole, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
@@ -16,7 +16,7 @@ from roughvisc.topography.indenters import grown
 
 def pressed(shape, **settings):
     settings = {"times": TIMES, "tolerance": 1e-3, "progress": False, "grid_error": True, **settings}
-    return rv.simulate(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
+    return simulate_whole(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
 
 
 @pytest.mark.parametrize("shape", [(47, 60), (33, 31), 64])
@@ -37,7 +37,7 @@ def test_grid_error__is_large_where_no_grid_sees_the_contact():
     for shape in (15, 16):
         few = rv.Program().load(LOAD * (0.4 * SIZE[0] / 15 / float(EXACT.radius(0.0))) ** 3, over=0)
         ball = rv.sphere(RADIUS, SIZE[0], shape)
-        ds = rv.simulate(ball, rv.elastic(3e6), few, grid_error=True, progress=False)
+        ds = simulate_whole(ball, rv.elastic(3e6), few, grid_error=True, progress=False)
         assert int((ds.pressure > 0).sum()) <= 4
         assert float(ds.grid_error[0]) > 0.8
         assert float(ds.grid_error_area[0]) > 0.3
@@ -54,7 +54,7 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     program = rv.Program().load(np.pi / 2 * slope, over=0)
     if control == "approach":
         program = rv.Program().approach(exact.approach, over=0)
-    ds = rv.simulate(height, rv.elastic(0.25), program, grid_error=True, progress=False)
+    ds = simulate_whole(height, rv.elastic(0.25), program, grid_error=True, progress=False)
     force = abs(float(ds.force[0]) / (np.pi / 2 * slope) - 1)
     approach = abs(float(ds.approach[0]) / exact.approach - 1)
     assert float(ds.grid_error[0]) > max(force, approach)
@@ -171,7 +171,7 @@ def test_grid_error__is_missing_where_the_coarser_solve_fails():
     height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
     at_border = {"times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
     load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
-    ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
+    ds = simulate_whole(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
     assert np.isnan(ds.grid_error).all()
     assert np.isnan(ds.grid_error_area).all()
 
@@ -180,7 +180,7 @@ def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
     file = tmp_path / "ball.toml"
     file.write_text(BALL + "[solve]\ngrid_error = true\n")
     case = read_study(file)
-    with rv.run(case, tmp_path / "out", progress=False) as ds:
+    with run_whole(case, tmp_path / "out", progress=False) as ds:
         assert (ds.grid_error > 0).all()
         assert ds.grid_error.attrs["long_name"].endswith("due to the grid")
     file.write_text(BALL)
@@ -198,7 +198,7 @@ def test_direct_memory__gives_the_same_contact():
 def test_direct_memory__is_refused_where_it_would_ring():
     soft = rv.kelvin_voigt(1e6, 1e5)
     with pytest.raises(rv.InputError, match="memory='direct'"):
-        rv.simulate(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, memory="direct", progress=False)
+        simulate_whole(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, memory="direct", progress=False)
 
 
 def test_coarser__makes_an_indenter_anew_and_averages_where_points_are_missing():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.study.simulation import simulate as simulate_module
@@ -44,9 +45,9 @@ def grounds(monkeypatch):
 def test_quarter__gives_what_the_whole_surface_gives(name, grounds, monkeypatch):
     height, program, settings = MIRRORED[name]
     given = {"times": 5, "tolerance": 1e-6, "time_step": 0.05, "fields": FIELDS, "progress": False, **settings}
-    found = rv.simulate(height, ZENER, program, **given)
+    found = simulate_whole(height, ZENER, program, **given)
     monkeypatch.setattr("roughvisc.study.simulation.scene.is_mirrored", lambda height: False)
-    whole = rv.simulate(height, ZENER, program, **given)
+    whole = simulate_whole(height, ZENER, program, **given)
     assert [ground.mirrored for ground in grounds] == [True, False]
     if name == "grown":
         assert whole.sizes["x"] > height.sizes["x"]
@@ -75,25 +76,25 @@ def test_quarter__gives_what_the_whole_surface_gives(name, grounds, monkeypatch)
 
 def test_quarter__is_all_that_is_solved(solved_on):
     settings = {"times": 2, "tolerance": 1e-2, "progress": False, "boundary": "periodic"}
-    rv.simulate(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    simulate_whole(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
     assert set(solved_on) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
     solved_on.clear()
-    rv.simulate(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    simulate_whole(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
     assert set(solved_on) == {(22, 17)}
     solved_on.clear()
-    rv.simulate(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
+    simulate_whole(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
     assert set(solved_on) == {(24, 21)}, "the middle of 21 cells is a cell"
 
 
 def test_border__of_a_quarter_is_that_of_the_surface():
     """Its inner sides are not."""
     with pytest.raises(rv.EdgeContactError, match="20 x 24 cells"):
-        rv.simulate(rv.from_array(rv.sphere(1.0, 0.2, (20, 24)).values, 0.01), ZENER, LOADED_TWICE, progress=False)
+        simulate_whole(rv.from_array(rv.sphere(1.0, 0.2, (20, 24)).values, 0.01), ZENER, LOADED_TWICE, progress=False)
 
 
 def test_seed_method__solves_all_of_it(grounds):
     settings = {"method": "seed", "time_step": 0.1, "edge": "accept", "tolerance": 1e-2, "progress": False}
-    rv.simulate(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
+    simulate_whole(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
     assert not grounds[0].mirrored
 
 
@@ -136,7 +137,7 @@ def test_checkpoint__goes_on_with_a_quarter(tmp_path):
         "[keep]\ntimes = 9\n"
     )
     case = rv.read_study(study)
-    whole = rv.run(case, tmp_path / "whole", progress=False)
+    whole = run_whole(case, tmp_path / "whole", progress=False)
 
     class Enough(Exception):
         pass
@@ -146,8 +147,8 @@ def test_checkpoint__goes_on_with_a_quarter(tmp_path):
             raise Enough
 
     with pytest.raises(Enough):
-        rv.run(case, tmp_path / "part", progress=stop)
-    resumed = rv.run(case, tmp_path / "part", progress=False)
+        run_whole(case, tmp_path / "part", progress=stop)
+    resumed = run_whole(case, tmp_path / "part", progress=False)
     assert whole.sizes["x"] > 16, "it grew"
     for name in ("pressure", "gap", "approach", "iterations"):
         assert resumed[name].values.tobytes() == whole[name].values.tobytes(), name

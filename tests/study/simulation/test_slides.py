@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support import friction_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -57,7 +58,7 @@ def wave(cells=24):
 
 def slid(program, height=None, **settings):
     settings = {"boundary": "periodic", "progress": False} | settings
-    return rv.simulate(wave() if height is None else height, RUBBER, program, **settings)
+    return simulate_whole(wave() if height is None else height, RUBBER, program, **settings)
 
 
 def test_result__holds_friction_over_time_and_steps():
@@ -68,7 +69,7 @@ def test_result__holds_friction_over_time_and_steps():
     assert (np.diff(steps.sliding_distance) >= 0).all()
     assert steps.friction_force.sizes["time"] > 60
     np.testing.assert_allclose(ds.friction_coefficient[1:], ds.friction_force[1:] / ds.force[1:])
-    curve = rv.friction(wave(), RUBBER, speeds=0.1, pressure=1e4)
+    curve = friction_whole(wave(), RUBBER, speeds=0.1, pressure=1e4)
     ends = steps.friction_coefficient.sel(time=[program.corners[3], program.corners[5]], method="nearest")
     np.testing.assert_allclose(ends, curve.friction_coefficient.item(), rtol=0.02)
     assert "slope_friction_force" not in ds
@@ -177,7 +178,7 @@ def test_study__refuses_in_plain_words(tmp_path, old, new, message):
 
 def test_plan__counts_the_cells(study):
     found = rv.plan([read_study(study)]).isel(case=0)
-    ds = rv.simulate(wave(), RUBBER, read_study(study).program(), boundary="periodic", times=9, progress=False)
+    ds = simulate_whole(wave(), RUBBER, read_study(study).program(), boundary="periodic", times=9, progress=False)
     assert found.refusal.item() == ""
     assert "36 of one cell in slides" in found.scheme.item()
     assert found.steps.item() == pytest.approx(rv.observables.history(ds).sizes["time"], rel=0.4)

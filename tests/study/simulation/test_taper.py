@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from support import friction_whole, run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.study.cost.estimate import coarse
+from roughvisc.study.storage.store import whole_result
 from roughvisc.topography.grid import nominal_area
 from roughvisc.views.observables.area_theories import nominal_area_of
 
@@ -18,7 +20,7 @@ def rough(seed):
 
 
 def pressed(h, pressure):
-    return rv.simulate(h, RUBBER, rv.Program().pressure(pressure, over=0), **OPTIONS)
+    return simulate_whole(h, RUBBER, rv.Program().pressure(pressure, over=0), **OPTIONS)
 
 
 def weights(margin):
@@ -112,8 +114,8 @@ boundary = "periodic"
     height = case.height()
     assert float(rv.plan(study).nominal_pressure[0]) == pytest.approx(2e4)
     np.testing.assert_allclose(nominal_area(coarse(height, 20)), 0.95e-3 * 8.1e-4, rtol=5e-3)
-    rv.run(case, tmp_path / "out", progress=False)
-    stored = rv.open_result(next((tmp_path / "out").glob("*.nc")))
+    run_whole(case, tmp_path / "out", progress=False)
+    stored = whole_result(next((tmp_path / "out").glob("*.nc")))
     assert float(stored.force[-1]) == pytest.approx(2e4 * 0.95e-3 * 8.1e-4, rel=1e-3)
     assert rv.audit(stored)["window"].verdict == "broken"
     assert float(rv.open_results(tmp_path / "out").force[0, -1]) == float(stored.force[-1])
@@ -123,7 +125,7 @@ boundary = "periodic"
 def test_friction__slides_under_the_nominal_pressure_of_the_rest():
     h = rv.taper(rough(1).isel(x=slice(0, 40), y=slice(0, 36)), (5e-5, 4.5e-5))
     rubber = rv.zener(3e6, 1e6, 1e5)
-    ds = rv.friction(h, rubber, pressure=2e4, speeds=[1e-4], fields=("pressure",), tolerance=1e-2, progress=False)
+    ds = friction_whole(h, rubber, pressure=2e4, speeds=[1e-4], fields=("pressure",), tolerance=1e-2, progress=False)
     weight = np.outer(ds.taper_x, ds.taper_y)
     np.testing.assert_allclose(ds.force, 2e4 * 0.81 * 5e-4 * 4.5e-4, rtol=1e-3)
     contact = ds.pressure.values[0] > 0
@@ -133,6 +135,6 @@ def test_friction__slides_under_the_nominal_pressure_of_the_rest():
 
 def test_history__has_an_axis_of_the_fraction_only_where_area_and_fraction_are_proportional():
     for h, shown in ((rough(1), True), (rv.taper(rough(1), 1e-4), False)):
-        ds = rv.simulate(h, RUBBER, rv.Program().pressure(4e4, over=1), **OPTIONS | {"times": [0.1, 0.5, 1]})
+        ds = simulate_whole(h, RUBBER, rv.Program().pressure(4e4, over=1), **OPTIONS | {"times": [0.1, 0.5, 1]})
         labels = [child.get_ylabel() for ax in rv.plot.history(ds).axes for child in ax.child_axes]
         assert ("of nominal [%]" in labels) == shown

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.interpolate import CubicSpline
+from support import run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -24,7 +25,7 @@ WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
 
 
 def pressed(height, material, program, **settings):
-    return rv.simulate(height, material, program, **{"progress": False, "thickness": THICKNESS, **settings})
+    return simulate_whole(height, material, program, **{"progress": False, "thickness": THICKNESS, **settings})
 
 
 @pytest.mark.parametrize("wide", [0.3, 1.0, 3.0])
@@ -206,7 +207,7 @@ def case(tmp_path):
 
 def test_study__presses_the_sheet_that_it_states(case, tmp_path):
     assert case.kernel() == Sheet(1e-4, 0.5, "slipping")
-    ds = rv.run(case, out=tmp_path / "out", progress=False)
+    ds = run_whole(case, out=tmp_path / "out", progress=False)
     assert (ds.attrs["thickness"], ds.attrs["base"]) == (1e-4, "slipping")
     assert "kernel" not in ds.attrs
     same = pressed(case.height(), case.material(), case.program(), base="slipping", times=[0, 0.5])
@@ -232,7 +233,7 @@ def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
     path = tmp_path / "sweep.toml"
     path.write_text(STUDY + '[sweep]\n"material.thickness" = ["50 um", "0.2 mm", inf]\n')
     results = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
-    assert results["material.thickness"].values.tolist() == [5e-5, 2e-4, math.inf]
+    assert results["material_thickness"].values.tolist() == [5e-5, 2e-4, math.inf]
     approach = results.approach.isel(time=-1).values.tolist()
     assert approach == sorted(approach), "the thicker the softer"
     assert len(set(approach)) == 3
@@ -252,7 +253,7 @@ def test_trade__offers_no_closed_form_of_a_half_space(case):
 def test_plan_and_result__say_whether_a_half_space_would_have_done(case, thickness, words):
     other = vary(case, {"material.thickness": thickness})
     assert words in str(rv.plan([other]).body_note.values[0])
-    ds = rv.simulate(
+    ds = simulate_whole(
         other.height(), other.material(), other.program(), thickness=thickness, base="slipping", progress=False
     )
     assert words in ds.attrs["body_note"]

@@ -18,6 +18,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from support import run_whole
 
 from roughvisc.errors import InUseError
 from roughvisc.mechanics.fields.sparse import Sparse
@@ -28,7 +29,6 @@ from roughvisc.mechanics.stepping.pace import Pace
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
@@ -36,7 +36,7 @@ from roughvisc.study.storage import records
 from roughvisc.study.storage.checkpoint import Keeper, Reached, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.records import RowFile
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.store import whole_result
 
 # Recovers after a jump down, holds the approach, and keeps times that no step would land on by itself.
 MODES = """
@@ -136,7 +136,7 @@ def case_of(text, folder):
 
 def values(path):
     """All variables but wall_time, to the last bit."""
-    with open_result(path) as ds:
+    with whole_result(path) as ds:
         loaded = ds.drop_vars("wall_time").load().variables
         return {str(name): (v.dims, v.dtype, v.values.tobytes()) for name, v in loaded.items()}
 
@@ -463,7 +463,7 @@ def test_finished_case__is_not_run_again(whole, tmp_path, monkeypatch):
 
     monkeypatch.setattr(run_module, "carry_out", computed)
     assert run_case(case, tmp_path) == path
-    xr.testing.assert_identical(run(case, tmp_path).load(), open_result(path).load())
+    xr.testing.assert_identical(run_whole(case, tmp_path).load(), whole_result(path).load())
     # killed after the result was in place, before all else was gone
     for left in (f".{case.key}.unfinished/rows", f".{case.key}.lock", f".{case.key}.0f0f0f0f.part.nc"):
         (tmp_path / left).parent.mkdir(exist_ok=True)
@@ -513,7 +513,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     path = run_case(case, tmp_path, stop=stop)
     assert stop.asked == steps - steps // 2
     assert not caplog.records
-    with open_result(path) as mixed:
+    with whole_result(path) as mixed:
         assert mixed.attrs["transforms"] == f"{here}; then {there}"
         force = mixed.pressure.sum(("x", "y")).values
     assert run_case(case, tmp_path, stop=stop) == path
@@ -522,7 +522,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     assert f"1 with {here}; then {there}, where this process has {there}: equal within" in record.getMessage()
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     assert values(run_case(case, tmp_path, same_bits=True)) == expected
-    with open_result(path) as same:
+    with whole_result(path) as same:
         assert same.attrs["transforms"] == here
         np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
 
@@ -532,7 +532,7 @@ def test_other_transforms__begin_again_where_bits_are_asked_for(whole, tmp_path,
     stopped(case, tmp_path, steps // 2)
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
     stop = Stop()
-    with open_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
+    with whole_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
         assert ds.attrs["transforms"] == transform_library()
     assert stop.asked == steps
 

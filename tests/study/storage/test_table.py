@@ -5,14 +5,14 @@ import csv
 import numpy as np
 import pandas as pd
 import pytest
-from support import BALL
+from support import BALL, run_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.execution.watch import Silence
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.table import CASES
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
@@ -44,7 +44,7 @@ def test_table__says_what_the_results_say(folder):
     assert table["status"].tolist() == ["converged", "converged", "failed", "failed"]
     assert (table["message"].str.contains("border") == [False, False, True, True]).all()
     for row in range(2):
-        with open_result(folder / table["file"].iloc[row]) as ds:
+        with whole_result(folder / table["file"].iloc[row]) as ds:
             for heading, value in {
                 "time [s]": ds.time[-1],
                 "force [N]": ds.force[-1],
@@ -78,7 +78,7 @@ def test_table__leaves_out_what_is_not_known(folder, tmp_path):
     with pytest.raises(InputError, match="holds no results"):
         rv.to_table(tmp_path)
     (tmp_path / "one.toml").write_text(SMALL)
-    rv.run(rv.read_study(tmp_path / "one.toml"), out=tmp_path / "one", progress=False)
+    run_whole(rv.read_study(tmp_path / "one.toml"), out=tmp_path / "one", progress=False)
     table = rv.to_table(tmp_path / "one")
     assert table["title"].tolist() == ["A ball"]
     assert not [name for name in table if name.startswith(("program", "material"))], "nothing was varied"
@@ -103,4 +103,4 @@ def test_results__are_frames_of_pandas(folder):
     frame = results[["force", "contact_area"]].to_dataframe().reset_index()
     assert len(frame) == 2 * 3
     assert np.array_equal(frame["force"], results.force.values.ravel())
-    assert np.array_equal(frame["program.0.load"].unique(), [5e-4, 1e-3])
+    assert np.array_equal(frame["program_0_load"].unique(), [5e-4, 1e-3])

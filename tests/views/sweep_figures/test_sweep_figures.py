@@ -366,8 +366,8 @@ def test_tree__of_cases_with_times_of_their_own(folder):
     (ax, *_) = plot.sweep(tree, "approach", along="program.0.load").axes
     assert ax.get_xlabel() == "Load [mN]"
     assert ax.get_title(loc="right") == "at the end"
-    held = [node for node in tree.children.values() if float(node["program.1.hold"]) == 0.1]
-    held.sort(key=lambda node: float(node["program.0.load"]))
+    held = [node for node in tree.children.values() if float(node["program_1_hold"]) == 0.1]
+    held.sort(key=lambda node: float(node["program_0_load"]))
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
     np.testing.assert_allclose(ax.lines[0].get_ydata(), [scale * float(node["approach"][-1]) for node in held])
     assert len(plot.histories_of_cases(tree, "approach").axes[0].lines) == 6
@@ -403,7 +403,7 @@ def test_report__shows_the_sweep(folder, tmp_path):
 
 def test_units__of_parameters_are_on_their_coordinates(folder):
     node = next(iter(results_of(folder).children.values()))
-    assert (node["program.0.load"].attrs["units"], node["program.1.hold"].attrs["units"]) == ("N", "s")
+    assert (node["program_0_load"].attrs["units"], node["program_1_hold"].attrs["units"]) == ("N", "s")
 
 
 def test_unit_of__cycles_by_what_they_control():
