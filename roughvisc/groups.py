@@ -30,7 +30,8 @@ _PREFIX = of_step("")
 
 def split(whole: xr.Dataset) -> dict[str, xr.Dataset]:
     """Root and groups of a whole result: the root under an empty name, and no group that would be empty."""
-    known = VOCABULARIES[rows_of(whole.variables)]
+    rows = rows_of(whole.variables)
+    known = VOCABULARIES[rows]
     names: dict[str, list[str]] = {}
     for name in map(str, whole.data_vars):
         names.setdefault(known[name].group if name in known else "", []).append(name)
@@ -40,7 +41,8 @@ def split(whole: xr.Dataset) -> dict[str, xr.Dataset]:
     parts = {"": root}
     for group in [group for group in GROUPS if group in names]:
         part = whole[names[group]]
-        part = part.drop_vars(["step", *(name for name, one in part.coords.items() if not one.dims)], errors="ignore")
+        scalars = [name for name, one in part.coords.items() if not one.dims and (name != rows or group == "steps")]
+        part = part.drop_vars(["step", *scalars], errors="ignore")
         if group == "steps":
             part = part.rename({name: name.removeprefix(_PREFIX) for name in names[group]}).set_coords("time")
         part.encoding = {}
@@ -136,8 +138,9 @@ def group_of(dataset: xr.Dataset, group: str) -> xr.Dataset:
         raise InputError(f"group is {group!r}: expected one of {', '.join(GROUPS)}")
     whole = whole_of(dataset)
     found = split(whole).get(group)
-    if found is None and group == "steps" and "time" in whole.dims:
-        rows = whole[[name for name in STEPPED if name in whole]]
+    every_step = [name for name in STEPPED if name in whole]
+    if found is None and group == "steps" and every_step and "time" in whole.dims:
+        rows = whole[every_step]
         rows = rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
         found = rows.drop_indexes("time").rename_dims(time="step")
         found.encoding, found.attrs = {}, {"title": GROUPS[group]}

@@ -105,11 +105,12 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
     columns: dict[str, Any] = {"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)}
     for rows in dict.fromkeys(entry.along for entry in entries if entry):
         mine = [entry if entry and entry.along == rows else None for entry in entries]
+        headings = {name: heading(name, one.units) for name, one in VOCABULARIES[rows].items()}
         for name in _TOLD[rows]:
-            column = columns.setdefault(heading(name, VOCABULARIES[rows][name].units), [np.nan] * len(keys))
+            column = columns.setdefault(headings[name], [np.nan] * len(keys))
             column[:] = _filled(column, mine, name, _telling)
         for name in _LARGEST[rows]:
-            column = columns.setdefault(f"largest {name}", [np.nan] * len(keys))
+            column = columns.setdefault(f"largest {headings[name]}", [np.nan] * len(keys))
             column[:] = _filled(column, mine, name, _largest)
     table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
     records = [failures.get(key) or {} for key in keys]
