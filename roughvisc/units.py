@@ -123,7 +123,26 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def range_in_words(above: float | None, least: float | None, most: float | None, below: float | None) -> str:
+def within(
+    number: float,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    below: float | None = None,
+) -> bool:
+    """Whether a number lies between bounds, the first and the last excluded; NaN lies in none."""
+    return (
+        (above is None or number > above)
+        and (above != 0 or number >= sys.float_info.min)  # whose reciprocal a double can hold
+        and (least is None or number >= least)
+        and (most is None or number <= most)
+        and (below is None or number < below)
+    )
+
+
+def range_in_words(
+    above: float | None = None, least: float | None = None, most: float | None = None, below: float | None = None
+) -> str:
     """``" above 0 and up to 0.5"`` and the like; empty without bounds."""
     words = [
         f"{word} {bound:g}"
@@ -194,14 +213,7 @@ def bounded_quantity(
             if is_quantity(value, other):
                 raise InputError(f"{error}; did you mean {key} = {value!r}?") from None
         raise
-    outside = (
-        (above is not None and not number > above)
-        or (above == 0 and number < sys.float_info.min)  # whose reciprocal no double can hold
-        or (least is not None and not number >= least)
-        or (most is not None and not number <= most)
-        or (below is not None and not number < below)
-    )
-    if outside:
+    if not within(number, above, least, most, below):
         raise InputError(f"found {shown(value)}: expected {wanted_quantity(unit, above, least, most, below)}")
     return number
 

@@ -11,14 +11,13 @@ from typing import Any
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
+from roughvisc.study.statement.settings import ENTRIES
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
 NUMERICS_REVISION = 18
 
-#: Keys of ``[solve]`` that always count. Any other came later, and its usual value leaves a case's key as it was.
-_FROM_THE_START = {"boundary", "tolerance", "time_step", "method", "edge"}
 #: Keys of a surface card that say whence it came and change no height.
 _PROSE = {
     "title",
@@ -49,7 +48,7 @@ def identity(settings: Study) -> tuple[str, str]:
     )
     usual = type(settings.solve)().model_dump(mode="json")
     stated["solve"] = {
-        key: value for key, value in stated["solve"].items() if key in _FROM_THE_START or value != usual[key]
+        key: value for key, value in stated["solve"].items() if ENTRIES[key].always_in_key or value != usual[key]
     }
     if settings.friction is None:
         stated["program"] = [

@@ -22,6 +22,7 @@ from roughvisc.study.statement.schema.entries import (
 )
 from roughvisc.study.statement.schema.section import Section, refuse
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
+from roughvisc.study.statement.settings import ENTRIES
 
 _SPEED = measured("m/s", above=0)
 _WANTED = "a speed in m/s, a list of them, or a table with from, to and count"
@@ -95,11 +96,9 @@ def refuse_beside_friction(solve: SolveSection, keep: KeepSection, missing: str)
     """
     if solve.boundary != "periodic":
         raise refuse("solve.boundary", f"found {solve.boundary!r}: steady sliding repeats: expected 'periodic'")
-    for key in ("time_step", "method", "edge", "memory"):
-        if getattr(solve, key) != SolveSection.model_fields[key].default:
-            raise refuse(
-                f"solve.{key}", f"found {getattr(solve, key)!r}: steady sliding has none: expected no such key"
-            )
+    for key, value in solve:
+        if not ENTRIES[key].of_sliding and value != SolveSection.model_fields[key].default:
+            raise refuse(f"solve.{key}", f"found {value!r}: steady sliding has none: expected no such key")
     if keep.times != "all":
         raise refuse("keep.times", f"found {shown(keep.times)}: steady sliding has no times: expected no such key")
     if "displacement" in keep.fields:

@@ -1,4 +1,4 @@
-"""What each key of a study file means: ``keys.toml`` beside this file, for the schema and for its page."""
+"""What each key of a study file means, for the schema and for its page: ``keys.toml``, and the settings' entries."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 from roughvisc.study.statement.schema.program import KINDS, RECORDINGS
 from roughvisc.study.statement.schema.surface import RECIPES
+from roughvisc.study.statement.settings import ENTRIES
 
 _STEPS = ("surface: steps of a face", "surface: steps of the profile")
 _RECIPES = {name: (f"generate: {name}", "generate: any", *_STEPS) for name in RECIPES}
@@ -36,8 +37,12 @@ _TABLES = {
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """Table -> key -> meaning and example."""
-    return tomllib.loads(files(__package__).joinpath("keys.toml").read_text(encoding="utf-8"))
+    """Table -> key -> meaning and example; those of settings come from their entries."""
+    found = tomllib.loads(files(__package__).joinpath("keys.toml").read_text(encoding="utf-8"))
+    for name, entry in ENTRIES.items():
+        table = {"surface": _STEPS[1]}.get(entry.table, entry.table)
+        found.setdefault(table, {})[name] = [entry.about, entry.example]
+    return found
 
 
 def meaning(tables: Sequence[str], key: str) -> list[str]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.entries import Flag, a_list, checked, choice, measured, shown, whole, word_or
 from roughvisc.study.statement.schema.section import Section, nearest
-from roughvisc.study.statement.settings import FINEST_TOLERANCE, MOST_TIMES, WORDS, Settings
+from roughvisc.study.statement.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
+from roughvisc.units import range_in_words
 from roughvisc.variables import FIELDS
 
 _INSTANT = measured("s", least=0)
@@ -36,16 +37,27 @@ def _fields(value: Any) -> Any:
     return tuple(name for name in FIELDS if name in names)
 
 
-class SolveSection(Section):
-    """How it is computed."""
+def _kind(name: str) -> Any:
+    """Kind of a setting, as a study file has it."""
+    entry = ENTRIES[name]
+    if name in WORDS:
+        return choice(*WORDS[name])
+    if isinstance(getattr(Settings, name), bool):
+        return Flag
+    number = measured(entry.unit, **entry.bounds)
+    if name not in WORD_OR_NUMBER:
+        return number
+    word = WORD_OR_NUMBER[name]
+    return word_or(word, number, f"{word!r}, or {entry.noun} in {entry.unit}{range_in_words(**entry.bounds)}")
 
-    boundary: choice(*WORDS["boundary"]) = Settings.boundary
-    tolerance: measured("1", least=FINEST_TOLERANCE, below=1) = Settings.tolerance
-    time_step: word_or("auto", measured("s", above=0), "'auto', or a time in s above 0") = Settings.time_step
-    method: choice(*WORDS["method"]) = Settings.method
-    edge: choice(*WORDS["edge"]) = Settings.edge
-    memory: choice(*WORDS["memory"]) = Settings.memory
-    grid_error: Flag = Settings.grid_error
+
+SolveSection = create_model(
+    "SolveSection",
+    __base__=Section,
+    __doc__="How it is computed.",
+    __module__=__name__,
+    **{name: (_kind(name), getattr(Settings, name)) for name, entry in ENTRIES.items() if entry.table == "solve"},
+)
 
 
 class KeepSection(Section):
