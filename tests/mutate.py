@@ -244,7 +244,7 @@ def noticed_by(tests, known, timeout=math.inf):
         with open(os.devnull, "w") as nowhere:
             os.dup2(nowhere.fileno(), 1)
             os.dup2(nowhere.fileno(), 2)
-        arguments = ["-q", "-x", "-p", "no:cacheprovider", "-k", LEFT_OUT, *tests]
+        arguments = ["-q", "-x", "-p", "no:cacheprovider", "-m", "not long", "-k", LEFT_OUT, *tests]
         os._exit(int(pytest.main(arguments, plugins=[QuickestFirst(known)])) != 0)
     ends = time.monotonic() + timeout
     while time.monotonic() < ends:
