@@ -30,27 +30,27 @@ class ConvergenceError(RoughviscError, RuntimeError):
     """A step did not reach its tolerance: the message names the time, the residual and what to try."""
 
 
-class HinderedError(RoughviscError, RuntimeError):
+class TransientError(RoughviscError, RuntimeError):
     """Something outside the case was in its way: nothing is recorded against the case, and the same command goes on."""
 
 
-class InUseError(HinderedError):
+class InUseError(TransientError):
     """Another run is at work on the same thing: the message names it."""
 
 
-class FolderError(InputError, HinderedError):
+class FolderError(InputError, TransientError):
     """A folder cannot be made or written to."""
 
 
-class DiskFullError(HinderedError):
+class DiskFullError(TransientError):
     """No space is left for what a case has to write."""
 
 
-class TooLargeError(InputError, HinderedError):
+class TooLargeError(InputError, TransientError):
     """A case takes more memory than there is here: the message says how much, and what would fit."""
 
 
-class ChangedError(HinderedError):
+class ChangedError(TransientError):
     """A file was changed after the case that names it was read."""
 
 

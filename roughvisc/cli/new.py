@@ -34,7 +34,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
 
     from roughvisc.study.cost.first_pressure import first_pressure
     from roughvisc.study.statement.starter import starter_study
-    from roughvisc.study.storage.store import whole_file
+    from roughvisc.study.storage.store import atomic_write
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.scans import open_scan
@@ -54,7 +54,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
     scan = open_scan(wanted, **options)
     found = inspect_scan(scan)
     text = starter_study(wanted, out, options, found, first_pressure(scan, found))
-    with whole_file(out) as temporary:
+    with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()
     console.print(advice_table(found))
@@ -68,12 +68,12 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
 
 def _write_example(path: Path) -> None:
     """Write the scan that ships with roughvisc; one that is there already stays, and has to be the same."""
-    from roughvisc.study.storage.store import whole_file
+    from roughvisc.study.storage.store import atomic_write
     from roughvisc.topography.example import example_scan
 
     held = example_scan()
     if not path.exists():
-        with whole_file(path) as temporary:
+        with atomic_write(path) as temporary:
             shutil.copyfile(held, temporary)
     elif path.read_bytes() != held.read_bytes():
         raise InputError(f"{path}: exists already, and is not written over: expected an empty folder, or your own FILE")

@@ -47,7 +47,7 @@ def scan(
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import whole_file
+    from roughvisc.study.storage.store import atomic_write
     from roughvisc.topography.bandwidth import level
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.parameters import parameters
@@ -83,10 +83,10 @@ def scan(
     else:
         say(console, "Picture", write_figure(surface(levelled), picture))
     if to:
-        with whole_file(to) as temporary:
+        with atomic_write(to) as temporary:
             save_scan(height, temporary)
         say(console, "Converted", to)
     if card:
-        with whole_file(card) as temporary:
+        with atomic_write(card) as temporary:
             temporary.write_text(text, encoding="utf-8")
         say(console, "Card", card)

@@ -55,9 +55,9 @@ def clean(results: Path, everything: bool, superseded: bool) -> None:
     Example:
       roughvisc clean results/ground_steel-study
     """
-    from roughvisc.study.storage.tidy import kept_of_other_versions, tidy
+    from roughvisc.study.storage.tidy import clean_folder, kept_of_other_versions
 
-    removed = tidy(results, everything=everything, outdated=True, superseded=superseded)
+    removed = clean_folder(results, everything=everything, outdated=True, superseded=superseded)
     for path in removed:
         click.echo(printable(f"removed {path.name}"))
     for line in kept_of_other_versions(results):

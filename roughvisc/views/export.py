@@ -9,7 +9,7 @@ import xarray as xr
 
 from roughvisc.groups import whole_of
 from roughvisc.labels import heading
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import atomic_write
 from roughvisc.variables import FLAGS
 from roughvisc.variables.rows import rows_of
 from roughvisc.views.figures.axes import frame_at, require
@@ -50,7 +50,7 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
         table[name] = [FLAGS[name][value] for value in table[name]]
     headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
     settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # the same on every system
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         table.to_csv(temporary, header=headings[1:], compression=None, **settings)
     return Path(path)
 

@@ -20,10 +20,10 @@ from roughvisc.cli import main as command
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import result_files, whole_result
-from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.tidy import clean_folder
 from roughvisc.study.storage.verify import verify
 
 _ONE = BALL.replace("[24, 21]", "[12, 9]")
@@ -49,7 +49,7 @@ def prepare(folder):
         if name == "one":
             run_case(cases[0], folder / name, checkpoint_steps=3)
         else:
-            run_cases(cases, folder / name, watch=Silence(), workers=0)
+            run_cases(cases, folder / name, watch=NullMonitor(), workers=0)
         studies[name] = path, cases, _values(folder / name), time.monotonic() - began
     began = time.monotonic()
     _wait(
@@ -205,6 +205,6 @@ def _check(out, wanted, whole):
     else:
         assert sorted(f"{key}.nc" for key in served["case_key"].values) == sorted(found)
     if whole:
-        tidy(out)
+        clean_folder(out)
         left = [one.name for one in Path(out).iterdir() if one.suffix == ".part" or ".unfinished" in one.name]
         assert not left, f"{left} are left behind"

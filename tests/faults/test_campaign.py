@@ -159,7 +159,7 @@ def test_campaign__notices_a_result_that_is_written_in_place(tmp_path, monkeypat
         path.parent.mkdir(parents=True, exist_ok=True)
         yield path
 
-    mine, seal = os.getpid(), store.seal
+    mine, seal = os.getpid(), store.append_checksum
 
     def killed_before(path):
         if os.getpid() != mine:
@@ -167,8 +167,8 @@ def test_campaign__notices_a_result_that_is_written_in_place(tmp_path, monkeypat
         seal(path)
 
     def plant():
-        monkeypatch.setattr(store, "whole_file", in_place)
-        monkeypatch.setattr(store, "seal", killed_before)
+        monkeypatch.setattr(store, "atomic_write", in_place)
+        monkeypatch.setattr(store, "append_checksum", killed_before)
 
     monkeypatch.setattr("killed_runs._WAYS", ("operation",))
     monkeypatch.setattr("killed_runs._OPERATIONS", (10_000,))  # it dies of what is planted

@@ -17,11 +17,11 @@ from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import whole_result
-from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.tidy import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -63,7 +63,7 @@ def test_at_a_file_operation(case, wanted, tmp_path, most):
         folder = tmp_path / way / at
         with whole_result(run_case(case, folder)) as found:
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
-        tidy(folder)
+        clean_folder(folder)
         assert [path.name for path in folder.iterdir()] == [f"{case.key}.nc"], (way, at, end)
 
 
@@ -115,7 +115,7 @@ def test_damaged_results(tmp_path, count):
     path = tmp_path / "two.toml"
     path.write_text(TWO_LOADS)
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(21)
-    run_cases(cases, out, watch=Silence(), workers=0)
+    run_cases(cases, out, watch=NullMonitor(), workers=0)
     wanted = whole_of(rv.open_results(out, cases=cases)).drop_vars("wall_time").load()
     places = [out / f"{case.key}.nc" for case in cases]
     whole = [place.read_bytes() for place in places]
@@ -130,7 +130,7 @@ def test_damaged_results(tmp_path, count):
             except InputError:
                 refused += 1
             if number % 10 == 0:
-                outcomes = run_cases(cases, out, watch=Silence(), workers=0)
+                outcomes = run_cases(cases, out, watch=NullMonitor(), workers=0)
                 assert {one.kind for one in outcomes.values()} == {"done"}
                 found = whole_of(rv.open_results(out)).drop_vars("wall_time")
                 xr.testing.assert_equal(found.load(), wanted)
@@ -150,7 +150,7 @@ def test_damaged_index(tmp_path, count):
     path = tmp_path / "two.toml"
     path.write_text(TWO_LOADS)
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(22)
-    run_cases(cases, out, watch=Silence(), workers=0)
+    run_cases(cases, out, watch=NullMonitor(), workers=0)
     wanted = rv.open_results(out).load()
     whole = {name: (out / name).read_bytes() for name in (INDEX, LATEST)}
     for number in range(count):

@@ -7,7 +7,7 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import FolderError
-from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.baggage import serialize_with_inputs
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 
@@ -87,12 +87,12 @@ def test_inputs__are_copied_to_no_folder_behind_a_link(tmp_path, precious):
     surface = SMALL[SMALL.index("generate") : SMALL.index("[material]")]
     (tmp_path / "s.toml").write_text(SMALL.replace(surface, 'file = "scan.nc"\n'))
     (case,) = read_cases(tmp_path / "s.toml")
-    pack(case, tmp_path / "plain")
+    serialize_with_inputs(case, tmp_path / "plain")
     (digest,) = [path.name for path in (tmp_path / "plain").iterdir()]
     (tmp_path / "inputs").mkdir()
     (tmp_path / "inputs" / digest).symlink_to(folder, target_is_directory=True)
     with pytest.raises(FolderError, match=rf"inputs/{digest}: is a link: expected a folder of copied inputs"):
-        pack(case, tmp_path / "inputs")
+        serialize_with_inputs(case, tmp_path / "inputs")
     assert untouched()
 
 

@@ -29,7 +29,7 @@ from scipy import fft
 import roughvisc as rv
 from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation.malloc import keeping
+from roughvisc.study.simulation.malloc import retain_arena
 
 AREAS = (0.05, 0.3, 0.95)
 REFERENCE = 1e-12
@@ -53,7 +53,7 @@ def scene(cells, area):
 
 def ours(gap, mean, boundary, tolerance, threads):
     halfspace = HalfSpace(gap.shape, (1.0, 1.0), boundary)
-    passes, solved = [], solver.solved
+    passes, solved = [], solver.pcg
 
     def counted(*given, **named):
         state = solved(*given, **named)
@@ -61,7 +61,7 @@ def ours(gap, mean, boundary, tolerance, threads):
         return state
 
     counting = mock.patch.object(solver, "solved", counted)
-    with counting, fft.set_workers(threads), keeping(gap.nbytes):  # the last two as a march does
+    with counting, fft.set_workers(threads), retain_arena(gap.nbytes):  # the last two as a march does
         state = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=tolerance)
     return state.pressure, state.iterations, sum(passes)
 

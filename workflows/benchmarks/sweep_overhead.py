@@ -17,7 +17,7 @@ from dask.system import CPU_COUNT
 
 from roughvisc.study.execution import run
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.simulation import rows
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage import records
@@ -49,7 +49,7 @@ def sweep(count, workers, boundary):
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         with processor_time() as spent:
-            outcomes = run_cases(cases, Path(folder), watch=Silence(), workers=workers)
+            outcomes = run_cases(cases, Path(folder), watch=NullMonitor(), workers=workers)
         wall, used = time.perf_counter() - began, sum(spent.values())
     assert all(outcome.entry for outcome in outcomes.values())
     return {
@@ -76,7 +76,7 @@ def storing(cells, boundary):
     base = Case.from_json(STUDY)
     solve = {"solve.boundary": boundary, "solve.edge": "accept", "solve.tolerance": 1e-3}
     case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 5e-3 / cells, "keep.times": "all"} | solve)
-    places = ((records.RowFile, "append"), (run, "keep"), (run.Keeper, "save"), (rows.Rows, "dataset"))
+    places = ((records.RowFile, "append"), (run, "keep"), (run.CheckpointWriter, "save"), (rows.Rows, "dataset"))
     inside, found = [], {place: getattr(*place) for place in places}
 
     def timed(function):

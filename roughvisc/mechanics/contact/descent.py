@@ -106,7 +106,7 @@ def conjugate_gradient(
     free_set, residual, held = free
     reference = level if problem.load is None else passes.total(residual, threads) / residual.size
     passes.lower(residual, reference, threads)
-    search, caution = problem.answered(residual, free_set, held, energy)
+    search, caution = problem.precondition(residual, free_set, held, energy)
     asked = caution * passes.magnitude(search, threads) if measured else math.nan
     if previous is not None:
         search = _conjugate(problem, search, residual, free_set, previous)
@@ -140,7 +140,7 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
 
     beta = sum(passes.of_vectors(along, threads, search, free_set))
     if beta > 0:
-        former = passes.carried_over(previous.change, previous.free_set, free_set, influence.size, threads)
+        former = passes.regather(previous.change, previous.free_set, free_set, influence.size, threads)
         mean = 0.0 if problem.load is None else passes.total(former, threads) / former.size
 
         def conjugated(here: Array, there: Array, downhill: Array) -> float:
@@ -186,10 +186,10 @@ def admissible_fraction(trial: Trial, minimum: float, threads: int) -> tuple[flo
     """Fraction of a trial to take, and whether the border of the feasible set cut it."""
     held, tried, change = trial.held, trial.pressure, trial.change
 
-    def emptied(before: Array, after: Array) -> bool:
+    def release(before: Array, after: Array) -> bool:
         return bool(np.count_nonzero((before > 0) & (after == 0)))
 
-    if any(passes.of_vectors(emptied, threads, held, tried)):
+    if any(passes.of_vectors(release, threads, held, tried)):
         # whole if f falls by it, so that these cells leave the contact
         return (1.0, minimum > 1) if minimum > _HALF_WAY else (minimum, False)
     if minimum <= 1:

@@ -45,7 +45,7 @@ class Influence:
 
     def at(self, field: Array, cells: Cells) -> Array:
         """Values of a field at some cells, as flat indices."""
-        return passes.taken(field, cells, self.threads)
+        return passes.gather(field, cells, self.threads)
 
     @property
     def largest(self) -> float:

@@ -97,7 +97,7 @@ class Search:
         return Search(self.step_length, self.spacer, self.single, self.best, self.since + 1)
 
 
-def solved(
+def pcg(
     problem: Problem,
     start: Array | None,
     start_displacement: Array | None,
@@ -176,7 +176,7 @@ def solved(
 
 def _first(problem: Problem, start: Array | None, start_displacement: Array | None) -> Iterate:
     """The first guess, made admissible."""
-    pressure, displacement = problem.feasible(start, start_displacement)
+    pressure, displacement = problem.initial_iterate(start, start_displacement)
     approximate = displacement is not None
     if displacement is None:
         displacement = problem.influence.displacement(pressure)
@@ -227,7 +227,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
     influence, free_set, threads = problem.influence, trial.free_set, problem.influence.threads
     pressure, displacement = iterate.pressure.reshape(-1), iterate.displacement
     if not search.single:  # else its displacement is that of the change alone
-        passes.put(pressure, free_set, trial.pressure, threads)
+        passes.scatter(pressure, free_set, trial.pressure, threads)
     response, unit = _response(influence, iterate, trial, search.single)
     curvature = unit * passes.inner(response, free_set, trial.change, threads)
     minimum = minimum_along(trial, curvature)
@@ -243,7 +243,7 @@ def _stepped(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -
         return cells[here > 0]
 
     found = passes.of_vectors(taken, threads, free_set, trial.pressure, trial.change, trial.held)
-    contact = passes.joined(found, threads)
+    contact = passes.concatenate(found, threads)
     passes.add_scaled(displacement, response, fraction * unit, threads)
     stepped = Iterate(iterate.pressure, displacement, contact, approximate=search.single)
     if search.spacer:

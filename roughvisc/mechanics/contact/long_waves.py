@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.threads import beside
+from roughvisc.mechanics.fields.threads import submit
 
 # Cells a side from which blocks may pay, and the part of the grid that is free up to which they do. Below the one and
 # above the other the sums over blocks take the time that is saved (measured at 512 squared: 3 to 14 % more time for 10
@@ -111,7 +111,7 @@ class LongWaves:
             np.subtract(residual[part], means.take(self.blocks[part]), out=rest[part])
 
         passes.of_parts(without_means, residual.size, threads)
-        waves = beside(partial(self._answered, self.cells * means), threads)
+        waves = submit(partial(self._answered, self.cells * means), threads)
         try:
             found = fine(rest)
         finally:

@@ -154,7 +154,7 @@ class Problem:
 
         def work(part: slice, few: slice) -> float:
             here = self.separation_of(displaced, part)
-            here.take(passes.within(part, contact[few]), out=apart[few], mode="clip")  # by others by way of a copy
+            here.take(passes.local_index(part, contact[few]), out=apart[few], mode="clip")  # by others by way of a copy
             return self.lowest_of(here, part)
 
         return min(passes.with_cells(work, displaced.size, contact, self.influence.threads)), apart, None
@@ -183,7 +183,7 @@ class Problem:
         parts = [list(each) for each in zip(*found, strict=True)]
         del found
         # the parts go as they are joined
-        return FreeSet(*(passes.joined(parts.pop(0), threads) for _ in range(3)))
+        return FreeSet(*(passes.concatenate(parts.pop(0), threads) for _ in range(3)))
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load, in its place."""
@@ -196,7 +196,7 @@ class Problem:
         """About the change of pressure that a residual asks for, but for the scale; keeps a given load."""
         return self.tangent(self.influence.approximate_pressure(residual, free_set))
 
-    def answered(self, residual: Array, free_set: Cells, pressure: Array, energy: float) -> tuple[Array, float]:
+    def precondition(self, residual: Array, free_set: Cells, pressure: Array, energy: float) -> tuple[Array, float]:
         """The same by both levels of the preconditioner where the second pays, and how cautious to be of its size.
 
         ``pressure`` is that on the free set so far, and ``energy`` is ``p.Kp``.
@@ -207,7 +207,7 @@ class Problem:
         cells = partial(self.influence.approximate_pressure, cells=free_set)
         return self.tangent(waves.preconditioned(residual, cells)), CAUTION
 
-    def feasible(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
+    def initial_iterate(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
         threads = self.influence.threads
         if start is None or not passes.any_positive(start):

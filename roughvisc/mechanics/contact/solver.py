@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.contact.iteration import solved
+from roughvisc.mechanics.contact.iteration import pcg
 from roughvisc.mechanics.contact.problem import Array, Problem
 from roughvisc.mechanics.contact.state import ContactState
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty, reused
-from roughvisc.mechanics.fields.threads import blocks, side_by_side
+from roughvisc.mechanics.fields.threads import blocks, parallel_map
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 # A cold start on so many cells a side is guessed on a grid of half as many, which is guessed in the same way.
@@ -93,7 +93,7 @@ def solve_contact(
         if load is not None and present is None and (start is None or not passes.any_positive(start)):
             start, start_displacement = coarse_guess(halfspace, gap, load), None
         problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
-        return solved(
+        return pcg(
             problem,
             start,
             start_displacement,
@@ -126,7 +126,7 @@ def _averaged(field: Array, shape: tuple[int, int], threads: int) -> Array:
         here *= 0.25
         np.add(here.take(columns, axis=1), here.take(columns + 1, axis=1), out=found[part])
 
-    side_by_side(work, list(blocks(shape[0], _ROWS)), threads)
+    parallel_map(work, list(blocks(shape[0], _ROWS)), threads)
     return found
 
 
@@ -138,5 +138,5 @@ def _spread(values: Array, shape: tuple[int, ...], threads: int) -> Array:
     def work(part: slice) -> None:
         found[part] = values.take(rows[part], axis=0).take(columns, axis=1)
 
-    side_by_side(work, list(blocks(shape[0], _ROWS)), threads)
+    parallel_map(work, list(blocks(shape[0], _ROWS)), threads)
     return found

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.threads import blocks, side_by_side
+from roughvisc.mechanics.fields.threads import blocks, parallel_map
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,7 +31,7 @@ def of_parts(work: Callable[[slice], Found], size: int, threads: int) -> list[Fo
     if size <= _PART:
         return [work(slice(0, size))]
     pairs = -(-size // (2 * _PART))  # of equal parts: of three, one thread of two would wait for the last
-    return side_by_side(work, list(blocks(size, -(-size // (2 * pairs)))), threads)
+    return parallel_map(work, list(blocks(size, -(-size // (2 * pairs)))), threads)
 
 
 def of_vectors(work: Callable[..., Found], threads: int, *vectors: NDArray[Any]) -> list[Found]:
@@ -44,7 +44,7 @@ def of_vectors(work: Callable[..., Found], threads: int, *vectors: NDArray[Any])
 
 def of_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int) -> list[Found]:
     """The same of parts of a field that are whole rows."""
-    return side_by_side(work, list(blocks(shape[0], max(_PART // shape[1], 1))), threads)
+    return parallel_map(work, list(blocks(shape[0], max(_PART // shape[1], 1))), threads)
 
 
 def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, threads: int) -> list[Found]:
@@ -52,7 +52,7 @@ def with_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, t
 
     if size <= _PART:
         return [work(slice(0, size), slice(0, cells.size))]
-    return of_parts(lambda part: work(part, lying_in(part, cells)), size, threads)
+    return of_parts(lambda part: work(part, slice_of_sorted(part, cells)), size, threads)
 
 
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
@@ -144,7 +144,7 @@ def cut_and_divide(out: Array, divisor: float, threads: int) -> None:
     of_vectors(work, threads, _flat(out))
 
 
-def apart(a: Array, b: Array, threads: int) -> float:
+def l1_distance(a: Array, b: Array, threads: int) -> float:
     """Sum of the magnitudes of ``a - b``."""
     return sum(of_vectors(lambda first, second: summed(np.abs(first - second)), threads, a.reshape(-1), b.reshape(-1)))
 
@@ -176,10 +176,10 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
             found += part.start
         return found
 
-    return joined(of_parts(work, size, threads), threads)
+    return concatenate(of_parts(work, size, threads), threads)
 
 
-def joined(parts: Sequence[NDArray[Any]], threads: int) -> NDArray[Any]:
+def concatenate(parts: Sequence[NDArray[Any]], threads: int) -> NDArray[Any]:
     """What was found of all parts, in their order; of a part that is alone, itself."""
     if len(parts) == 1:
         return parts[0]
@@ -189,11 +189,11 @@ def joined(parts: Sequence[NDArray[Any]], threads: int) -> NDArray[Any]:
     def work(number: int) -> None:
         found[begins[number] : begins[number] + parts[number].size] = parts[number]
 
-    side_by_side(work, range(len(parts)), threads)
+    parallel_map(work, range(len(parts)), threads)
     return found
 
 
-def taken(field: Array, cells: Cells, threads: int) -> Array:
+def gather(field: Array, cells: Cells, threads: int) -> Array:
     """Values of a field at some cells."""
     if threads == 1 or cells.size <= _PART:
         return field.take(cells)
@@ -206,7 +206,7 @@ def taken(field: Array, cells: Cells, threads: int) -> Array:
     return found
 
 
-def put(out: Array, cells: Cells, values: Array, threads: int) -> None:
+def scatter(out: Array, cells: Cells, values: Array, threads: int) -> None:
     """Set a field at some cells."""
     field = _flat(out)
 
@@ -216,7 +216,7 @@ def put(out: Array, cells: Cells, values: Array, threads: int) -> None:
     of_parts(work, cells.size, threads)
 
 
-def spread(out: Array, cells: Cells, values: Array, threads: int) -> None:
+def scatter_into_zeros(out: Array, cells: Cells, values: Array, threads: int) -> None:
     """Set a field to values at some cells, and to zero elsewhere."""
     field = _flat(out)
 
@@ -227,13 +227,13 @@ def spread(out: Array, cells: Cells, values: Array, threads: int) -> None:
     with_cells(work, field.size, cells, threads)
 
 
-def lying_in(part: slice, cells: Cells) -> slice:
+def slice_of_sorted(part: slice, cells: Cells) -> slice:
     """Which of some cells lie in a part of a field."""
     # bounds of the same kind: for others, numpy makes a copy of all cells, for each part anew
     return slice(*cells.searchsorted(np.array((part.start, part.stop), cells.dtype)))
 
 
-def within(part: slice, cells: Cells) -> Cells:
+def local_index(part: slice, cells: Cells) -> Cells:
     """Where some cells of a part of a field lie in it."""
     return cells - part.start if part.start else cells
 
@@ -241,20 +241,20 @@ def within(part: slice, cells: Cells) -> Cells:
 def part_of(values: Array, cells: Cells, part: slice) -> Array:
     """Part of a field that has values at some cells of it, and is zero elsewhere."""
     found = np.zeros(part.stop - part.start)
-    found[within(part, cells)] = values
+    found[local_index(part, cells)] = values
     return found
 
 
-def carried_over(values: Array, cells: Cells, onto: Cells, size: int, threads: int) -> Array:
+def regather(values: Array, cells: Cells, onto: Cells, size: int, threads: int) -> Array:
     """What some cells of a field of some size have, at others: zero where these are not among them."""
     found = np.empty(onto.size)
 
     def work(part: slice, few: slice) -> None:
-        asked = lying_in(part, onto)
+        asked = slice_of_sorted(part, onto)
         if np.array_equal(cells[few], onto[asked]):
             found[asked] = values[few]
         else:
-            found[asked] = part_of(values[few], cells[few], part).take(within(part, onto[asked]))
+            found[asked] = part_of(values[few], cells[few], part).take(local_index(part, onto[asked]))
 
     with_cells(work, size, cells, threads)
     return found

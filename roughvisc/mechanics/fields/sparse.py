@@ -49,7 +49,7 @@ class Sparse:
         cells = _not_zero(field)
         if cells.size > _FEW * field.size:
             return cls.whole(field)
-        values = passes.taken(field, cells, threads_of(field.size))
+        values = passes.gather(field, cells, threads_of(field.size))
         return cls(field.shape, cells.astype(_INDEX), values)
 
     @classmethod
@@ -75,7 +75,7 @@ class Sparse:
         """Some of it by flat indices, not to be changed."""
         if self.cells is None:
             return self.values.reshape(-1)[part]
-        few = passes.lying_in(part, self.cells)
+        few = passes.slice_of_sorted(part, self.cells)
         return passes.part_of(self.values[few], self.cells[few], part)
 
     def positive(self) -> Mask:
@@ -95,7 +95,7 @@ class Sparse:
         if self.cells is None:
             return passes.times(self.values, factor, self.threads)
         found = empty(self.shape)
-        passes.spread(found, self.cells, factor * self.values, self.threads)
+        passes.scatter_into_zeros(found, self.cells, factor * self.values, self.threads)
         return found
 
     def add_to(self, out: Array, factor: float) -> None:
@@ -176,8 +176,8 @@ class Scattered:
         if rows.stop - rows.start == self.shape[0]:
             return slice(0, self.cells.size), self.cells
         part = slice(rows.start * self.shape[1], rows.stop * self.shape[1])
-        few = passes.lying_in(part, self.cells)
-        return few, passes.within(part, self.cells[few])
+        few = passes.slice_of_sorted(part, self.cells)
+        return few, passes.local_index(part, self.cells[few])
 
 
 @dataclass(frozen=True)

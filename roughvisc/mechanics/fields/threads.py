@@ -35,7 +35,7 @@ def threads_of(size: int, workers: int | None = None) -> int:
     return fft.get_workers() if workers is None else workers
 
 
-def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: int) -> list[Found]:
+def parallel_map(work: Callable[[Part], Found], parts: Sequence[Part], threads: int) -> list[Found]:
     """What some work gives of each part, in their order.
 
     Parameters
@@ -49,7 +49,8 @@ def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
     if threads == 1 or len(parts) == 1:
         return [work(part) for part in parts]
     found: list[Any] = [None] * len(parts)
-    todo = deque(_far_apart(len(parts), threads))  # each takes the next: a task for each costs as much as a short part
+    # each thread takes the next: a task for each costs as much as a short part
+    todo = deque(_interleaved(len(parts), threads))
 
     def take_on() -> None:
         try:
@@ -68,7 +69,7 @@ def side_by_side(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
     return found
 
 
-def beside(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
+def submit(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
     """Begin some work beside the caller's where there is another thread; what is returned waits for what it gives."""
     if threads == 1:
         return work
@@ -81,7 +82,7 @@ def blocks(length: int, size: int) -> Iterator[slice]:
     return (slice(first, min(first + size, length)) for first in range(0, length, size))
 
 
-def _far_apart(count: int, threads: int) -> list[int]:
+def _interleaved(count: int, threads: int) -> list[int]:
     """Numbers of so many parts, in an order in which those that threads work on at a time do not lie side by side.
 
     A processor fetches ahead what the other one is about to change: neighbouring columns of a transform take 1.1 times

@@ -38,7 +38,7 @@ class Kernel(Protocol):
         touches, and the contact in free space is followed by a window. Default: it may.
     """
 
-    bulges: bool = True
+    raises_surface: bool = True
 
     @abstractmethod
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
@@ -122,7 +122,7 @@ class Kernel(Protocol):
         return np.asarray(sum(total[np.ix_(i, j)] for i in x for j in y))
 
 
-def displaces_as_a_whole(kernel: Kernel) -> bool:
+def has_finite_mean(kernel: Kernel) -> bool:
     """Whether the mean displacement under uniform pressure is finite, and known."""
     return float(kernel.transfer(0.0, 0.0)) > 0
 

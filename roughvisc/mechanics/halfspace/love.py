@@ -116,7 +116,7 @@ class Love(Kernel):
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, sections 3.2 and 13.2.
     """
 
-    bulges = False
+    raises_surface = False
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """As :func:`love_kernel`. [m]"""

@@ -18,7 +18,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.sparse import Scattered
-from roughvisc.mechanics.fields.threads import blocks, side_by_side, threads_of
+from roughvisc.mechanics.fields.threads import blocks, parallel_map, threads_of
 from roughvisc.mechanics.halfspace.kernel import Kernel, free_space_symbol, periodic_symbol
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.transforms import transforms
@@ -256,9 +256,9 @@ class HalfSpace:
 
         rows = list(blocks(nx, _rows_together(my)))
         columns_of = _column_blocks(spectrum.shape[1], mx, number)
-        side_by_side(forward, rows, threads)
-        side_by_side(across, range(len(columns_of)), threads)
-        side_by_side(back, rows, threads)
+        parallel_map(forward, rows, threads)
+        parallel_map(across, range(len(columns_of)), threads)
+        parallel_map(back, rows, threads)
 
     def _working_memory(
         self, points: tuple[int, int], kind: np.dtype[Any], threads: int

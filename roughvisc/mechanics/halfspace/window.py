@@ -141,7 +141,7 @@ def mean_influence(window: Window, spacing: tuple[float, float], kernel: Kernel)
     return kernel.under_rectangle((before[0], before[1]), (after[0], after[1]), spacing) / count
 
 
-class Reach:
+class FarFieldDisplacement:
     """Displacement of a whole domain under pressure in a window of it: one convolution of their joint length.
 
     Parameters

@@ -29,7 +29,7 @@ _SOLVED = 0.2
 _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure, in steps
 
 
-def rest(scene: Scene) -> State:
+def initial_state(scene: Scene) -> State:
     nothing = np.zeros(scene.halfspace.shape)
     given = any(segment.control == "approach" for segment in scene.program.segments[:1])
     now = Instant(0.0, Sparse.of(nothing), 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
@@ -42,7 +42,7 @@ def trial_at_rest(scene: Scene, state: State) -> Trial:
     return Trial(state.now, nothing, None if scene.memory.acts_on == "displacement" else nothing, 0.0, "linear")
 
 
-def attempt(
+def trial_step(
     scene: Scene,
     state: Trajectory,
     control: Control,
@@ -58,7 +58,7 @@ def attempt(
     ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought and its displacement at
     unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves.
     """
-    alpha, effective, field = predicted(scene, state.memory, length, rule)
+    alpha, effective, field = elastic_step(scene, state.memory, length, rule)
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
     carried = None if effective is None else field
     threads = scene.halfspace.threads
@@ -121,7 +121,7 @@ def attempt(
     )
 
 
-def predicted(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
+def elastic_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
     """``alpha`` of a step, and what is carried into it: the effective pressure, if known, and the displacement."""
     alpha, carried = scene.memory.predict(memory, length, rule)
     if scene.memory.acts_on == "displacement":
@@ -160,7 +160,7 @@ def advanced(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
     }
 
 
-def committed(scene: Scene, state: State, trial: Trial) -> State:
+def accept(scene: Scene, state: State, trial: Trial) -> State:
     """State after an accepted trial."""
     changes = advanced(scene, state, trial)
     now, work = changes["now"], changes["work"]
@@ -171,7 +171,7 @@ def committed(scene: Scene, state: State, trial: Trial) -> State:
         largest_approach=max(state.largest_approach, abs(now.approach)),
         largest_work=max(state.largest_work, abs(work)),
         contact_since=state.contact_since if now.force > 0 and state.now.force > 0 else state.now.time,
-        pace=state.pace.seeing(),
+        pace=state.pace.with_pressure_error(),
     )
 
 
@@ -194,7 +194,7 @@ def energy_after(scene: Scene, state: Trajectory, trial: Trial) -> energy.Energy
         scene.halfspace.cell_area,
         fresh=state.before is None,
         jumped=state.unresolved,
-        work=work_while_held(state, trial) if scene.remembers and trial.length > 0 else None,
+        work=work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
     )
 
 
@@ -236,11 +236,12 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
     shown, converged, moved = trial, trial.converged, displacement_after(scene, state, trial)
     contact, level = state.now.contact, state.now.approach
-    if not trial.apart and trial.length > 0 and scene.keeps(state.now.time) and scene.is_soft(trial.length):
+    kept = trial.length > 0 and not trial.apart and scene.keeps(state.now.time)
+    if kept and scene.lacks_instantaneous_compliance(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
         alone = replace(state, before=None)
-        shown = attempt(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
+        shown = trial_step(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
         state = with_cost(state, shown)
         converged = converged and shown.converged
         moved = displacement_after(scene, alone, shown, shown.length, shown.rule)

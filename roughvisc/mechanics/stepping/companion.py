@@ -18,9 +18,9 @@ from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Rule
 from roughvisc.mechanics.stepping.attempt import (
     advanced,
-    attempt,
     displacement_after,
     segment_number,
+    trial_step,
     with_cost,
     without_past,
 )
@@ -79,7 +79,7 @@ def _bare(companion: Trajectory) -> Trajectory:
     return replace(companion, before=before)
 
 
-def beside(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
+def coarse_initial_guess(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
     """Where the companion of a state may be: as far from it as when both were last at the same instant.
 
     Parameters
@@ -135,10 +135,10 @@ def difference(
     area = scene.halfspace.cell_area
     inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
     (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
-    entered, soft = 0.0, scene.is_soft(scene.program.duration)
+    entered, soft = 0.0, scene.lacks_instantaneous_compliance(scene.program.duration)
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))
-        if companion.before is None or scene.is_soft(coarse.time - companion.before.time):
+        if companion.before is None or scene.lacks_instantaneous_compliance(coarse.time - companion.before.time):
             entered += _ENTERING * outside * fine.force / max(fine.contact.count, 1)
     stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
     if soft:
@@ -158,7 +158,7 @@ def difference(
     )
 
 
-def sharpened(scene: Scene, before: State, state: State, ahead: float, left: float) -> State:
+def adapt_tolerance_share(scene: Scene, before: State, state: State, ahead: float, left: float) -> State:
     """State whose steps take from here on the part of the tolerance's share that what they have come to leaves them.
 
     Parameters
@@ -182,14 +182,16 @@ def sharpened(scene: Scene, before: State, state: State, ahead: float, left: flo
 def _used(scene: Scene, state: State) -> float:
     """What is stated of a state, over the tolerance."""
     unknown = state.uncertainty
-    if scene.is_soft(scene.program.duration):  # pressure and force jump with every cell that enters
+    if scene.lacks_instantaneous_compliance(
+        scene.program.duration
+    ):  # pressure and force jump with every cell that enters
         unknown = replace(unknown, pressure=0.0, force=0.0)
     return unknown.relative(state.largest_force, state.largest_approach) / scene.tolerance
 
 
 def _used_by_work(scene: Scene, state: State) -> float:
     """A part of what is stated of the work, over the tolerance."""
-    part = _USED_BY_SOFT_WORK if scene.is_soft(scene.program.duration) else _USED_BY_WORK
+    part = _USED_BY_SOFT_WORK if scene.lacks_instantaneous_compliance(scene.program.duration) else _USED_BY_WORK
     return part * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
 
 
@@ -231,7 +233,8 @@ def followed(
 ) -> tuple[State, Trial | None] | None:
     """State whose companion, if it has one, has come to the same instant by one step, and that step.
 
-    None if that outgrew the grid. ``guess`` is where the companion may be, as of :func:`beside`; it is used up.
+    None if that outgrew the grid. ``guess`` is where the companion may be, as of :func:`coarse_initial_guess`; it is
+    used up.
     """
     companion = state.companion
     if companion is None:
@@ -240,14 +243,14 @@ def followed(
     length = time - companion.now.time
     value = segment.value(time - state.began, companion.start)
     rule = rule or rule_for(scene, companion, length, _GROWTH)
-    trial = attempt(scene, companion, segment.control, value, length, rule, _SHARE, guess)
+    trial = trial_step(scene, companion, segment.control, value, length, rule, _SHARE, guess)
     trial = replace(trial, instant=replace(trial.instant, time=time))
     if is_outgrown(scene, trial.instant):
         return None
-    return caught_up(scene, state, companion, trial), trial
+    return coarse_step(scene, state, companion, trial), trial
 
 
-def caught_up(scene: Scene, state: State, companion: Trajectory, trial: Trial) -> State:
+def coarse_step(scene: Scene, state: State, companion: Trajectory, trial: Trial) -> State:
     """State whose companion has accepted a step to the same instant."""
     changes = advanced(scene, companion, trial)
     if companion.unresolved:
@@ -255,7 +258,7 @@ def caught_up(scene: Scene, state: State, companion: Trajectory, trial: Trial) -
     return replace(with_cost(state, trial), companion=_bare(replace(companion, **changes)), behind=0)
 
 
-def compared(
+def with_error_estimate(
     scene: Scene, step: Step, companion_trial: Trial | None, earlier: Sparse | None = None, asked: bool = True
 ) -> Step:
     """A step with what its companion says of it, if it has taken one."""
@@ -263,10 +266,10 @@ def compared(
     if companion is None or companion_trial is None:
         return step
     moved = displacement_after(scene, companion, companion_trial)
-    return stating(step, difference(scene, step, companion, moved, earlier, asked))
+    return with_uncertainty(step, difference(scene, step, companion, moved, earlier, asked))
 
 
-def stating(step: Step, uncertainty: Uncertainty) -> Step:
+def with_uncertainty(step: Step, uncertainty: Uncertainty) -> Step:
     """The step, with what is stated of it."""
     return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty))
 
@@ -284,7 +287,7 @@ def in_pairs(steps: Held) -> Through:
         except StopIteration as end:
             return end.value
         if first is not None:
-            yield first if step is None else _of_a_pair(first, step)
+            yield first if step is None else assign_pair_error(first, step)
             first = None
         if step is not None and step.state.behind and _is_held(step):
             first = step
@@ -298,7 +301,7 @@ def _is_held(step: Step) -> bool:
     return step.scene.keeps(step.shown.time) or (companion is not None and companion.before is None)
 
 
-def _of_a_pair(first: Step, second: Step) -> Step:
+def assign_pair_error(first: Step, second: Step) -> Step:
     """The first step of a pair, with what is stated of it by the second."""
     companion = first.state.companion
     assert companion is not None  # it waits where the pair began

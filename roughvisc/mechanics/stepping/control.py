@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from roughvisc.mechanics.fields.passes import apart
+from roughvisc.mechanics.fields.passes import l1_distance
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes, Rule
 from roughvisc.mechanics.stepping.fading import Fading, fading
 from roughvisc.mechanics.stepping.program import Segment
@@ -36,7 +36,7 @@ _NOT_FADING = 0.35
 _ROUNDING = 1e-11
 
 
-def retarded(scene: Scene, length: float) -> float:
+def remaining_creep_fraction(scene: Scene, length: float) -> float:
     """Part of the compliance that a step of some length can get wrong: what creeps within it and after it. [-]
 
     Notes
@@ -54,7 +54,7 @@ def retarded(scene: Scene, length: float) -> float:
 
 def counted(scene: Scene, state: State, length: float) -> float:
     """Part of the error of a step's pressure that counts, at the next kept time or a later one. [-]"""
-    share, left, known = retarded(scene, length), _left(scene, state), _fading(scene)
+    share, left, known = remaining_creep_fraction(scene, length), _left(scene, state), _fading(scene)
     if known is None or math.isinf(left):
         return share
     return min(share, max(known.weight(max(left, length), length), _NOT_FADING * share))
@@ -82,7 +82,7 @@ def _fading(scene: Scene) -> Fading | None:
 
 def is_gentle(scene: Scene) -> bool:
     """Whether the material follows at once so far that no cell that enters makes the pressure jump."""
-    return scene.remembers and not scene.is_soft(scene.program.duration)
+    return scene.is_viscoelastic and not scene.lacks_instantaneous_compliance(scene.program.duration)
 
 
 def _crept_within(scene: Scene, length: float) -> float:
@@ -111,12 +111,16 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
     length = max(length, shortest_step(scene, state, segment))
     if "bdf2" not in scene.memory.rules:
         length = min(length, _longest_linear(scene, distance))
-    if segment.amplitude and retarded(scene, length) > _NOT_SEEN * scene.tolerance:
+    if segment.amplitude and remaining_creep_fraction(scene, length) > _NOT_SEEN * scene.tolerance:
         length = min(length, segment.period / _STEPS_A_CYCLE)
     if length >= distance * (1 - 1e-9):
         # steps go in pairs up to what is shown: a single one would not tell what it got wrong
         single = state.behind == 0 and event == end and (state.before is None or scene.keeps(end))
-        return distance / 2 if single and retarded(scene, distance) > _NOT_SEEN * scene.tolerance else distance
+        return (
+            distance / 2
+            if single and remaining_creep_fraction(scene, distance) > _NOT_SEEN * scene.tolerance
+            else distance
+        )
     return distance / 2 if length > distance / 2 else length
 
 
@@ -136,17 +140,17 @@ def _longest_linear(scene: Scene, distance: float) -> float:
 
 def _first_length(scene: Scene, state: State, segment: Segment, event: float) -> float:
     """Length of the first step after an event: the longest that neither program nor creep make too inaccurate."""
-    if not scene.remembers:
+    if not scene.is_viscoelastic:
         return math.inf if scene.times is not None else min(segment.duration, segment.period) / 20
     span, allowed = min(segment.duration, segment.period), 12 * _allowed(scene, state)
     glassy, length = scene.glassy, span
     while length > SMALLEST_STEP * span:
         now = scene.compliance(length)
         crept = _crept_within(scene, length) / now * min(1.0, now / glassy - 1) if glassy else 0.0
-        if retarded(scene, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
+        if remaining_creep_fraction(scene, length) * (length / (0.2 * span)) ** 2 <= allowed and crept <= allowed:
             break
         length /= 1.5
-    wrong = retarded(scene, length)
+    wrong = remaining_creep_fraction(scene, length)
     if state.now.force == 0:
         length = min(length, 2 * _allowed(scene, state) / wrong * (event - state.now.time)) if wrong else length
     if state.unresolved:
@@ -162,7 +166,7 @@ def rule_for(scene: Scene, state: Trajectory, length: float, growth: float = _GR
     if "bdf2" not in scene.memory.rules:
         return "linear"
     if state.before is None:
-        return "euler" if scene.is_soft(length) else "linear"
+        return "euler" if scene.lacks_instantaneous_compliance(length) else "linear"
     if scene.stiff_ratio(length) <= STIFF:
         return "linear"
     # as the ratio of steps grows the two-step rule turns into the trapezoidal one and rings
@@ -173,12 +177,12 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     """Relative error in time of a step, from its difference to the extrapolation; NaN without one."""
     if state.before is None:
         return math.nan
-    if not scene.remembers:
+    if not scene.is_viscoelastic:
         return 0.0
     # what contact leaves behind as it recedes does not fade as what stays in contact does, and the second step after an
     # event also judges the first one
     receding, second = _receding(state, trial), state.before.time <= state.began
-    share = retarded(scene, trial.length) if receding or second else counted(scene, state, trial.length)
+    share = remaining_creep_fraction(scene, trial.length) if receding or second else counted(scene, state, trial.length)
     last = state.now.time - state.before.time
     ahead = max(1.0, growth(state, segment, trial.instant.time, event))
     soft = 1.0
@@ -190,8 +194,10 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
     approach = max(
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
-    difference = apart(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.halfspace.threads)
-    pressure_error = difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.blind else 0.0
+    difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.halfspace.threads)
+    pressure_error = (
+        difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.ignore_pressure_error else 0.0
+    )
     ratio = trial.length / last
     if segment.control == "load":
         found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach
@@ -227,7 +233,7 @@ def _faded(scene: Scene, state: State, trial: Trial, event: float) -> float:
     wrong then counts by its share of the creep till the next kept time; not so while contact recedes, when the
     pressure is smooth and what it was stays in the dent that it leaves.
     """
-    if scene.times is None or not scene.is_soft(trial.length) or _receding(state, trial):
+    if scene.times is None or not scene.lacks_instantaneous_compliance(trial.length) or _receding(state, trial):
         return 1.0
     remaining = event - trial.instant.time
     own = scene.mean_compliance(trial.length)

@@ -12,7 +12,7 @@ import numpy as np
 from roughvisc.errors import EdgeContactError
 from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import padded
-from roughvisc.mechanics.stepping.attempt import predicted
+from roughvisc.mechanics.stepping.attempt import elastic_step
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory
 
 # The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
@@ -71,7 +71,7 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict
         return replace(instant, contact=contact, unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
-    glassy, _, carried = predicted(scene, memory, 0.0, "linear")
+    glassy, _, carried = elastic_step(scene, memory, 0.0, "linear")
     unit_displacement = scene.halfspace.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement

@@ -6,14 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.attempt import attempt, committed, step_of, trial_at_rest, with_cost, without_past
-from roughvisc.mechanics.stepping.companion import beside, compared, followed
+from roughvisc.mechanics.stepping.attempt import accept, step_of, trial_at_rest, trial_step, with_cost, without_past
+from roughvisc.mechanics.stepping.companion import coarse_initial_guess, followed, with_error_estimate
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene, State, Step, Trajectory
 
 
-def entering(scene: Scene, state: State) -> State:
+def start_segment(scene: Scene, state: State) -> State:
     """State at the start of the next segment."""
     segments = scene.program.segments
     index = state.segment + 1
@@ -31,7 +31,7 @@ def entering(scene: Scene, state: State) -> State:
     # a corner in what is prescribed bends the histories and does not break them: the steps may stay as long, unless
     # the first one is of first order
     smooth = len(neighbours) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
-    smooth = smooth and scene.remembers and not scene.is_soft(state.pace.suggestion)
+    smooth = smooth and scene.is_viscoelastic and not scene.lacks_instantaneous_compliance(state.pace.suggestion)
     pace = state.pace if smooth and state.now.force > 0 and not entered.unresolved else state.pace.after_event()
     return replace(entered, segment=index, began=state.now.time, pace=pace)
 
@@ -40,29 +40,29 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
     """Zero-length segment: solved with the instantaneous compliance; left for the next step if there is none."""
     value = segment.value(0.0, state.start)
     if not scene.can_jump:
-        return scene, step_of(scene, _postponed(scene, state, segment, value), trial_at_rest(scene, state))
+        return scene, step_of(scene, _defer_jump(scene, state, segment, value), trial_at_rest(scene, state))
     while True:
-        trial = attempt(scene, state, segment.control, value, 0.0, "linear", stated=True)
+        trial = trial_step(scene, state, segment.control, value, 0.0, "linear", stated=True)
         state = with_cost(state, trial)
         if not is_outgrown(scene, trial.instant):
-            found = followed(scene, committed(scene, state, trial), segment, beside(trial.instant), "linear")
+            found = followed(scene, accept(scene, state, trial), segment, coarse_initial_guess(trial.instant), "linear")
             if found is not None:
                 break
         scene, state = enlarged(scene, state, state.now.time)
     state, companion_trial = found
-    return scene, compared(scene, step_of(scene, entering(scene, state), trial), companion_trial)
+    return scene, with_error_estimate(scene, step_of(scene, start_segment(scene, state), trial), companion_trial)
 
 
-def _postponed(scene: Scene, state: State, segment: Segment, value: float) -> State:
+def _defer_jump(scene: Scene, state: State, segment: Segment, value: float) -> State:
     """State after a jump that the material cannot follow at once: the next step takes it."""
     if value == (state.now.force if segment.control == "load" else state.now.approach):
-        return entering(scene, state)
+        return start_segment(scene, state)
     if segment.control == "approach":
         raise InputError(
             f"at {state.now.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
             "compliance: expected a ramp (over > 0), or a material that can jump"
         )
-    entered = entering(scene, state)
+    entered = start_segment(scene, state)
     following = scene.program.segments[entered.segment : entered.segment + 1]
     held = bool(following) and following[0].control == "load"
     return entered.with_each(lambda one: {"unresolved": True, "start": value if held else one.start})

@@ -17,17 +17,25 @@ from functools import partial
 
 from roughvisc.mechanics.stepping.apart import closing_time
 from roughvisc.mechanics.stepping.attempt import (
-    attempt,
-    committed,
-    predicted,
-    rest,
+    accept,
+    elastic_step,
+    initial_state,
     restarted,
     step_of,
     trial_at_rest,
+    trial_step,
     with_cost,
     without_past,
 )
-from roughvisc.mechanics.stepping.companion import behind, beside, compared, followed, in_pairs, sharpened, stating
+from roughvisc.mechanics.stepping.companion import (
+    adapt_tolerance_share,
+    behind,
+    coarse_initial_guess,
+    followed,
+    in_pairs,
+    with_error_estimate,
+    with_uncertainty,
+)
 from roughvisc.mechanics.stepping.control import (
     error_limit,
     estimate,
@@ -39,7 +47,7 @@ from roughvisc.mechanics.stepping.control import (
     suggestion,
 )
 from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
-from roughvisc.mechanics.stepping.events import entering, jump, next_event
+from roughvisc.mechanics.stepping.events import jump, next_event, start_segment
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
@@ -73,7 +81,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     """
     segments = scene.program.segments
     if state is None:
-        state = rest(scene)
+        state = initial_state(scene)
         if segments and segments[0].duration > 0:
             yield step_of(scene, state, trial_at_rest(scene, state))
     while state.segment < len(segments):
@@ -123,7 +131,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Held:
                 yield first
                 first = None
             yield None
-            step = _carried_apart(scene, state, segment, closing, end)
+            step = _step_while_open(scene, state, segment, closing, end)
             scene, state = step.scene, step.state
             if state.now.time in (event, end):
                 yield step
@@ -141,13 +149,13 @@ def _through(scene: Scene, state: State, segment: Segment) -> Held:
         fresh = state.before is None and scene.time_step is None
         judged = None
         if not outgrown:
-            waits = scene.remembers and single
+            waits = scene.is_viscoelastic and single
             accepted, guess = _accepted(scene, state, trial, error, waits), None
             if state.companion is not None and not waits:
-                guess = beside(accepted.now, state.companion.now, state.before if state.behind else None)
+                guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
                     state = base = _without_fields(state)
-            judged = _judged(scene, state, accepted, segment, trial, guess)
+            judged = _estimate_error(scene, state, accepted, segment, trial, guess)
             del accepted, guess
         if first is not None:
             yield first
@@ -179,9 +187,9 @@ def _tried(scene: Scene, state: State, segment: Segment, event: float, end: floa
     arrival = event if length == event - state.now.time else state.now.time + length
     value = segment.value(arrival - state.began, state.start)
     # what a short discarded solve shows of a soft step's end is the step's own residual, magnified
-    share = _MAGNIFIED if scene.is_soft(length) and scene.keeps(arrival) else 1.0
+    share = _MAGNIFIED if scene.lacks_instantaneous_compliance(length) and scene.keeps(arrival) else 1.0
     rule, stated = rule_for(scene, state, length), scene.keeps(arrival)
-    trial = attempt(scene, state, segment.control, value, length, rule, share, stated=stated)
+    trial = trial_step(scene, state, segment.control, value, length, rule, share, stated=stated)
     trial = replace(trial, instant=replace(trial.instant, time=arrival))
     return trial, estimate(scene, state, trial, segment, event)
 
@@ -195,7 +203,7 @@ def _too_long(scene: Scene, state: State, segment: Segment, trial: Trial, error:
         if held or math.isnan(error):
             return True
     limit = error_limit(scene, state, state.now.time if shown else trial.instant.time)
-    return error > limit and not state.pace.in_vain(error)
+    return error > limit and not state.pace.shortening_failed(error)
 
 
 def _seems_to_open(state: State, segment: Segment, trial: Trial) -> bool:
@@ -221,7 +229,7 @@ def _without_fields(state: State) -> State:
 def _accepted(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
     """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
     time = trial.instant.time
-    accepted = committed(scene, state, trial)
+    accepted = accept(scene, state, trial)
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
     accepted = replace(accepted, pace=state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
     if waits:
@@ -230,7 +238,7 @@ def _accepted(scene: Scene, state: State, trial: Trial, error: float, waits: boo
     return restarted(scene, accepted, trial.length) if state.unresolved else accepted
 
 
-def _judged(
+def _estimate_error(
     scene: Scene,
     state: State,
     accepted: State,
@@ -250,47 +258,48 @@ def _judged(
         accepted, companion_trial = found
     end = scene.program.corners[state.segment + 1]
     if time == end:
-        accepted = entering(scene, accepted)
+        accepted = start_segment(scene, accepted)
     step = step_of(scene, accepted, trial)
     if companion_trial is None:
         return step
     assert state.companion is not None
     asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
-    step = compared(scene, step, companion_trial, state.companion.now.contact, asked)
+    step = with_error_estimate(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
         return replace(
-            step, state=sharpened(scene, state, step.state, ahead, 1.0 if asked else remaining(scene, accepted))
+            step,
+            state=adapt_tolerance_share(scene, state, step.state, ahead, 1.0 if asked else remaining(scene, accepted)),
         )
-    return stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
+    return with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
 
 
 def _touched(scene: Scene, state: State, time: float) -> float:
     """Approach at which surfaces that are apart would touch at a time to come. [m]"""
-    carried = predicted(scene, state.memory, time - state.now.time, "linear")[2]
+    carried = elastic_step(scene, state.memory, time - state.now.time, "linear")[2]
     return scene.lowest(scene.gap + carried)
 
 
-def _carried_apart(scene: Scene, state: State, segment: Segment, until: float, end: float) -> Step:
+def _step_while_open(scene: Scene, state: State, segment: Segment, until: float, end: float) -> Step:
     """One exact step without contact; the companion takes the same."""
     while state.behind:
-        found = followed(scene, state, segment, beside(state.now))
+        found = followed(scene, state, segment, coarse_initial_guess(state.now))
         if found is None:
             scene, state = enlarged(scene, state, state.now.time)
         else:
             state = found[0]
     value = segment.value(until - state.began, state.start)
-    trial = attempt(scene, state, segment.control, value, until - state.now.time, "linear")
+    trial = trial_step(scene, state, segment.control, value, until - state.now.time, "linear")
     trial = replace(trial, instant=replace(trial.instant, time=until))
-    carried = committed(scene, with_cost(state, trial), trial)
+    carried = accept(scene, with_cost(state, trial), trial)
     in_contact = carried.companion is not None and carried.companion.now.force > 0
-    found = followed(scene, carried, segment, beside(carried.now), "right" if in_contact else "linear")
+    found = followed(scene, carried, segment, coarse_initial_guess(carried.now), "right" if in_contact else "linear")
     if found is None:  # the companion is in contact, beyond the grid
-        return _carried_apart(*enlarged(scene, state, until), segment, until, end)
+        return _step_while_open(*enlarged(scene, state, until), segment, until, end)
     carried, companion_trial = found
     carried = carried.with_each(partial(without_past, scene))
     carried = replace(carried, pace=carried.pace.after_event())
     if until == end:
-        carried = entering(scene, carried)
+        carried = start_segment(scene, carried)
     step = step_of(scene, carried, trial)
-    return compared(scene, step, companion_trial) if scene.keeps(until) else step
+    return with_error_estimate(scene, step, companion_trial) if scene.keeps(until) else step

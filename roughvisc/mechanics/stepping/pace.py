@@ -21,7 +21,7 @@ _GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
 
 
 @dataclass(frozen=True)
-class Pace:
+class ControllerState:
     """What the choice of the next step remembers.
 
     Attributes
@@ -38,39 +38,41 @@ class Pace:
 
     suggestion: float = 0.0
     sharpness: float = 1.0
-    blind: bool = False
+    ignore_pressure_error: bool = False
     rejected_error: float = math.inf
 
-    def in_vain(self, error: float) -> bool:
+    def shortening_failed(self, error: float) -> bool:
         """Whether a shorter step was hardly better than the one that was rejected before."""
         return error > _IN_VAIN * self.rejected_error
 
-    def rejected(self, length: float, error: float, allowed: float) -> Pace:
+    def rejected(self, length: float, error: float, allowed: float) -> ControllerState:
         """After a step of some length [s] whose error, NaN where there is no estimate, is not allowed."""
         if math.isnan(error):
             return replace(self, suggestion=_SHORTEST * length, rejected_error=math.inf)
         shrink = min(max(_AIM * math.sqrt(allowed / error), _SHORTEST), _LONGEST)
         return replace(self, suggestion=shrink * length, rejected_error=error)
 
-    def accepted(self, suggestion: float, error: float, allowed: float, fresh: bool) -> Pace:
+    def accepted(self, suggestion: float, error: float, allowed: float, fresh: bool) -> ControllerState:
         """After an accepted step; ``fresh``: it was the first after an event, and the second one judges it.
 
         Where it was accepted since shortening was in vain, the pressure has jumped: the next estimate would see that
         jump once more.
         """
-        blind = self.in_vain(error) and error > allowed
+        ignore_pressure_error = self.shortening_failed(error) and error > allowed
         rejected_error = self.rejected_error if fresh else math.inf
-        return replace(self, suggestion=suggestion, blind=blind, rejected_error=rejected_error)
+        return replace(
+            self, suggestion=suggestion, ignore_pressure_error=ignore_pressure_error, rejected_error=rejected_error
+        )
 
-    def seeing(self) -> Pace:
+    def with_pressure_error(self) -> ControllerState:
         """After a step: the next estimate sees the pressure."""
-        return replace(self, blind=False)
+        return replace(self, ignore_pressure_error=False)
 
-    def after_event(self, suggestion: float = 0.0) -> Pace:
+    def after_event(self, suggestion: float = 0.0) -> ControllerState:
         """Where nothing is extrapolated, with the length of the next step if it is known. [s]"""
         return replace(self, suggestion=suggestion)
 
-    def sharpened(self, used: float, earlier: float) -> Pace:
+    def sharpened(self, used: float, earlier: float) -> ControllerState:
         """By what is stated, over the tolerance, now and when it was last told."""
         if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
             wanted = max(_MOST_USED / used, 0.5)

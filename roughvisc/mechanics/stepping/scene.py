@@ -20,7 +20,7 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy
-from roughvisc.mechanics.stepping.pace import Pace
+from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.program import Control, Program
 from roughvisc.mechanics.stepping.slide import Slid, Slide
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
@@ -121,11 +121,11 @@ class Scene:
         return self.glassy > 0
 
     @property
-    def remembers(self) -> bool:
+    def is_viscoelastic(self) -> bool:
         """Whether the past matters: without creep nothing that is computed depends on the steps."""
         return self.final > self.glassy
 
-    def is_soft(self, length: float) -> bool:
+    def lacks_instantaneous_compliance(self, length: float) -> bool:
         """Whether hardly any of a step's compliance is there at once."""
         return self.glassy < _SOFT * self.compliance(length)
 
@@ -286,7 +286,7 @@ class State(Trajectory):
     behind: int = 0
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     slid: Slid | None = None
-    pace: Pace = field(default_factory=Pace)
+    pace: ControllerState = field(default_factory=ControllerState)
     iterations: int = 0
     convolutions: int = 0
 

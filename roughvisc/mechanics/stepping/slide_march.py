@@ -15,10 +15,16 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.fields.sparse import Sparse
-from roughvisc.mechanics.stepping.attempt import attempt, committed, restarted, step_of, with_cost
-from roughvisc.mechanics.stepping.companion import behind, beside, caught_up, compared, stating
+from roughvisc.mechanics.stepping.attempt import accept, restarted, step_of, trial_step, with_cost
+from roughvisc.mechanics.stepping.companion import (
+    behind,
+    coarse_initial_guess,
+    coarse_step,
+    with_error_estimate,
+    with_uncertainty,
+)
 from roughvisc.mechanics.stepping.control import rule_for
-from roughvisc.mechanics.stepping.events import entering
+from roughvisc.mechanics.stepping.events import start_segment
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial
 from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
@@ -65,32 +71,32 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     """The step over the next cell, with what the companion says of it where it has come along."""
     assert segment.slide is not None
     end = scene.program.corners[state.segment + 1]
-    trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, beside(state.now))
+    trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, coarse_initial_guess(state.now))
     moved = _moved(scene, state, segment.slide, 1)
     # the step before is kept as the profile saw it
-    accepted = replace(committed(scene, with_cost(moved, trial), trial), before=state.now)
+    accepted = replace(accept(scene, with_cost(moved, trial), trial), before=state.now)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
     if state.unresolved:
         accepted = restarted(scene, accepted, 0.0)
     companion_trial, earlier = None, state.companion
-    if scene.remembers and state.behind == 0 and arrival < end:
+    if scene.is_viscoelastic and state.behind == 0 and arrival < end:
         accepted = behind(state, accepted)
     elif earlier is not None:
         cells = state.behind + 1
-        guess = beside(accepted.now, earlier.now, state.before if state.behind else None)
+        guess = coarse_initial_guess(accepted.now, earlier.now, state.before if state.behind else None)
         companion_trial = _tried(scene, earlier, segment, arrival, length, cells, _COMPANION_SHARE * _SHARE, guess)
-        accepted = caught_up(scene, accepted, _moved(scene, earlier, segment.slide, cells), companion_trial)
+        accepted = coarse_step(scene, accepted, _moved(scene, earlier, segment.slide, cells), companion_trial)
     if arrival == end:
-        accepted = entering(scene, accepted)
+        accepted = start_segment(scene, accepted)
     step = step_of(scene, accepted, trial)
     if companion_trial is None or earlier is None:
         return step
     asked = scene.keeps(arrival) or (state.behind > 0 and scene.keeps(state.now.time))
     entered = Sparse.of(_rolled(earlier.now.pressure, segment.slide, state.behind + 1))
-    step = compared(scene, step, companion_trial, entered, asked)
+    step = with_error_estimate(scene, step, companion_trial, entered, asked)
     step = replace(step, state=replace(step.state, slid=_sharpened(step, state.uncertainty)))
     # after a single step the companion knows no more than before
-    return step if state.behind else stating(step, step.uncertainty.or_worse(state.uncertainty, 0.0))
+    return step if state.behind else with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))
 
 
 def _tried(
@@ -108,7 +114,7 @@ def _tried(
     value = segment.value(arrival, state.start)  # it is held
     body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
     stated = cells == 1 and scene.keeps(arrival)
-    trial = attempt(scene, body, segment.control, value, cells * length, rule, share, guess, stated=stated)
+    trial = trial_step(scene, body, segment.control, value, cells * length, rule, share, guess, stated=stated)
     return replace(trial, instant=replace(trial.instant, time=arrival), slides=True)
 
 

@@ -16,7 +16,7 @@ from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface
 from roughvisc.study.audit.evidence import Evidence, of_case, of_result
 from roughvisc.study.audit.finding import Finding
-from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.limits import BROKEN, DOUBTFUL
 from roughvisc.study.statement.case import Case
 
@@ -165,7 +165,7 @@ def audit(
     >>> found["adhesion"].verdict, found["slope"].verdict, found["yielding"].verdict
     ('broken', 'holds', 'not known')
     """
-    given = Given(
+    given = AuditInputs(
         work_of_adhesion=work_of_adhesion,
         yield_strength=yield_strength,
         thickness=thickness,
@@ -178,12 +178,12 @@ def audit(
     if base is not None and thickness is None:
         raise InputError(f"base is {base!r} without a thickness: expected both, or neither")
     if isinstance(result, Case):
-        return judged(of_case(result, result.height()), given, result.title)
+        return evaluate(of_case(result, result.height()), given, result.title)
     evidence = of_result(result)
-    return judged(evidence, given, str(result.attrs.get("title", "")))
+    return evaluate(evidence, given, str(result.attrs.get("title", "")))
 
 
-def judged(evidence: Evidence, given: Given, title: str) -> Audit:
+def evaluate(evidence: Evidence, given: AuditInputs, title: str) -> Audit:
     """The verdicts on what is known of a scene.
 
     Parameters

@@ -18,8 +18,8 @@ from roughvisc.mechanics.closed_forms.validity import (
 )
 from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.study.audit.evidence import Evidence
-from roughvisc.study.audit.finding import Finding, percent, told, unknown
-from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.finding import Finding, as_text, percent, unknown
+from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.limits import LIMITS
 from roughvisc.study.statement.body import BASE
 
@@ -35,22 +35,22 @@ _FLAT = 1.25
 _LEAST_DENSE, _DENSEST = 1.0, 22_600.0
 
 
-def yielding(evidence: Evidence, given: Given) -> Finding:
+def yielding(evidence: Evidence, given: AuditInputs) -> Finding:
     """The largest pressure over the yield strength."""
     if not evidence.ran:
         return unknown("yielding", "Known after the run, by the largest pressure.")
     if evidence.contact is None:
         return unknown("yielding", 'Keep the pressure, fields = ["pressure"], for the largest.')
     peak = evidence.contact.peak
-    about = f"the largest pressure is {told(peak, 'Pa')}"
+    about = f"the largest pressure is {as_text(peak, 'Pa')}"
     if given.yield_strength is None:
-        least = told(peak / LIMITS["yielding"].doubtful, "Pa")
+        least = as_text(peak / LIMITS["yielding"].doubtful, "Pa")
         return unknown("yielding", f"Give yield_strength: {about}; above {least} nothing yields.")
-    shown = told(given.yield_strength, "Pa")
+    shown = as_text(given.yield_strength, "Pa")
     return Finding("yielding", peak / given.yield_strength, f"T{about[1:]}, on a body that yields at {shown}.")
 
 
-def thickness(evidence: Evidence, given: Given) -> Finding:
+def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
     """By how much approach or force are off on a half-space, in place of the sheet that there is."""
     if evidence.sheet is not None:
         return _modelled(evidence.sheet, given)
@@ -65,18 +65,18 @@ def thickness(evidence: Evidence, given: Given) -> Finding:
     excess, shortfall = _excess(evidence, sheet), _shortfall(evidence, sheet)
     if math.isnan(excess):
         return unknown("thickness", _WITHOUT_LOAD if evidence.ran else "Known after the run, by the pressure.")
-    sentence = f"On a {sheet.base} sheet of {told(sheet.thickness, 'm', 3)} the approach would be {percent(excess)}"
+    sentence = f"On a {sheet.base} sheet of {as_text(sheet.thickness, 'm', 3)} the approach would be {percent(excess)}"
     sentence += " smaller at the same load"
     if shortfall > excess:
         sentence += f"; at the same approach the force here is {percent(shortfall)} too small"
     return Finding("thickness", max(excess, shortfall), f"{sentence}.")
 
 
-def _modelled(sheet: Sheet, given: Given) -> Finding:
+def _modelled(sheet: Sheet, given: AuditInputs) -> Finding:
     if given.thickness is not None and not math.isclose(given.thickness, sheet.thickness, rel_tol=1e-9):
-        other = f"{told(sheet.thickness, 'm', 3)}, and {told(given.thickness, 'm', 3)} is stated"
+        other = f"{as_text(sheet.thickness, 'm', 3)}, and {as_text(given.thickness, 'm', 3)} is stated"
         return unknown("thickness", f"The sheet that was pressed is one of {other}: press that one.")
-    return Finding("thickness", 0.0, f"Modelled: a sheet of {told(sheet.thickness, 'm', 3)}, {sheet.base}.")
+    return Finding("thickness", 0.0, f"Modelled: a sheet of {as_text(sheet.thickness, 'm', 3)}, {sheet.base}.")
 
 
 def _excess(evidence: Evidence, sheet: Sheet) -> float:
@@ -119,16 +119,16 @@ def _enough(evidence: Evidence, sheet: Sheet) -> str:
         return off(evidence, replace(sheet, thickness=math.exp(log))) - LIMITS["thickness"].doubtful
 
     if beyond(math.log(low)) <= 0:
-        return f": from {told(low, 'm')} on a half-space does, if not before"
+        return f": from {as_text(low, 'm')} on a half-space does, if not before"
     least = math.log(low)
     if beyond(least, _excess) > 0:
         least = brentq(beyond, least, math.log(high), args=(_excess,), xtol=1e-3)
     if beyond(least) > 1e-3:  # of the force it takes more, by less than four times
         least = brentq(beyond, least, least + math.log(4), xtol=1e-2)
-    return f": from {told(math.exp(least), 'm')} on a half-space does, even if bonded"
+    return f": from {as_text(math.exp(least), 'm')} on a half-space does, even if bonded"
 
 
-def inertia(evidence: Evidence, given: Given) -> Finding:
+def inertia(evidence: Evidence, given: AuditInputs) -> Finding:
     """What waves change: by their lag over the time scale of the program, and by the speed of slides against theirs."""
     width, scale, limit = evidence.half_width, evidence.time_scale, LIMITS["inertia"].doubtful
     if math.isnan(evidence.late) or math.isnan(scale):
@@ -159,21 +159,25 @@ def inertia(evidence: Evidence, given: Given) -> Finding:
     lag, excess = lag_and_excess(density)
     number = max(lag, excess)
     if excess > lag:
-        waves = f"{any_solid}shear waves go at {told(math.sqrt(shear / density), 'm/s')}"
+        waves = f"{any_solid}shear waves go at {as_text(math.sqrt(shear / density), 'm/s')}"
         more = "faster than waves along the surface"
         if math.isfinite(excess):
             more = f"which adds {percent(excess)} to what a load displaces"
         return Finding(
-            "inertia", number, f"{waves[0].upper()}{waves[1:]}, and it slides at {told(evidence.speed, 'm/s')}, {more}."
+            "inertia",
+            number,
+            f"{waves[0].upper()}{waves[1:]}, and it slides at {as_text(evidence.speed, 'm/s')}, {more}.",
         )
-    takes = f"the program changes within {told(scale, 's')}" if math.isfinite(scale) else "nothing changes"
+    takes = f"the program changes within {as_text(scale, 's')}" if math.isfinite(scale) else "nothing changes"
     of = f"{any_solid}waves lag"
     return Finding(
-        "inertia", number, f"{of[0].upper()}{of[1:]} by {told(lag * scale, 's')} over {told(2 * width, 'm')}; {takes}."
+        "inertia",
+        number,
+        f"{of[0].upper()}{of[1:]} by {as_text(lag * scale, 's')} over {as_text(2 * width, 'm')}; {takes}.",
     )
 
 
-def heating(evidence: Evidence, given: Given) -> Finding | None:
+def heating(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Rise of temperature of the spots by friction, in a slide; None where nothing slides."""
     contact, speed, power = evidence.contact, evidence.speed, evidence.friction_power
     if speed == 0:
@@ -186,7 +190,7 @@ def heating(evidence: Evidence, given: Given) -> Finding | None:
         return unknown("heating", 'Keep the pressure, fields = ["pressure"], for the spots that friction heats.')
     radius = math.sqrt(evidence.area / (math.pi * contact.spots))
     spots = "one spot" if contact.spots == 1 else f"{contact.spots} spots"
-    about = f"{told(max(power, 0.0), 'W')} of friction heat {spots} of radius {told(radius, 'm')}"
+    about = f"{as_text(max(power, 0.0), 'W')} of friction heat {spots} of radius {as_text(radius, 'm')}"
     flux, conductivity, capacity = (
         max(power, 0.0) / evidence.area,
         given.heat_conductivity,
@@ -198,10 +202,10 @@ def heating(evidence: Evidence, given: Given) -> Finding | None:
         )
         return unknown("heating", f"Give {missing}: {about}.")
     rise = flash_temperature(flux, radius, speed, conductivity, capacity)
-    return Finding("heating", rise, f"{about[0].upper()}{about[1:]} by {told(rise, 'K')} above the surface around.")
+    return Finding("heating", rise, f"{about[0].upper()}{about[1:]} by {as_text(rise, 'K')} above the surface around.")
 
 
-def coupling(evidence: Evidence, given: Given) -> Finding:
+def coupling(evidence: Evidence, given: AuditInputs) -> Finding:
     """Dundurs' second constant."""
     if not evidence.bodies:
         return unknown("coupling", "Poisson's ratio of each body is not known, or changes in time.")

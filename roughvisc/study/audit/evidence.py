@@ -17,7 +17,7 @@ from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.study.audit.contact import Contact, contact_of
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
-from roughvisc.study.statement.body import BASE, not_one_body
+from roughvisc.study.statement.body import BASE, separability_error
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import of_step
@@ -207,7 +207,7 @@ def bodies_of(case: Case) -> tuple[Body, ...]:
     stated = case.settings.material
     parts = [stated.a, stated.b] if stated.model == "pair" else [stated]
     materials = [complete(part.build()) for part in parts]
-    if any(map(not_one_body, materials)):
+    if any(map(separability_error, materials)):
         return ()
     end = case.program().duration
     return tuple(Body(*(float(one.contact_compliance(t)) for t in (0.0, end)), float(one.poisson)) for one in materials)
@@ -243,7 +243,7 @@ def _with_the_case(attrs: Mapping[Any, Any], case: Case | None) -> dict[str, Any
         "compliance_at_end": float(material.contact_compliance(program.duration)),
         "time_scale": program.time_scale,
     }
-    return found | ({} if not_one_body(material) else {"poisson": material.poisson}) | known
+    return found | ({} if separability_error(material) else {"poisson": material.poisson}) | known
 
 
 def _bodies(attrs: Mapping[str, Any], case: Case | None) -> tuple[Body, ...]:

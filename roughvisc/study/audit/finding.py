@@ -54,7 +54,7 @@ def unknown(name: str, sentence: str) -> Finding:
     return Finding(name, math.nan, sentence)
 
 
-def told(value: float, unit: str, digits: int = 2) -> str:
+def as_text(value: float, unit: str, digits: int = 2) -> str:
     """A quantity in SI to so many digits, as 490 kPa and not 4.9e+02 kPa."""
     return said(float(f"{value:.{digits}g}"), unit)
 

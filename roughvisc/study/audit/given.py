@@ -16,7 +16,7 @@ from roughvisc.units import stated_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
+class AuditInputs:
     """What is stated, None where nothing is; see :func:`roughvisc.audit`. Quantities are numbers in SI, or texts."""
 
     work_of_adhesion: Any = None
@@ -36,9 +36,9 @@ class Given:
         if self.base not in (None, *get_args(Base)):
             raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
 
-    def over(self, others: Mapping[str, Any]) -> Given:
+    def over(self, others: Mapping[str, Any]) -> AuditInputs:
         """These, and the others where these state nothing."""
-        return Given(**{**others, **self.stated()})
+        return AuditInputs(**{**others, **self.stated()})
 
     def stated(self) -> dict[str, Any]:
         """What is stated, in SI."""
@@ -46,17 +46,17 @@ class Given:
         return {name: value for name, value in values.items() if value is not None}
 
 
-def from_options(texts: Mapping[str, str | None]) -> Given:
+def from_options(texts: Mapping[str, str | None]) -> AuditInputs:
     """What is stated on a command line, where numbers are texts too; messages name the options.
 
     Raises
     ------
     InputError
-        As :class:`Given` does.
+        As :class:`AuditInputs` does.
     """
     values = {name: _number_or_text(text) for name, text in texts.items()}
     try:
-        return Given(**values)
+        return AuditInputs(**values)
     except InputError as error:
         name, rest = re.match(r"\w+", str(error))[0], re.sub(r"^\w+", "", str(error))  # type: ignore[index]
         raise InputError(f"--{name.replace('_', '-')}{rest}") from None

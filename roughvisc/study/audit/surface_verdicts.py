@@ -13,8 +13,8 @@ from roughvisc.mechanics.closed_forms.adhesion import (
     tabor_parameter,
 )
 from roughvisc.study.audit.evidence import Evidence
-from roughvisc.study.audit.finding import Finding, percent, told, unknown
-from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.finding import Finding, as_text, percent, unknown
+from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STATED, STIFF
 
 #: Contact fraction from which on spots have grown together.
@@ -24,7 +24,7 @@ _FLAT = 1e4
 _NO_MATERIAL = "The result does not say its material: audit the file that run wrote, or what simulate gave."
 
 
-def adhesion(evidence: Evidence, given: Given) -> Finding:
+def adhesion(evidence: Evidence, given: AuditInputs) -> Finding:
     """Pull-off force of the spots in contact over the largest load."""
     contact, w = evidence.contact, given.work_of_adhesion
     if not evidence.ran:
@@ -40,12 +40,12 @@ def adhesion(evidence: Evidence, given: Given) -> Finding:
     if flat:
         return _flat(evidence, w)
     radius = 1 / contact.curvature
-    spots = f"one spot of radius {told(radius, 'm')}"
+    spots = f"one spot of radius {as_text(radius, 'm')}"
     if contact.spots > 1:
-        spots = f"{contact.spots} spots of mean radius {told(radius, 'm')}"
+        spots = f"{contact.spots} spots of mean radius {as_text(radius, 'm')}"
     if w is None:
         least = LIMITS["adhesion"].doubtful * evidence.force / (contact.spots * pull_off_force(radius, 1.0))
-        return unknown("adhesion", f"Give work_of_adhesion: {spots} may have up to {told(least, 'J/m^2')}.")
+        return unknown("adhesion", f"Give work_of_adhesion: {spots} may have up to {as_text(least, 'J/m^2')}.")
     tabor = _tabor(evidence, radius, w)
     pull = contact.spots * pull_off_force(radius, w, math.inf if math.isnan(tabor) else tabor)
     ratio = pull / evidence.force
@@ -53,12 +53,12 @@ def adhesion(evidence: Evidence, given: Given) -> Finding:
         grown, theory = (1 + ratio) ** (2 / 3) - 1, "DMT"
     else:
         grown, theory = float(adhesive_load(1.0, ratio)) ** (2 / 3) - 1, "JKR"
-    theory += "" if math.isnan(tabor) else f", Tabor parameter {told(tabor, '1')}"
-    more = f"{percent(grown)} larger" if grown < 1 else f"{told(1 + grown, '1')} times as large"
+    theory += "" if math.isnan(tabor) else f", Tabor parameter {as_text(tabor, '1')}"
+    more = f"{percent(grown)} larger" if grown < 1 else f"{as_text(1 + grown, '1')} times as large"
     return Finding(
         "adhesion",
         ratio,
-        f"{spots[0].upper()}{spots[1:]} would hold {told(pull, 'N')} when pulled off, and make the contact area "
+        f"{spots[0].upper()}{spots[1:]} would hold {as_text(pull, 'N')} when pulled off, and make the contact area "
         f"{more} ({theory}).",
     )
 
@@ -73,13 +73,13 @@ def _flat(evidence: Evidence, w: float | None) -> Finding:
     unit = punch_pull_off(radius, 1 / evidence.early, 1.0)
     if w is None:
         least = (LIMITS["adhesion"].doubtful * evidence.force / unit) ** 2
-        return unknown("adhesion", f"Give work_of_adhesion: a flat contact may have up to {told(least, 'J/m^2')}.")
+        return unknown("adhesion", f"Give work_of_adhesion: a flat contact may have up to {as_text(least, 'J/m^2')}.")
     pull = unit * math.sqrt(w)
-    held = f"A flat contact would hold {told(pull, 'N')} when pulled off fast (Kendall)"
+    held = f"A flat contact would hold {as_text(pull, 'N')} when pulled off fast (Kendall)"
     return Finding("adhesion", pull / evidence.force, f"{held}; its area stays.")
 
 
-def stickiness(evidence: Evidence, given: Given) -> Finding | None:
+def stickiness(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Whether a rough surface sticks without a load; None of a smooth body in free space."""
     texture, w = evidence.texture, given.work_of_adhesion
     if texture is None:
@@ -93,7 +93,7 @@ def stickiness(evidence: Evidence, given: Given) -> Finding | None:
     energy = conformal_energy(texture.roughness, evidence.modulus)
     if w is None:
         least = LIMITS["stickiness"].doubtful * energy
-        enough = "" if math.isnan(least) else f": up to {told(least, 'J/m^2')} would do no harm to soft spots"
+        enough = "" if math.isnan(least) else f": up to {as_text(least, 'J/m^2')} would do no harm to soft spots"
         return unknown("stickiness", f"Give work_of_adhesion{enough}.")
     tabor = _tabor(evidence, 2 / texture.laplacian, w)
     if tabor <= STIFF:
@@ -110,12 +110,12 @@ def stickiness(evidence: Evidence, given: Given) -> Finding | None:
     return Finding(
         "stickiness",
         ratio,
-        f"Soft spots (Tabor parameter {told(tabor, '1')}): full contact stores {told(energy, 'J/m^2')} of elastic "
-        f"energy at the last modulus, and adhesion yields {told(w, 'J/m^2')} (Persson, Tosatti).",
+        f"Soft spots (Tabor parameter {as_text(tabor, '1')}): full contact stores {as_text(energy, 'J/m^2')} of "
+        f"elastic energy at the last modulus, and adhesion yields {as_text(w, 'J/m^2')} (Persson, Tosatti).",
     )
 
 
-def slope(evidence: Evidence, given: Given) -> Finding:
+def slope(evidence: Evidence, given: AuditInputs) -> Finding:
     """The rms slope of the loaded surface."""
     if math.isnan(evidence.slope):
         return unknown("slope", "The result holds no heights that were loaded.")
@@ -124,7 +124,7 @@ def slope(evidence: Evidence, given: Given) -> Finding:
     return Finding("slope", number, f"The {where} has {percent(number**2 / 2)} more area than its projection.")
 
 
-def strain(evidence: Evidence, given: Given) -> Finding:
+def strain(evidence: Evidence, given: AuditInputs) -> Finding:
     """The rms slope of the loaded surface over the linear range."""
     if math.isnan(evidence.slope):
         return unknown("strain", "The result holds no heights that were loaded.")
@@ -135,7 +135,7 @@ def strain(evidence: Evidence, given: Given) -> Finding:
     return Finding("strain", largest / given.linear_strain, f"{about[0].upper()}{about[1:]}.")
 
 
-def resolution(evidence: Evidence, given: Given) -> Finding:
+def resolution(evidence: Evidence, given: AuditInputs) -> Finding:
     """Cells in the shortest wave that a generator states; of others what the last octave adds to the rms slope."""
     texture = evidence.texture
     if texture is None:
@@ -147,14 +147,16 @@ def resolution(evidence: Evidence, given: Given) -> Finding:
         return Finding(
             "resolution",
             number,
-            f"Stated by the generator: the shortest wave is {told(wave, 'm')} long, and has {cells:.3g} cells{few}.",
+            f"Stated by the generator: the shortest wave is {as_text(wave, 'm')} long, and has {cells:.3g} cells{few}.",
             STATED,
         )
     if texture.analytic:
         return Finding("resolution", 0.0, "The profile is analytic: it has no shorter waves.")
     if texture.smooth:
         return Finding(
-            "resolution", 0.005, f"Form alone: 99 % of the slope's square lie above {told(texture.shortest / 2, 'm')}."
+            "resolution",
+            0.005,
+            f"Form alone: 99 % of the slope's square lie above {as_text(texture.shortest / 2, 'm')}.",
         )
     if math.isnan(texture.last_octave):
         why = "The surface is flat" if texture.slope == 0 else "Points are absent"
@@ -162,12 +164,12 @@ def resolution(evidence: Evidence, given: Given) -> Finding:
     return Finding(
         "resolution",
         texture.last_octave,
-        f"Waves below {told(texture.shortest, 'm')} add {percent(texture.last_octave)} of the slope, and take away as "
-        "much of the area; the next octave may do so again.",
+        f"Waves below {as_text(texture.shortest, 'm')} add {percent(texture.last_octave)} of the slope, and take away "
+        "as much of the area; the next octave may do so again.",
     )
 
 
-def border(evidence: Evidence, given: Given) -> Finding | None:
+def border(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Whether a surface repeats with a step; None in free space."""
     if evidence.boundary != "periodic":
         return None
@@ -179,7 +181,7 @@ def border(evidence: Evidence, given: Given) -> Finding | None:
     return Finding("border", number, f"{seam}: they differ {number:.2g} times as much as neighbouring rows.{advice}")
 
 
-def window(evidence: Evidence, given: Given) -> Finding | None:
+def window(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """What part of the side a taper has changed; None of a surface that was not tapered."""
     if evidence.texture is None or not evidence.texture.taper > 0:
         return None

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from roughvisc.study.cost.estimate import Copies, March, coarse
+from roughvisc.study.cost.estimate import Copies, CostEstimate, coarse
 from roughvisc.study.cost.press import Pressed
 from roughvisc.study.simulation.coarser import on_fewer_cells
 from roughvisc.study.simulation.footprint import PROCESS, curve_bytes
 from roughvisc.study.simulation.friction import rub
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import nominal_area
 
@@ -28,7 +28,7 @@ _OF_ITERATION, _OF_PROBLEM = 2.0, 5.0
 _AGAIN = 1.4
 
 
-def curve_march(case: Case, height: xr.DataArray, _: Copies | None = None) -> March:
+def curve_march(case: Case, height: xr.DataArray, _: Copies | None = None) -> CostEstimate:
     """Speeds as steps, and convolutions of a curve, from coarse grids.
 
     Raises
@@ -50,7 +50,7 @@ def curve_march(case: Case, height: xr.DataArray, _: Copies | None = None) -> Ma
         for side, one in zip(reversed(_COARSE), reversed(found), strict=True)
     )
     known = {"pressed": pressed, "halved": halved if max(height.shape) > _COARSE[1] else None}
-    return March(count, count, work, 0.0, max(contact), True, level, force, fraction, contact, **known)
+    return CostEstimate(count, count, work, 0.0, max(contact), True, level, force, fraction, contact, **known)
 
 
 def memory_of_curve(cells: float, settings: Settings) -> float:
@@ -58,9 +58,9 @@ def memory_of_curve(cells: float, settings: Settings) -> float:
     return PROCESS + curve_bytes(settings, cells)
 
 
-def _curve(case: Case) -> Curve:
+def _curve(case: Case) -> SteadySliding:
     experiment = case.experiment()
-    assert isinstance(experiment, Curve), "a program has a march of its own"
+    assert isinstance(experiment, SteadySliding), "a program has a march of its own"
     return experiment
 
 

@@ -30,7 +30,7 @@ from roughvisc.study.simulation.coarser import coarser_shape
 from roughvisc.study.simulation.footprint import PROCESS, march_bytes
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.rows import in_slide, staircase_area
-from roughvisc.study.simulation.scene import GROWTH, MOST_CELLS, Ground, prepare
+from roughvisc.study.simulation.scene import GROWTH, MOST_CELLS, Ground, build_scene
 from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.settings import Settings
@@ -69,7 +69,7 @@ class Passed(NamedTuple):
 
 
 @dataclass(frozen=True)
-class March:
+class CostEstimate:
     """What a march through a case takes.
 
     Attributes
@@ -183,7 +183,7 @@ def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
     return with_taper_weights(few, resampled_taper(height, few.shape))
 
 
-def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> March:
+def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> CostEstimate:
     """Steps and convolutions of a case, from marches over coarse grids; how much comes into contact, from a press.
 
     Where the grid may grow, the coarse grids cover the one that it grows to.
@@ -198,7 +198,7 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
     program = program.on_area(nominal_area(height))  # larger grids carry the same loads
     copies, shapes = copies or Copies(height, settings.boundary), grids_of(height, settings)
 
-    def marched(grid: int, side: int, outgrowing: bool = False) -> March:
+    def marched(grid: int, side: int, outgrowing: bool = False) -> CostEstimate:
         few = coarse(height, side) if grid == 0 else over(height, shapes[grid], side)
         return _march(case, program, few, outgrowing)
 
@@ -240,10 +240,10 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         "pressed": finest,
         "halved": halved,
     }
-    return March(**{**vars(_rescaled(second, finest)), **taken, **known, "rows": rows})
+    return CostEstimate(**{**vars(_rescaled(second, finest)), **taken, **known, "rows": rows})
 
 
-def _rescaled(found: March, pressed: Pressed) -> March:
+def _rescaled(found: CostEstimate, pressed: Pressed) -> CostEstimate:
     """A march whose largest approach and contact are those of a finer grid, which has the higher summits."""
     largest = (
         max((passed.level for passed in found.course), default=0.0),
@@ -262,13 +262,13 @@ def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
     return min(max(second / max(first, 1.0), limits[0]), limits[1])
 
 
-def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool = False) -> March:
+def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool = False) -> CostEstimate:
     """March over a coarse grid; no farther than to its border, if that is ``outgrowing`` it."""
     settings = replace(case.solving(), missing="absent", edge="accept")
     if program.slides:  # its corners will do: the times that are kept lie elsewhere in a shorter program
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
     ground = Ground(height, settings.missing, kernel=settings.kernel)
-    scene, _ = prepare(ground, case.material(), program, settings)
+    scene, _ = build_scene(ground, case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = fraction = level = force = 0.0
     work, instants = 0, [0.0]
@@ -312,7 +312,7 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
     known = (part, contact, bool(whole), level, force, fraction, tuple(contacts), slid, slid_work)
     known = (*known, tuple(course), push, bordering)
-    return March(steps * stretch, kept_rows, work * stretch, *known)
+    return CostEstimate(steps * stretch, kept_rows, work * stretch, *known)
 
 
 def _push(scene: Scene, instants: Sequence[float], forces: Sequence[float]) -> Push:
@@ -326,7 +326,7 @@ def _is_damped(scene: Scene, length: float) -> bool:
     return "bdf2" in scene.memory.rules and scene.stiff_ratio(length) > STIFF
 
 
-class Stopwatch:
+class ConvolutionTimer:
     """Seconds a convolution takes within a solve, by grid, boundary and kernel; once each, in two seconds in all."""
 
     def __init__(self) -> None:
@@ -411,7 +411,7 @@ class Solved:
         return sum(share * of(stage.solved) for stage, share in zip(self.stages, self.shares, strict=True))
 
 
-def solved_on(stages: tuple[Stage, ...], found: March) -> Solved:
+def solved_on(stages: tuple[Stage, ...], found: CostEstimate) -> Solved:
     """What a march is solved on, by its contacts on a coarse grid."""
     course = found.course or (Passed(found.level, (0.0, 0.0), 1.0),)
     reached, taken = 0, [0.0] * len(stages)
@@ -422,7 +422,7 @@ def solved_on(stages: tuple[Stage, ...], found: March) -> Solved:
     return Solved(stages[: reached + 1], tuple(shares.tolist()))
 
 
-def wall_time(settings: Settings, solved: Solved, found: March, choice: Choice, convolution: float) -> float:
+def wall_time(settings: Settings, solved: Solved, found: CostEstimate, choice: Choice, convolution: float) -> float:
     """Seconds for a case in one process with one thread, by those of a convolution on the final surface. [s]"""
     cells = solved.cells
     modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
@@ -434,14 +434,14 @@ def wall_time(settings: Settings, solved: Solved, found: March, choice: Choice, 
 
 
 def bytes_needed(
-    settings: Settings, cells: int, found: March, choice: Choice, part: float = 1.0, grows: bool = False
+    settings: Settings, cells: int, found: CostEstimate, choice: Choice, part: float = 1.0, grows: bool = False
 ) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
     counts = {"contact": found.contact, "steps": found.steps, "rows": found.rows, "part": part}
     return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
-def disk(case: Case, cells: int, found: March) -> float:
+def disk(case: Case, cells: int, found: CostEstimate) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
     rows = found.rows

@@ -20,16 +20,16 @@ from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.audit.audit import judged
+from roughvisc.study.audit.audit import evaluate
 from roughvisc.study.audit.evidence import of_case
-from roughvisc.study.audit.given import Given
+from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.columns import COLUMNS, attributes
 from roughvisc.study.cost.curve import curve_march, memory_of_curve
 from roughvisc.study.cost.estimate import (
+    ConvolutionTimer,
     Copies,
-    March,
-    Stopwatch,
+    CostEstimate,
     bytes_needed,
     disk,
     march_of,
@@ -53,9 +53,9 @@ from roughvisc.study.simulation.available import Available, memory_available
 from roughvisc.study.simulation.coarser import coarser
 from roughvisc.study.simulation.notes import body_note, left_out
 from roughvisc.study.simulation.refusal import PART, too_large
-from roughvisc.study.simulation.scene import Ground, check_cells, follows, memory_wanted
+from roughvisc.study.simulation.scene import Ground, check_cells, memory_options, uses_window
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.study.storage.versions import upgrade_note
@@ -130,10 +130,10 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     marches, surfaces, problems = _marches(cases, stated, parameters)
-    stopwatch, choices, there = Stopwatch(), _Choices(), memory_available()
+    stopwatch, choices, there = ConvolutionTimer(), _Choices(), memory_available()
     rows = []
     for number, case in enumerate(cases):
-        like = _most_like(number, list(marches), parameters)
+        like = _nearest_case(number, list(marches), parameters)
         surface = surfaces.get(_surface_name(cases[number], stated[number]))
         kind = _KINDS[type(case.experiment())]
         rows.append(
@@ -160,9 +160,9 @@ def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
 
 def _marches(
     cases: Sequence[Case], stated: Sequence[Mapping[str, Any]], parameters: Mapping[str, Any]
-) -> tuple[dict[int, March], dict[str, _Surface], dict[int, str]]:
+) -> tuple[dict[int, CostEstimate], dict[str, _Surface], dict[int, str]]:
     """Coarse marches of as many cases as time allows, spread over all; surfaces by name; what is impossible."""
-    marches: dict[int, March] = {}
+    marches: dict[int, CostEstimate] = {}
     surfaces: dict[str, _Surface] = {}
     problems: dict[int, str] = {}
     until = time.perf_counter() + _BUDGET
@@ -219,7 +219,7 @@ def _half_slope(height: xr.DataArray, boundary: Boundary = Settings.boundary) ->
     return rms_slope(coarser(height, 2.0, boundary))
 
 
-def _most_like(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
+def _nearest_case(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
     """The one of some cases with most parameters in common, the nearest of those."""
     if number in others or not others:
         return number
@@ -237,7 +237,7 @@ class _Choices:
         self._found: dict[str, Choice] = {}
 
     def of(self, case: Case, grows: bool) -> Choice:
-        wanted = memory_wanted(case.program(), case.solving(), "pressure" if grows else "displacement")
+        wanted = memory_options(case.program(), case.solving(), "pressure" if grows else "displacement")
         name = f"{case.settings.material!r} {wanted!r}"
         if name not in self._found:
             self._found[name] = choose_memory(case.material(), **wanted)
@@ -247,20 +247,20 @@ class _Choices:
 def _row(
     case: Case,
     surface: _Surface | None,
-    found: March | None,
+    found: CostEstimate | None,
     marched: bool,
     problem: str,
     choices: _Choices,
-    stopwatch: Stopwatch,
+    stopwatch: ConvolutionTimer,
     there: Available,
 ) -> dict[str, Any]:
     settings = case.solving()
     row = _blank(settings, marched, problem)
     if surface is None or surface.height is None:
         return row
-    height, grows = surface.height, surface.grows and follows(settings)
+    height, grows = surface.height, surface.grows and uses_window(settings)
     whole = next(i for i, stage in enumerate(surface.stages) if stage.outside == math.inf)
-    window = whole > 0 and follows(settings)
+    window = whole > 0 and uses_window(settings)
     mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
@@ -313,7 +313,7 @@ def _row(
     }
 
 
-def _contact(found: March, marched: bool) -> dict[str, Any]:
+def _contact(found: CostEstimate, marched: bool) -> dict[str, Any]:
     """How much comes into contact, on which cells, and on cells twice as long; of a case that was marched itself."""
     finest, halved = found.pressed, found.halved
     if finest is None or not marched:
@@ -336,11 +336,11 @@ def _blank(settings: Settings, marched: bool, problem: str) -> dict[str, Any]:
 def _curve_row(
     case: Case,
     surface: _Surface | None,
-    found: March | None,
+    found: CostEstimate | None,
     marched: bool,
     problem: str,
     _: _Choices,
-    stopwatch: Stopwatch,
+    stopwatch: ConvolutionTimer,
     there: Available,
 ) -> dict[str, Any]:
     """What a curve of friction will cost."""
@@ -356,7 +356,7 @@ def _curve_row(
     cells, convolution = height.size, stopwatch.seconds(height, "periodic", settings.kernel)
     nominal = found.force / nominal_area(height)
     curve = case.experiment()
-    assert isinstance(curve, Curve), "a program has a row of its own"
+    assert isinstance(curve, SteadySliding), "a program has a row of its own"
     passing = max(np.ptp(height[axis].values) for axis in ("x", "y")) / min(curve.asked)  # of the longest wave
     relaxed = full_contact_pressure(surface.slope, material, passing)
     needed = partial(memory_of_curve, settings=settings)
@@ -389,17 +389,17 @@ def _pressures(case: Case, surface: _Surface, choice: Choice, force: float) -> d
     }
 
 
-def _audit(case: Case, surface: _Surface, found: March) -> str:
+def _audit(case: Case, surface: _Surface, found: CostEstimate) -> str:
     """What an audit says before the run, by the load and the approach of a coarse march."""
     assert surface.height is not None
     height, boundary = surface.height, case.settings.solve.boundary
     if boundary not in surface.textures:
         surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
     foreseen = {"force": found.force, "approach": found.level, "fraction": found.fraction}
-    return judged(of_case(case, height, surface.textures[boundary], **foreseen), Given(), case.title).warning
+    return evaluate(of_case(case, height, surface.textures[boundary], **foreseen), AuditInputs(), case.title).warning
 
 
-def _scheme(settings: Settings, choice: Choice, found: March) -> str:
+def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
     if settings.method == "seed":
         return "the seed paper's: rectangle rule, first order"
     steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
@@ -414,8 +414,8 @@ def _scheme(settings: Settings, choice: Choice, found: March) -> str:
 class _Kind:
     """How the cost of one kind of experiment is foretold: from coarse grids, and as a row."""
 
-    march: Callable[[Case, xr.DataArray, Copies | None], March]
+    march: Callable[[Case, xr.DataArray, Copies | None], CostEstimate]
     row: Callable[..., dict[str, Any]]
 
 
-_KINDS: dict[type, _Kind] = {Program: _Kind(march_of, _row), Curve: _Kind(curve_march, _curve_row)}
+_KINDS: dict[type, _Kind] = {Program: _Kind(march_of, _row), SteadySliding: _Kind(curve_march, _curve_row)}

@@ -12,7 +12,7 @@ from typing import Any
 from roughvisc.errors import ChangedError, InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.links import refuse_link
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import atomic_write
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
@@ -20,7 +20,7 @@ from roughvisc.topography.readers import sha256
 INPUTS = "inputs"
 
 
-def pack(case: Case, folder: Path) -> str:
+def serialize_with_inputs(case: Case, folder: Path) -> str:
     """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.
 
     Parameters
@@ -62,7 +62,7 @@ def _copy(path: Path, folder: Path) -> Path:
         for above in (folder, *(one for one in reversed(copy.parents) if folder in one.parents)):
             refuse_link(above, "a folder of copied inputs")
         if not copy.is_file() or sha256(copy) != digest:
-            with whole_file(copy) as temporary:
+            with atomic_write(copy) as temporary:
                 shutil.copyfile(root / place, temporary)
                 if sha256(temporary) != digest:
                     raise ChangedError(f"{root / place}: was changed while it was copied: run the study again")

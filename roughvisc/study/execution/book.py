@@ -24,7 +24,7 @@ log = logging.getLogger("roughvisc")
 _SAVE_EVERY = 60.0
 
 
-class Watcher(Protocol):
+class Monitor(Protocol):
     """Who is told how a sweep goes on; times in seconds."""
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
@@ -50,7 +50,7 @@ class Watcher(Protocol):
 
 
 @dataclass
-class Book:
+class SweepLog:
     """Keeps account of a sweep.
 
     Attributes
@@ -61,7 +61,7 @@ class Book:
         All distinct cases by key.
     outcomes : dict
         How those ended that have ended.
-    watch : Watcher
+    watch : Monitor
         Who is told.
     entries : list of Entry
         Of the results that are known.
@@ -72,7 +72,7 @@ class Book:
     folder: Path
     cases: Mapping[str, Case]
     outcomes: dict[str, Outcome]
-    watch: Watcher
+    watch: Monitor
     entries: list[Entry]
     saved: float = 0.0
 

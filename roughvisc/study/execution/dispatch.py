@@ -23,11 +23,11 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 from roughvisc import errors
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.study.execution.baggage import INPUTS, pack
-from roughvisc.study.execution.book import Book
+from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
+from roughvisc.study.execution.book import SweepLog
 from roughvisc.study.execution.cluster import SOURCE, VERSION
 from roughvisc.study.execution.task import Outcome, Progress, Report, stop_sweep
-from roughvisc.study.execution.watch import Silence, watcher
+from roughvisc.study.execution.watch import NullMonitor, watcher
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import program_version
 
@@ -53,7 +53,7 @@ _TASK = (
 
 
 @dataclass
-class _Course:
+class _CaseStatus:
     """What is known of a case on its way.
 
     Attributes
@@ -107,12 +107,12 @@ class _Dispatch:
     """
 
     client: Client
-    book: Book
+    book: SweepLog
     texts: Mapping[str, str]
     arguments: tuple[Any, ...]
     name: str
     finished: Any
-    courses: dict[str, _Course]
+    courses: dict[str, _CaseStatus]
     futures: dict[Any, str] = field(default_factory=dict)
     waiting: deque[str] = field(default_factory=deque)
     refused: dict[str, str] = field(default_factory=dict)
@@ -196,7 +196,7 @@ class _Dispatch:
 
 
 def distribute(
-    texts: Mapping[str, str], book: Book, client: Client, threads: int | None, link: str, same_bits: bool
+    texts: Mapping[str, str], book: SweepLog, client: Client, threads: int | None, link: str, same_bits: bool
 ) -> None:
     """Bring cases to their ends on the workers of a client.
 
@@ -226,7 +226,7 @@ def distribute(
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
-    courses = {key: _Course() for key in texts}
+    courses = {key: _CaseStatus() for key in texts}
     transforms = transform_library() if same_bits else ""
     cases = _Dispatch(client, book, texts, (str(book.folder), name, threads, transforms), name, finished, courses)
     client.subscribe_topic(name, cases.heard)
@@ -254,10 +254,17 @@ def run_on(
     RoughviscError
         As :func:`roughvisc.study.execution.run.run_case`; what else went wrong there is one, too.
     """
-    watch = _Heard(progress) if callable(progress) else watcher(progress)
-    book = Book(folder, {case.key: case}, {}, watch, [])
+    watch = ProgressForwarder(progress) if callable(progress) else watcher(progress)
+    book = SweepLog(folder, {case.key: case}, {}, watch, [])
     try:
-        distribute({case.key: pack(case, folder / INPUTS)}, book, client, threads, client.dashboard_link, same_bits)
+        distribute(
+            {case.key: serialize_with_inputs(case, folder / INPUTS)},
+            book,
+            client,
+            threads,
+            client.dashboard_link,
+            same_bits,
+        )
     finally:
         watch.close()
     outcome = book.outcomes[case.key]
@@ -267,7 +274,7 @@ def run_on(
     return folder / outcome.entry.file
 
 
-class _Heard(Silence):
+class ProgressForwarder(NullMonitor):
     """Passes the times reached on to a function."""
 
     def __init__(self, progress: Progress) -> None:
@@ -350,7 +357,7 @@ def _workers(client: Client) -> set[str]:
     return set(client.nthreads())
 
 
-def _outcome(key: str, result: Any, course: _Course) -> Outcome:
+def _outcome(key: str, result: Any, course: _CaseStatus) -> Outcome:
     """What a future came to; ``interrupted`` is a case that another worker should go on with."""
     if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
         result = result[1]

@@ -11,7 +11,7 @@ from functools import wraps
 from typing import Any
 
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.halfspace.window import Reach
+from roughvisc.mechanics.halfspace.window import FarFieldDisplacement
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sliding import steady
@@ -20,7 +20,7 @@ from roughvisc.mechanics.stepping import attempt
 from roughvisc.study.execution import run
 from roughvisc.study.simulation import rows, simulate
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.checkpoint import Keeper
+from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.records import RowFile
 
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
@@ -28,18 +28,18 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "transforms": (
         *((HalfSpace, name) for name in ("displacement", "displacement_single")),
         *((HalfSpace, name) for name in ("approximate_inverse", "approximate_inverse_within")),
-        (Reach, "spread"),
+        (FarFieldDisplacement, "spread"),
         *((Sliding, name) for name in ("displacement", "full_contact", "lagging", "force_across")),
     ),
     "vector work of the solver": ((attempt, "solve_contact"), (steady, "solve_complementarity")),
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
     "surface and kernels": (
         (Case, "height"),
-        (simulate, "prepare"),
-        *((kind, "__init__") for kind in (HalfSpace, Reach, Sliding)),
+        (simulate, "build_scene"),
+        *((kind, "__init__") for kind in (HalfSpace, FarFieldDisplacement, Sliding)),
     ),
     "kept rows": ((rows.Rows, "add"), (RowFile, "append")),
-    "files": ((run, "keep"), (Keeper, "save"), (Keeper, "resume")),
+    "files": ((run, "keep"), (CheckpointWriter, "save"), (CheckpointWriter, "resume")),
 }
 REST = "stepping, figures and the rest"
 

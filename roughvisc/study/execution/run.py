@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, HinderedError, InputError, InUseError, RoughviscError, TooLargeError
+from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
 from roughvisc.labels import annotate
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.simulation.experiment import carry_out
@@ -26,15 +26,15 @@ from roughvisc.study.simulation.malloc import keep_memory
 from roughvisc.study.simulation.refusal import require_surface
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
-from roughvisc.study.storage.checkpoint import Keeper
+from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import (
     is_writable,
+    partial_files,
+    quarantine,
     require_writable,
     result_path,
-    set_aside,
-    torn_files,
     whole_result,
     write_result,
 )
@@ -102,7 +102,7 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
 
 
 def compute(
-    case: Case, *, progress: bool | Progress = True, keeper: Keeper | None = None, threads: int | None = None
+    case: Case, *, progress: bool | Progress = True, keeper: CheckpointWriter | None = None, threads: int | None = None
 ) -> xr.Dataset:
     """Result of a case, with all that is needed to run it again in its attributes.
 
@@ -143,7 +143,7 @@ def _named(case: Case) -> Iterator[None]:
     try:
         yield
     except (InputError, ConvergenceError) as error:
-        if case.origin is None or (isinstance(error, HinderedError) and not isinstance(error, TooLargeError)):
+        if case.origin is None or (isinstance(error, TransientError) and not isinstance(error, TooLargeError)):
             raise
         raise type(error)(f"{case.origin}: {error}") from error
 
@@ -230,9 +230,9 @@ def run_case(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with held(lock_path(folder, case.key)) as lock:
-            for torn in torn_files(path):
+            for torn in partial_files(path):
                 torn.unlink()
-            keeper = Keeper(
+            keeper = CheckpointWriter(
                 folder / f".{case.key}.unfinished",
                 case.key,
                 lock.check,
@@ -244,7 +244,7 @@ def run_case(
             with closing(keeper):
                 if not is_result_of(case, path, same_bits):
                     if path.exists() and (problem := _problem(case, path)):  # not one of other transforms
-                        set_aside(path, problem)
+                        quarantine(path, problem)
                     keeper.resume()
                     _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
@@ -269,18 +269,18 @@ def set_aside_damaged(case: Case, folder: Path) -> str:
     path = result_path(folder, case.key)
     with suppress(InUseError, OSError), held(lock_path(folder, case.key), patience=0.0):
         if path.exists() and (problem := _problem(case, path)):
-            set_aside(path, problem)
+            quarantine(path, problem)
             return f"{problem}; it is set aside as {path.name}.damaged"
     return ""
 
 
-def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Keeper, threads: int | None) -> None:
+def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: CheckpointWriter, threads: int | None) -> None:
     """Compute what is missing of a case and write its file."""
     try:
         dataset = compute(case, progress=progress, keeper=keeper, threads=threads)
         keeper.check()
         keep(dataset, case, folder)
-    except HinderedError:
+    except TransientError:
         raise
     except RoughviscError:  # it would fail again in the same way
         keeper.remove()

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.study.execution.baggage import INPUTS, pack
-from roughvisc.study.execution.book import Book, Watcher
+from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
+from roughvisc.study.execution.book import Monitor, SweepLog
 from roughvisc.study.execution.cluster import default_client, local_client
 from roughvisc.study.execution.run import other_transforms, result_folder, set_aside_damaged
 from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.side_by_side import side_by_side, threads_each
-from roughvisc.study.execution.task import REFUSED, Outcome, bring, outcome_of
+from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
 from roughvisc.study.simulation.available import cores
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, recorded_failure
@@ -26,7 +26,7 @@ from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import is_writable, require_writable
 from roughvisc.study.storage.sweep_log import LOG, log_file
-from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.tidy import clean_folder
 from roughvisc.study.storage.trust import UNSEALED
 from roughvisc.study.storage.versions import upgrade_note
 
@@ -124,7 +124,7 @@ def run_cases(
     cases: Sequence[Case],
     folder: Path,
     *,
-    watch: Watcher,
+    watch: Monitor,
     client: Client | None = None,
     workers: int | None = None,
     retry_failed: bool = False,
@@ -167,7 +167,7 @@ def run_cases(
             refuse_link(folder / f".{key}.{kind}", f"what an unfinished run has left ({kind})")
     with log_file(folder) if writable else nullcontext():
         if writable:
-            tidy(folder)
+            clean_folder(folder)
         index = index_of(folder, warn=False)
         outcomes = _known(distinct, folder, index, retry_failed, same_bits)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
@@ -182,7 +182,7 @@ def run_cases(
                     folder.rmdir()
                 raise
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        book = Book(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
+        book = SweepLog(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
             _tell_beforehand(book, index, todo, writable)
             _compute(todo, folder, book, client, processes, same_bits, threads)
@@ -209,7 +209,7 @@ def run_cases(
     return {key: outcomes[key] for key in distinct}
 
 
-def _tell_beforehand(book: Book, index: Index, todo: Mapping[str, Case], writable: bool) -> None:
+def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], writable: bool) -> None:
     """Say what there is to say of the folder before anything is computed, each thing once."""
     if not writable:
         book.tell(f"{book.folder}: may not be written to: all cases are finished, and nothing is written")
@@ -242,7 +242,7 @@ def _known(
 def _compute(
     todo: Mapping[str, Case],
     folder: Path,
-    book: Book,
+    book: SweepLog,
     client: Client | None,
     processes: int,
     same_bits: bool,
@@ -256,7 +256,7 @@ def _compute(
     from roughvisc.study.execution.dispatch import distribute
 
     if client is not None:
-        texts = {key: pack(case, folder / INPUTS) for key, case in todo.items()}
+        texts = {key: serialize_with_inputs(case, folder / INPUTS) for key, case in todo.items()}
         distribute(texts, book, client, threads, client.dashboard_link, same_bits)
         return
     texts = {key: case.to_json() for key, case in todo.items()}
@@ -274,9 +274,9 @@ def _processes(workers: int | None, cases: Sequence[Case]) -> int:
     return side_by_side(cases, min(cores(), len(cases)))
 
 
-def _here(case: Case, folder: Path, book: Book, threads: int, same_bits: bool) -> Outcome:
+def _here(case: Case, folder: Path, book: SweepLog, threads: int, same_bits: bool) -> Outcome:
     def report(now: float, end: float) -> None:
         book.watch.reached(case.key, now, end)
         book.watch.tick()
 
-    return bring(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)
+    return run_case_safely(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)

@@ -14,7 +14,7 @@ from typing import Literal, TypedDict, get_args
 
 import numpy as np
 
-from roughvisc.errors import DiskFullError, HinderedError, InUseError, RoughviscError
+from roughvisc.errors import DiskFullError, InUseError, RoughviscError, TransientError
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
@@ -84,7 +84,7 @@ class Outcome:
     reused: bool = False
 
 
-def bring(
+def run_case_safely(
     case: Case,
     folder: Path,
     *,
@@ -117,7 +117,7 @@ def bring(
     except InUseError as error:
         outcome = Outcome(case.key, "held", str(error), type(error).__name__)
     except RoughviscError as error:
-        kind: Kind = "hindered" if isinstance(error, HinderedError) else "failed"
+        kind: Kind = "hindered" if isinstance(error, TransientError) else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)
     except MemoryError:
         text = "not enough memory; what was computed up to the last checkpoint is kept: roughvisc plan says how much a "
@@ -141,7 +141,7 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
 
 
 def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None, transforms: str) -> Outcome:
-    """The task of a worker: :func:`bring`, with progress sent to the scheduler.
+    """The task of a worker: :func:`run_case_safely`, with progress sent to the scheduler.
 
     It ends as interrupted, with a checkpoint, if the sweep is stopped or the worker told to leave.
 
@@ -162,10 +162,10 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
     """
     from distributed import get_worker
 
-    from roughvisc.study.execution.worker import is_leaving, leave_in_order
+    from roughvisc.study.execution.worker import close_on_sigterm, is_leaving
 
     worker = get_worker()
-    leave_in_order(worker)
+    close_on_sigterm(worker)
     last = -np.inf
 
     def report(now: float, end: float) -> None:
@@ -191,7 +191,9 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
                 there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
                 return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
             threads = threads or worker.state.nthreads
-            return bring(case, Path(folder), progress=report, stop=stop, threads=threads, same_bits=bool(transforms))
+            return run_case_safely(
+                case, Path(folder), progress=report, stop=stop, threads=threads, same_bits=bool(transforms)
+            )
         except RoughviscError as error:  # a file that this machine does not have
             return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it

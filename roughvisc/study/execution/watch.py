@@ -19,12 +19,12 @@ from roughvisc.study.statement.case import Case
 _SHOWN = 8
 
 
-def watcher(progress: bool, console: Console | None = None) -> Watch | Silence:
+def watcher(progress: bool, console: Console | None = None) -> LiveMonitor | NullMonitor:
     """Who watches a sweep: a display, or nobody."""
-    return Watch(console) if progress else Silence()
+    return LiveMonitor(console) if progress else NullMonitor()
 
 
-class Silence:
+class NullMonitor:
     """Shows nothing but what the user should know at once."""
 
     def begin(self, cases: Sequence[Case], link: str) -> None: ...
@@ -40,7 +40,7 @@ class Silence:
     def close(self) -> None: ...
 
 
-class Watch:
+class LiveMonitor:
     """Cases done, running and failed, and the time left.
 
     Parameters

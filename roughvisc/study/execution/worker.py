@@ -19,7 +19,7 @@ def is_leaving(worker: Worker) -> bool:
     return worker.status in _LEAVING
 
 
-def leave_in_order(worker: Worker) -> None:
+def close_on_sigterm(worker: Worker) -> None:
     """Have a worker close in order at SIGTERM; called by its task, from whatever thread.
 
     Batch systems send SIGTERM to every process of a job. Dask's nanny knows what to do; its worker would end there and

@@ -12,19 +12,19 @@ from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.friction import rub
 from roughvisc.study.simulation.simulate import press
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.settings import Settings
-from roughvisc.study.storage.checkpoint import Keeper
+from roughvisc.study.storage.checkpoint import CheckpointWriter
 
 
 def carry_out(
-    experiment: Program | Curve,
+    experiment: Program | SteadySliding,
     height: xr.DataArray,
     material: Material,
     settings: Settings,
     *,
     progress: bool | Callable[[float, float], None],
-    keeper: Keeper | None = None,
+    keeper: CheckpointWriter | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Press a surface through a program, or slide it at the speeds of a curve.
@@ -51,7 +51,7 @@ def carry_out(
     xarray.Dataset
         Over ``time``, as :func:`roughvisc.simulate` gives it, or over ``speed``, as :func:`roughvisc.friction` does.
     """
-    if isinstance(experiment, Curve):
+    if isinstance(experiment, SteadySliding):
         with fft.set_workers(threads_for(threads)):
             return rub(height, material, experiment, settings, progress=progress, keeper=keeper)
     return press(height, material, experiment, settings, progress=progress, keeper=keeper, threads=threads)

@@ -30,7 +30,7 @@ _QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
 
 
 @dataclass(frozen=True)
-class Turn:
+class AxisTransform:
     """The rotation of fields by which the profile moves along +x. What lies to the left of the motion is then +y.
 
     Attributes
@@ -42,7 +42,7 @@ class Turn:
     quarters: int
 
     @classmethod
-    def of(cls, direction: str) -> Turn:
+    def of(cls, direction: str) -> AxisTransform:
         """That of a direction."""
         return cls(_QUARTERS[direction])
 
@@ -61,7 +61,7 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Face:
+class SlidingGrid:
     """One grid of a surface that slides along +x.
 
     Attributes
@@ -79,12 +79,12 @@ class Face:
     kernel: Kernel
 
     @classmethod
-    def of(cls, ground: Ground, turn: Turn) -> Face:
+    def of(cls, ground: Ground, turn: AxisTransform) -> SlidingGrid:
         """That of a surface."""
         sides = ground.spacing[::-1] if turn.swapped else ground.spacing
         return cls(np.ascontiguousarray(turn.there(ground.gap)), (sides[0], sides[1]), ground.kernel)
 
-    def smooth(self) -> tuple[Face, float]:
+    def smooth(self) -> tuple[SlidingGrid, float]:
         """The same without its shortest octave of waves, and the length below which these are. [m]
 
         Raises
@@ -95,16 +95,16 @@ class Face:
         gap, shortest = without_last_octave(self.gap, self.spacing)
         if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
             raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
-        return Face(gap, self.spacing, self.kernel), shortest
+        return SlidingGrid(gap, self.spacing, self.kernel), shortest
 
-    def coarser(self, factor: float) -> Face | None:
+    def coarser(self, factor: float) -> SlidingGrid | None:
         """The same waves on cells about so many times longer, as far as these can hold them; None if there is none."""
         shape = coarser_shape((self.gap.shape[0], self.gap.shape[1]), factor, False)
         if shape == self.gap.shape:
             return None
         sides = [side * many / few for side, many, few in zip(self.spacing, self.gap.shape, shape, strict=True)]
         gap = resample_periodic(self.gap, shape, first_kept=True)
-        return Face(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
+        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
 
     @property
     def period(self) -> float:

@@ -16,15 +16,15 @@ from roughvisc.mechanics.halfspace.sheet import Base
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.slide import Direction
-from roughvisc.study.simulation.malloc import keeping
+from roughvisc.study.simulation.malloc import retain_arena
 from roughvisc.study.simulation.notes import border_note, slope_note
 from roughvisc.study.simulation.refusal import require_memory_of_curve
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.simulation.speeds import Speeds
-from roughvisc.study.statement.body import body
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.body import make_body
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.settings import Settings
-from roughvisc.study.storage.checkpoint import Keeper, Reached
+from roughvisc.study.storage.checkpoint import Checkpoint, CheckpointWriter
 from roughvisc.study.storage.records import RowsInMemory
 from roughvisc.variables import RESULT_FORMAT
 
@@ -115,13 +115,13 @@ def friction(
     >>> int(ds.friction_coefficient.argmax("speed"))
     1
     """
-    curve = Curve(speeds=speeds, load=load, pressure=pressure, direction=direction, last_octave=last_octave)
+    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, last_octave=last_octave)
     settings = Settings(
         boundary="periodic",
         tolerance=tolerance,
         fields=_fields(fields),
         grid_error=grid_error,
-        kernel=body(complete(material), thickness, base),
+        kernel=make_body(complete(material), thickness, base),
     )
     return root_of(rub(height, material, curve, settings, progress=progress).assign_attrs(title="Steady sliding"))
 
@@ -129,11 +129,11 @@ def friction(
 def rub(
     height: xr.DataArray,
     material: Material,
-    curve: Curve,
+    curve: SteadySliding,
     settings: Settings,
     *,
     progress: bool | Progress,
-    keeper: Keeper | None = None,
+    keeper: CheckpointWriter | None = None,
 ) -> xr.Dataset:
     """As :func:`friction`; a keeper takes each speed to the disk, and knows at which to go on."""
     began = time.perf_counter()
@@ -142,13 +142,13 @@ def rub(
     require_memory_of_curve((ground.gap.shape[0], ground.gap.shape[1]), settings)
     if not ground.present.all():  # of a punch, which says so itself
         raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
-    reached = Reached() if keeper is None else keeper.latest
+    reached = Checkpoint() if keeper is None else keeper.latest
     spent = reached.wall_time - began
     store = RowsInMemory() if keeper is None else keeper.rows
     rows = Speeds(ground, material, curve, settings, store)
     from roughvisc.study.progress import reporting  # slow to import
 
-    with keeping(ground.gap.nbytes), reporting(progress, "sliding", at=curve.at) as report:
+    with retain_arena(ground.gap.nbytes), reporting(progress, "sliding", at=curve.at) as report:
         for number in np.argsort(curve.asked)[reached.rows :]:
             rows.add(int(number), lambda: spent + time.perf_counter())
             reached = reached.at_speed(spent + time.perf_counter())
@@ -173,7 +173,7 @@ def rub(
         "model_note": MODEL,
         "direction": curve.direction,
         "history": str(ground.height.attrs.get("history", "")),
-        **settings.told(),
+        **settings.to_attributes(),
         **settings.kernel.described(),
         **{name: note for name, note in notes.items() if note},
     }

@@ -16,7 +16,7 @@ import numpy as np
 from roughvisc.mechanics.contact.neighbours import faces_between
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.steady import SteadyState
-from roughvisc.study.simulation.faces import Face, areas
+from roughvisc.study.simulation.faces import SlidingGrid, areas
 from roughvisc.study.simulation.grid_convergence import grid_uncertainty
 from roughvisc.study.simulation.grid_error import counting_error
 
@@ -39,7 +39,7 @@ class CoarserFaces:
         On the grid of the surface.
     """
 
-    def __init__(self, face: Face) -> None:
+    def __init__(self, face: SlidingGrid) -> None:
         self._spacing = face.spacing
         self.faces = [coarse for coarse in (face.coarser(2.0), face.coarser(4.0)) if coarse is not None]
         if not self.faces:
@@ -67,9 +67,9 @@ class CoarserFaces:
         tolerance : float
             Of the coarser solutions too.
         """
-        runs = [_told(found, self._spacing)]
+        runs = [_friction_and_area(found, self._spacing)]
         for face in self.faces:
-            runs.append(_told(face.slide(face.sliding(speed, law), force, tolerance), face.spacing))
+            runs.append(_friction_and_area(face.slide(face.sliding(speed, law), force, tolerance), face.spacing))
         if len(self.faces) == 0 or not runs[0][0] > 0:
             return dict(_NOTHING)
         runs += [(math.nan, math.nan)] * (3 - len(runs))
@@ -84,7 +84,7 @@ class CoarserFaces:
         return {"grid_error_friction": friction, "grid_error_area": float(np.maximum(area, counting))}  # NaN stays
 
 
-def _told(state: SteadyState, spacing: tuple[float, float]) -> tuple[float, float]:
+def _friction_and_area(state: SteadyState, spacing: tuple[float, float]) -> tuple[float, float]:
     """Friction force [N] and contact area [m2] of a steady state; missing where it did not converge."""
     if not state.converged:
         return math.nan, math.nan

@@ -34,7 +34,7 @@ def keep_memory() -> bool:
 
 
 @contextmanager
-def keeping(size: int) -> Iterator[None]:
+def retain_arena(size: int) -> Iterator[None]:
     """Have the C library keep freed memory while arrays of so many bytes are computed with.
 
     Of narrow grids it is only told what to expect. What an iteration on a wide one needs for the cells in contact, some

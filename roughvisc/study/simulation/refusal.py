@@ -18,7 +18,7 @@ from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.simulation.available import Available, memory_available
 from roughvisc.study.simulation.footprint import curve_bytes, march_bytes
 from roughvisc.study.simulation.mirror import is_mirrored
-from roughvisc.study.simulation.scene import follows, memory_wanted
+from roughvisc.study.simulation.scene import memory_options, uses_window
 from roughvisc.study.statement.settings import Settings
 
 #: Cells from which it is asked what memory there is: on fewer a march takes less than 100 MB.
@@ -64,9 +64,9 @@ def require_memory(
     cells = math.prod(shape)
     if cells < WORTH_ASKING:
         return
-    memory = choose_memory(complete(material), **memory_wanted(program.on_area(area), settings)).memory
+    memory = choose_memory(complete(material), **memory_options(program.on_area(area), settings)).memory
     rows = least_rows(settings, program)
-    part = 0.0 if follows(settings) and not settings.kernel.bulges else 1.0
+    part = 0.0 if uses_window(settings) and not settings.kernel.raises_surface else 1.0
 
     def needed(cells: float, settings: Settings = settings, *, part: float, in_memory: bool = in_memory) -> float:
         return march_bytes(settings, cells, memory, rows=rows, part=part, in_memory=in_memory)

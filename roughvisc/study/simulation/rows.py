@@ -14,14 +14,14 @@ from roughvisc.labels import annotate
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.threads import is_wide
-from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence
+from roughvisc.mechanics.halfspace.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.domain import at_border
 from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.study.simulation.friction_rows import friction_row
 from roughvisc.study.simulation.mirror import quarter, unfold
 from roughvisc.study.simulation.scene import Ground
-from roughvisc.study.simulation.stated import stated, stated_area
+from roughvisc.study.simulation.stated import area_columns, error_columns
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.topography.grid import TAPER
@@ -65,7 +65,9 @@ class Rows:
         #: Whether the profile has a mean plane of its own: that of an indenter depends on how large its grid is.
         self._has_mean_plane = settings.boundary == "free" and not ground.can_grow()
         single = settings.tolerance >= _SINGLE
-        self._reach = lru_cache(maxsize=2)(lambda window: Reach(window, ground.spacing, ground.kernel, single=single))
+        self._reach = lru_cache(maxsize=2)(
+            lambda window: FarFieldDisplacement(window, ground.spacing, ground.kernel, single=single)
+        )
         self._mean_influence = lru_cache(maxsize=2)(
             lambda window: mean_influence(window, ground.spacing, ground.kernel)
         )
@@ -115,9 +117,9 @@ class Rows:
             **friction_row(step),
         }
         if kept:
-            row |= stated(step, self.series_error) | stated_area(step, contact, touching, area)
+            row |= error_columns(step, self.series_error) | area_columns(step, contact, touching, area)
         grid = {"level": step.level, "corner": self._ground.corner, "shape": window.shape, "domain": window.domain}
-        self._store.append({"row": row, "grid": grid, "kept": kept, "border": self.border}, _of_their_own(arrays))
+        self._store.append({"row": row, "grid": grid, "kept": kept, "border": self.border}, _copy_views(arrays))
 
     def _kept(self) -> list[int]:
         """Numbers of the steps that are kept."""
@@ -126,7 +128,7 @@ class Rows:
     def dataset(self) -> xr.Dataset:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
         height, kept = self._ground.height, self._kept()
-        rows = [plain["row"] | self._recounted(i) for i, plain in enumerate(self._store.plain)]
+        rows = [plain["row"] | self._rescaled_to_domain(i) for i, plain in enumerate(self._store.plain)]
         columns = {name: np.array([rows[number][name] for number in kept]) for name in (rows[kept[0]] if kept else ())}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
@@ -150,7 +152,7 @@ class Rows:
             attrs={
                 "Conventions": "CF-1.11",
                 "result_format": RESULT_FORMAT,
-                **self._settings.told(),
+                **self._settings.to_attributes(),
                 "history": str(height.attrs.get("history", "")),
             },
         )
@@ -161,7 +163,7 @@ class Rows:
         grid = self._store.plain[index]["grid"]
         return self._ground.window_at(grid["corner"], grid["shape"])
 
-    def _recounted(self, index: int) -> dict[str, float]:
+    def _rescaled_to_domain(self, index: int) -> dict[str, float]:
         """What is counted over the domain, where that has grown since the row was taken up."""
         row, grid = (self._store.plain[index][part] for part in ("row", "grid"))
         if tuple(grid["domain"]) == self._ground.window.domain:
@@ -196,7 +198,7 @@ class Rows:
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
         """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
         gap = self._ground.gap[rows] + step.displacement_on(rows)
-        self._settle(gap, step.level, rows)
+        self._clip_gap(gap, step.level, rows)
         gap[contact[rows]] = 0.0
         return gap
 
@@ -239,11 +241,11 @@ class Rows:
                 out[rows] = displacement
             else:
                 np.add(displacement, self._ground.gap[rows], out=out[rows])
-                self._settle(out[rows], self._store.plain[index]["grid"]["level"], rows)
+                self._clip_gap(out[rows], self._store.plain[index]["grid"]["level"], rows)
         if name == "gap":
             out[window.cells][arrays["source_pressure"] > 0] = 0.0
 
-    def _settle(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
+    def _clip_gap(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
         """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
         gap -= level
         np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
@@ -272,7 +274,7 @@ class Rows:
         return STATUS_MEANINGS.index(meaning)
 
 
-def keeps_its_word(step: Step, series_error: float) -> bool:
+def meets_tolerance(step: Step, series_error: float) -> bool:
     """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
 
     Where hardly any compliance is there at once, pressure jumps in each cell that enters. Only the approach is
@@ -282,11 +284,11 @@ def keeps_its_word(step: Step, series_error: float) -> bool:
     scene, state = step.scene, step.state
     if scene.time_step is not None or in_slide(step):  # the steps are as long as they are
         return True
-    found = stated(step, series_error)
+    found = error_columns(step, series_error)
     most = _AT_MOST * scene.tolerance
     if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
         return False
-    if not scene.is_soft(scene.program.duration):
+    if not scene.lacks_instantaneous_compliance(scene.program.duration):
         return not found["stated_error"] > scene.tolerance
     since = state.now.time - state.began
     if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
@@ -302,7 +304,7 @@ def in_slide(step: Step) -> bool:
     return bool(scene.motions) and scene.program.segments[segment_number(step.state)].slide is not None
 
 
-def tells_of_its_end(step: Step) -> bool:
+def is_end_value(step: Step) -> bool:
     """Whether pressure and force of an accepted step are those at its end.
 
     Where hardly any compliance is there at once they belong to the whole step, unless it is kept: what is given, the
@@ -310,7 +312,7 @@ def tells_of_its_end(step: Step) -> bool:
     """
     state = step.state
     since = state.began if state.before is None else state.before.time
-    return step.control == "load" or not step.scene.is_soft(state.now.time - since)
+    return step.control == "load" or not step.scene.lacks_instantaneous_compliance(state.now.time - since)
 
 
 def _entered(step: Step) -> bool:
@@ -319,7 +321,7 @@ def _entered(step: Step) -> bool:
     return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))
 
 
-def _of_their_own(arrays: dict[str, Array]) -> dict[str, Array]:
+def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:
     """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
     own: dict[int, Array] = {}
     for array in arrays.values():

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.kernel import Kernel, displaces_as_a_whole
+from roughvisc.mechanics.halfspace.kernel import Kernel, has_finite_mean
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.halfspace.window import Window, whole_domain, window_around
@@ -27,7 +27,7 @@ from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.simulation.mirror import is_mirrored, quarter
 from roughvisc.study.simulation.representable import check_loads, check_times
-from roughvisc.study.simulation.slides import check_slides, on_cells
+from roughvisc.study.simulation.slides import check_slides, snap_to_cells
 from roughvisc.study.statement.settings import Missing, Settings
 from roughvisc.topography.grid import checked, nominal_area, spacing, taper_weights
 from roughvisc.topography.indenters import grown, highest
@@ -78,7 +78,7 @@ class Ground:
         #: Area that nominal pressures refer to: that of the surface as it was given. [m2]
         self.nominal_area = nominal_area(height)
         self._extent = float(_FIRST_EXTENT)
-        if follow and not kernel.bulges and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
+        if follow and not kernel.raises_surface and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
 
     def _lay(self, height: xr.DataArray) -> None:
@@ -177,7 +177,7 @@ class Ground:
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
-def follows(settings: Settings) -> bool:
+def uses_window(settings: Settings) -> bool:
     """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
     return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
 
@@ -192,7 +192,7 @@ def check_cells(height: xr.DataArray, settings: Settings) -> None:
         settings.kernel.check_cells((dx, dy))
 
 
-def prepare(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Choice]:
+def build_scene(ground: Ground, material: Material, program: Program, settings: Settings) -> tuple[Scene, Choice]:
     """Scene of a case and what models its material.
 
     Raises
@@ -208,19 +208,19 @@ def prepare(ground: Ground, material: Material, program: Program, settings: Sett
     material = complete(material)
     (nx, ny), (dx, dy) = ground.height.shape, ground.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), ground.gap[ground.present])
-    if settings.boundary == "periodic" and ground.present.all() and not displaces_as_a_whole(ground.kernel):
+    if settings.boundary == "periodic" and ground.present.all() and not has_finite_mean(ground.kernel):
         _check_approach(program, ground.mean_gap)
     foreseen = 0.0 if ground.window.whole else _foreseen(ground, program, material)
     while ground.window.outside <= foreseen:
         ground.widen()
     grows = not ground.window.whole or (settings.boundary == "free" and settings.edge == "error" and ground.can_grow())
-    choice = choose_memory(material, **memory_wanted(program, settings, "pressure" if grows else "displacement"))
+    choice = choose_memory(material, **memory_options(program, settings, "pressure" if grows else "displacement"))
     scene = Scene(
         halfspace=ground.halfspace(settings.boundary),
         material=choice.material,
         memory=choice.memory,
         program=program,
-        times=on_cells(program, kept_times(program, settings.times), ground.spacing),
+        times=snap_to_cells(program, kept_times(program, settings.times), ground.spacing),
         tolerance=settings.tolerance,
         time_step=None if settings.time_step == "auto" else settings.time_step,
         accept_edge=settings.edge == "accept",
@@ -285,7 +285,7 @@ def _check_approach(program: Program, full: float) -> None:
             )
 
 
-def memory_wanted(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
+def memory_options(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
     """What :func:`~roughvisc.mechanics.hereditary.choice.choose_memory` is to be asked for, whatever the material."""
     return {
         "duration": program.duration,

@@ -26,16 +26,16 @@ from roughvisc.mechanics.stepping.scene import Scene, State
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.study.simulation.available import threads_for
 from roughvisc.study.simulation.grid_error import with_grid_error
-from roughvisc.study.simulation.malloc import keeping
+from roughvisc.study.simulation.malloc import retain_arena
 from roughvisc.study.simulation.notes import accuracy_note, body_note, border_note, edge_note, left_out, slope_note
 from roughvisc.study.simulation.refusal import require_memory
-from roughvisc.study.simulation.rows import Rows, keeps_its_word, tells_of_its_end
-from roughvisc.study.simulation.scene import Ground, check_cells, follows, prepare
+from roughvisc.study.simulation.rows import Rows, is_end_value, meets_tolerance
+from roughvisc.study.simulation.scene import Ground, build_scene, check_cells, uses_window
 from roughvisc.study.simulation.slides import slide_note
 from roughvisc.study.simulation.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
-from roughvisc.study.statement.body import body, not_one_body
+from roughvisc.study.statement.body import make_body, separability_error
 from roughvisc.study.statement.settings import Edge, Memory, Method, Missing, Settings, TimeStep
-from roughvisc.study.storage.checkpoint import Keeper, Reached
+from roughvisc.study.storage.checkpoint import Checkpoint, CheckpointWriter
 from roughvisc.study.storage.records import RowsInMemory
 from roughvisc.topography.grid import checked, nominal_area
 
@@ -159,7 +159,7 @@ def simulate(
         edge=edge,
         memory=memory,
         grid_error=grid_error,
-        kernel=body(material, thickness, base, kernel),
+        kernel=make_body(material, thickness, base, kernel),
     )
     return root_of(press(height, material, program, settings, progress=progress, threads=threads))
 
@@ -171,7 +171,7 @@ def press(
     settings: Settings,
     *,
     progress: bool | Progress,
-    keeper: Keeper | None = None,
+    keeper: CheckpointWriter | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
     """As :func:`simulate`; a keeper takes to the disk what is computed, and knows where to go on from.
@@ -185,7 +185,7 @@ def press(
     count = threads_for(threads)
 
     def pressed(of: xr.DataArray, program: Program, settings: Settings, **kept: Any) -> xr.Dataset:
-        with fft.set_workers(count), keeping(8 * of.size):
+        with fft.set_workers(count), retain_arena(8 * of.size):
             return _press(of, material, program, settings, **kept)
 
     dataset = pressed(height, program, with_needed, progress=progress, keeper=keeper)
@@ -206,14 +206,14 @@ def _press(
     program: Program,
     settings: Settings,
     progress: bool | Progress = False,
-    keeper: Keeper | None = None,
+    keeper: CheckpointWriter | None = None,
 ) -> xr.Dataset:
     began = time.perf_counter()
     shape, area, held = (height.sizes["x"], height.sizes["y"]), nominal_area(height), keeper is None
     require_memory(shape, settings, material, program, in_memory=held, heights=height.values, area=area)
     mirror = settings.method == "fast" and not program.slides
-    ground = Ground(height, settings.missing, follow=follows(settings), mirror=mirror, kernel=settings.kernel)
-    scene, choice = prepare(ground, material, program, settings)
+    ground = Ground(height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=settings.kernel)
+    scene, choice = build_scene(ground, material, program, settings)
     followed = not ground.window.whole
     log.info("memory: %s", choice.note)
     if keeper is not None:
@@ -252,7 +252,7 @@ def _for_the_audit(scene: Scene, height: xr.DataArray, material: Material) -> di
     return {
         "compliance_at_once": scene.compliance(0.0),
         "compliance_at_end": scene.final,
-        "poisson": "" if not_one_body(material) else complete(material).poisson,
+        "poisson": "" if separability_error(material) else complete(material).poisson,
         "time_scale": scene.program.time_scale,
         "recipe": str(height.attrs.get("recipe", "")),
     }
@@ -274,10 +274,10 @@ def _march(
     settings: Settings,
     began: float,
     report: Progress,
-    keeper: Keeper | None,
+    keeper: CheckpointWriter | None,
 ) -> None:
     """March to the end of the program; the rows take up what is kept, the keeper how far it has come."""
-    reached = Reached() if keeper is None else keeper.latest
+    reached = Checkpoint() if keeper is None else keeper.latest
     assert reached.state is None or isinstance(reached.state, State), "the key tells a program from a curve"
     spent = reached.wall_time - began
     every = scene.times is None
@@ -286,10 +286,10 @@ def _march(
         rows.watch_border(step)
         reached = reached.after(step, ground.growths, spent + time.perf_counter())
         # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-        if step.shown.time in kept or (every and keeps_its_word(step, rows.series_error)):
+        if step.shown.time in kept or (every and meets_tolerance(step, rows.series_error)):
             rows.add(step, reached.converged, reached.wall_time)
             reached = reached.kept()
-        elif not every and tells_of_its_end(step):
+        elif not every and is_end_value(step):
             rows.add(step, step.converged, reached.wall_time, kept=False)
             reached = reached.noted()
         report(step.shown.time, scene.program.duration)

@@ -53,7 +53,7 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
                 raise InputError(f"program.{number}: {error}") from None
 
 
-def on_cells(program: Program, times: Sequence[float] | None, spacing: Spacing) -> tuple[float, ...] | None:
+def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spacing) -> tuple[float, ...] | None:
     """Kept times, those within a slide brought to the nearest whole cell. [s]
 
     Parameters

@@ -14,11 +14,11 @@ from roughvisc.mechanics.materials.frequency import over_frequencies
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
-from roughvisc.study.simulation.faces import Face, Turn, areas, on_rows
+from roughvisc.study.simulation.faces import AxisTransform, SlidingGrid, areas, on_rows
 from roughvisc.study.simulation.friction_grid_error import CoarserFaces
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.simulation.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowStore
 from roughvisc.topography.grid import TAPER
@@ -48,7 +48,7 @@ class Speeds:
         self,
         ground: Ground,
         material: Material,
-        curve: Curve,
+        curve: SteadySliding,
         settings: Settings,
         store: RowStore,
     ) -> None:
@@ -59,13 +59,13 @@ class Speeds:
             settings,
             store,
         )
-        self._turn = Turn.of(curve.direction)
+        self._turn = AxisTransform.of(curve.direction)
         self._force = curve.force(ground.nominal_area)
-        self._face = Face.of(ground, self._turn)
+        self._face = SlidingGrid.of(ground, self._turn)
         #: Attributes of the result that say what was computed beside the curve.
         self.told: dict[str, str] = {}
         self._alone = surface_stands_alone(ground.height)
-        self._smooth: Face | None = None
+        self._smooth: SlidingGrid | None = None
         if curve.last_octave:
             self._smooth, shortest = self._face.smooth()
             self.told["last_octave"] = f"waves shorter than {shortest:.4g} m"

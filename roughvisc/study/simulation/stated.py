@@ -21,7 +21,7 @@ _SUMMED = 0.5
 _SOLVER_AT_EDGE = 3.0
 
 
-def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
+def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
     """Area in contact and area out of it that the contact solver's error may put on the other side. [m2]
 
     Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
@@ -47,7 +47,7 @@ def solver_in_doubt(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
     return area * sum(inside for inside, _ in found), area * sum(outside for _, outside in found)
 
 
-def stated_area(step: Step, contact: NDArray[np.bool_], counted: float, area: float) -> dict[str, float]:
+def area_columns(step: Step, contact: NDArray[np.bool_], counted: float, area: float) -> dict[str, float]:
     """Bounds on the contact area of a step, by the cells that time steps and contact solver leave in doubt. [m2]
 
     Parameters
@@ -59,12 +59,12 @@ def stated_area(step: Step, contact: NDArray[np.bool_], counted: float, area: fl
     counted, area : float
         Contact area, counted and corrected for the grid. [m2]
     """
-    in_doubt, unknown = solver_in_doubt(step, contact), step.uncertainty
+    in_doubt, unknown = uncertain_cells(step, contact), step.uncertainty
     lower, upper = area_bounds(counted, area, unknown.inside + in_doubt[0], unknown.outside + in_doubt[1])
     return {"contact_area_solver_lower": float(lower), "contact_area_solver_upper": float(upper)}
 
 
-def stated(step: Step, series_error: float) -> dict[str, float]:
+def error_columns(step: Step, series_error: float) -> dict[str, float]:
     """What is stated of the accuracy of a step.
 
     Parameters
@@ -83,14 +83,14 @@ def stated(step: Step, series_error: float) -> dict[str, float]:
     """
     state, unknown, shown = step.state, step.uncertainty, step.shown
     largest_force, largest_approach = state.largest_force, state.largest_approach
-    remembers, unit = step.scene.remembers, step.scene.tolerance if largest_force > 0 else 0.0
-    solved = step.residual + _INHERITED * unit if remembers else max(step.residual, _LEAST * unit)
+    is_viscoelastic, unit = step.scene.is_viscoelastic, step.scene.tolerance if largest_force > 0 else 0.0
+    solved = step.residual + _INHERITED * unit if is_viscoelastic else max(step.residual, _LEAST * unit)
     force = approach = 0.0
     if step.control == "approach" or not step.given:
         force = unknown.force + solved * shown.force + series_error * largest_force
     if step.control == "load" or not step.given:
         approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
-        approach += _INHERITED_APPROACH * unit * largest_approach if remembers else 0.0
+        approach += _INHERITED_APPROACH * unit * largest_approach if is_viscoelastic else 0.0
     pressure = solved
     if largest_force > 0:
         pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error

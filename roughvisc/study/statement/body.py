@@ -16,7 +16,9 @@ from roughvisc.mechanics.materials.protocol import complete
 BASE: Base = "bonded"
 
 
-def body(material: Material, thickness: float | None, base: Base | None = None, kernel: Kernel = HALF_SPACE) -> Kernel:
+def make_body(
+    material: Material, thickness: float | None, base: Base | None = None, kernel: Kernel = HALF_SPACE
+) -> Kernel:
     """Kernel of a body of a material.
 
     Parameters
@@ -42,7 +44,7 @@ def body(material: Material, thickness: float | None, base: Base | None = None, 
         return kernel
     if kernel != HALF_SPACE:
         raise InputError(f"thickness is {thickness!r} beside the kernel {kernel!r}: expected one of them")
-    amiss = not_one_body(material)
+    amiss = separability_error(material)
     if amiss:
         raise InputError(
             f"thickness is {thickness!r}, and the material is {amiss}: expected one body, Poisson's ratio constant"
@@ -52,7 +54,7 @@ def body(material: Material, thickness: float | None, base: Base | None = None, 
     return HALF_SPACE if endless else sheet
 
 
-def not_one_body(material: Any) -> str:
+def separability_error(material: Any) -> str:
     """What a material stands for that is no one body of a constant Poisson ratio; empty if it is one."""
     while material is not None:
         amiss: str = getattr(material, "stands_for", "")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from roughvisc.mechanics.halfspace.kernel import Kernel
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
-    from roughvisc.study.statement.curve import Curve
+    from roughvisc.study.statement.curve import SteadySliding
     from roughvisc.study.statement.settings import Settings
 
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
@@ -133,7 +133,7 @@ class Case:
         except InputError as error:
             raise InputError(f"{self.origin}: {error}" if self.origin else str(error)) from error
 
-    def experiment(self) -> Program | Curve:
+    def experiment(self) -> Program | SteadySliding:
         """What is done with the surface: the program that presses it, or the curve of speeds at which it slides."""
         return self.settings.experiment()
 
@@ -146,14 +146,14 @@ class Case:
         return replace(self.settings.solving(), kernel=self.kernel())
 
     def _repr_html_(self) -> str:
-        stated = _stated(self.settings)
+        stated = _dump(self.settings)
         surface = stated["surface"]
         rows = [
-            ("key", _told(lambda: self.key)),
+            ("key", _text_or_error(lambda: self.key)),
             ("study", self.origin.name if self.origin else ""),
             *((name, self.written.get(name) or str(value)) for name, value in self.varied.items()),
             ("surface", Path(surface["file"]).name if "file" in surface else str(surface.get("generate", ""))),
-            ("material", _told(lambda: repr(self.material()))),
+            ("material", _text_or_error(lambda: repr(self.material()))),
             _experiment(self.settings),
             *((name, str(value)) for name, value in stated.get("solve", {}).items()),
         ]
@@ -165,7 +165,7 @@ class Case:
 
     def to_json(self) -> str:
         """The case as JSON, whole: :meth:`from_json` gives it back, with the same key."""
-        stated = _stated(self.settings)
+        stated = _dump(self.settings)
         if self.varied:
             stated["varied"] = dict(self.varied)
         if self.written:
@@ -295,7 +295,7 @@ def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | 
         except InputError as error:
             raise Problems([f"{key}: {error}"]) from error
     settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
-    stated = _stated(settings)
+    stated = _dump(settings)
     varied = {key: _at(stated, key, value) for key, value in changes.items()}
     written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}
     return Case(settings, origin, varied, written)
@@ -309,7 +309,7 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
         raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
 
 
-def _told(what: Callable[[], str]) -> str:
+def _text_or_error(what: Callable[[], str]) -> str:
     """A text, or why it cannot be had: a table that shows a case refuses none."""
     try:
         return what()
@@ -318,11 +318,11 @@ def _told(what: Callable[[], str]) -> str:
 
 
 def _experiment(settings: Study) -> tuple[str, str]:
-    kind, _, words = _told(lambda: repr(settings.experiment())).partition(": ")
-    return {"Curve": "friction"}.get(kind, "program"), words or kind
+    kind, _, words = _text_or_error(lambda: repr(settings.experiment())).partition(": ")
+    return {"Steady sliding": "friction"}.get(kind, "program"), words or kind
 
 
-def _stated(settings: Study) -> dict[str, Any]:
+def _dump(settings: Study) -> dict[str, Any]:
     return settings.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
 
 

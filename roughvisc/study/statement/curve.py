@@ -17,7 +17,7 @@ DIRECTIONS: tuple[str, ...] = get_args(Direction)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class SteadySliding:
     """What is asked of steady sliding, beside a surface, a material and settings; see :func:`roughvisc.friction`.
 
     Parameters
@@ -32,8 +32,8 @@ class Curve:
 
     Examples
     --------
-    >>> Curve(speeds=[1e-3, 1.0], load=2.0)
-    Curve: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
+    >>> SteadySliding(speeds=[1e-3, 1.0], load=2.0)
+    Steady sliding: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
     """
 
     speeds: Sequence[float] | float
@@ -57,7 +57,7 @@ class Curve:
         count = f"{len(self.asked)} speeds from " if len(self.asked) > 1 else ""
         pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
         under = unit_for([pressed[0] or 0.0], pressed[1]).text(pressed[0] or 0.0)
-        return f"Curve: {count}{' to '.join(ends)} along {self.direction}, under {under}"
+        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
 
     @property
     def asked(self) -> tuple[float, ...]:

@@ -120,13 +120,13 @@ class Settings:
     ------
     InputError
         If a value is none of those expected. What depends on the program or on the surface is refused where these
-        meet, in :func:`roughvisc.study.simulation.scene.prepare`.
+        meet, in :func:`roughvisc.study.simulation.scene.build_scene`.
 
     Examples
     --------
     >>> Settings(tolerance=1e-2, times=[1.0, 0.5]).times
     (0.5, 1.0)
-    >>> Settings().told()
+    >>> Settings().to_attributes()
     {'boundary': 'free', 'tolerance': 0.001, 'method': 'fast'}
     """
 
@@ -203,7 +203,7 @@ class Settings:
         for name, entry in ENTRIES.items():
             object.__setattr__(self, name, _checked(name, entry, getattr(self, name)))
 
-    def told(self) -> dict[str, Any]:
+    def to_attributes(self) -> dict[str, Any]:
         """Those that stand in the attributes of a result."""
         values = {name: getattr(self, name) for name, entry in ENTRIES.items() if entry.in_attributes}
         return {name: value for name, value in values.items() if value is not None}

@@ -21,14 +21,14 @@ from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.energy import Energy
-from roughvisc.mechanics.stepping.pace import Pace
+from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.scene import Instant, State, Step, Trajectory
 from roughvisc.mechanics.stepping.slide import Slid
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import atomic_write
 from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
@@ -37,12 +37,24 @@ log = logging.getLogger("roughvisc")
 _SHARE = 0.05
 #: Between two libraries in the account of what a run was computed with.
 _THEN = "; then "
-_KINDS = (State, Trajectory, Pace, Slid, Instant, Sparse, Uncertainty, Energy, ModesState, HistoryState, Block)
+_KINDS = (
+    State,
+    Trajectory,
+    ControllerState,
+    Slid,
+    Instant,
+    Sparse,
+    Uncertainty,
+    Energy,
+    ModesState,
+    HistoryState,
+    Block,
+)
 _TYPES = {kind.__name__: kind for kind in _KINDS}
 
 
 @dataclass(frozen=True)
-class Reached:
+class Checkpoint:
     """How far a run has come.
 
     Attributes
@@ -76,47 +88,47 @@ class Reached:
         """Where it goes on, as the log says it."""
         return f"t = {self.time:.6g} s" if isinstance(self.state, State) else f"speed {self.rows + 1}"
 
-    def after(self, step: Step, growths: int, wall_time: float) -> Reached:
+    def after(self, step: Step, growths: int, wall_time: float) -> Checkpoint:
         """How far it has come with another step, what is bad of it folded in."""
         converged = self.converged and step.converged
         return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
 
-    def at_speed(self, wall_time: float) -> Reached:
+    def at_speed(self, wall_time: float) -> Checkpoint:
         """How far it has come with another speed of a curve of friction, which depends on no other speed."""
         return replace(self, state=(), rows=self.rows + 1, wall_time=wall_time)
 
-    def going_on_here(self) -> Reached:
+    def with_current_transforms(self) -> Checkpoint:
         """The same, to be gone on from with the transforms that are here."""
         before = self.transforms.split(_THEN)
         return replace(self, transforms=_THEN.join(dict.fromkeys([*before, transform_library()])))
 
-    def kept(self) -> Reached:
+    def kept(self) -> Checkpoint:
         """How far it has come when the step is kept as a row."""
         return replace(self, converged=True, rows=self.rows + 1)
 
-    def noted(self) -> Reached:
+    def noted(self) -> Checkpoint:
         """How far it has come when the step leaves a row without fields."""
         return replace(self, rows=self.rows + 1)
 
 
-def save_checkpoint(path: Path, reached: Reached, key: str) -> None:
+def save_checkpoint(path: Path, reached: Checkpoint, key: str) -> None:
     """Write how far the case of that key has come, whole or not at all."""
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
     stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
     plain = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT, "reached": stated}
-    with whole_file(path) as temporary, open(temporary, "wb", buffering=0) as stream:
+    with atomic_write(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
 
-def load_checkpoint(path: Path, key: str) -> Reached | None:
+def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
     """How far the case of that key has come; None if the file is absent, damaged, or of something else."""
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
         found = plain["key"], plain["revision"], plain.get("result_format", 1)
         if found == (key, NUMERICS_REVISION, RESULT_FORMAT):
-            reached = Reached(**{name: _together(value, arrays) for name, value in plain["reached"].items()})
+            reached = Checkpoint(**{name: _together(value, arrays) for name, value in plain["reached"].items()})
     except FileNotFoundError:
         return None
     except (Damaged, OSError, KeyError, TypeError, ValueError) as error:
@@ -169,7 +181,7 @@ def _together(value: Any, arrays: dict[str, Any]) -> Any:
     return _TYPES[value["type"]](**{name: _together(part, arrays) for name, part in value["parts"].items()})
 
 
-class Keeper:
+class CheckpointWriter:
     """Keeps what a run has computed: rows in one file, how far it has come in two others, all in one folder.
 
     Parameters
@@ -212,7 +224,7 @@ class Keeper:
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows", check)
         #: How far the run has come: no state of an earlier step is held.
-        self.latest = Reached()
+        self.latest = Checkpoint()
         self._folder = folder
         self._key = key
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
@@ -225,7 +237,7 @@ class Keeper:
             leftover.unlink()
         found = [(reached, path) for path in self._paths if (reached := load_checkpoint(path, self._key)) is not None]
         for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
-            here = reached.going_on_here()
+            here = reached.with_current_transforms()
             if here != reached and self._same_bits:
                 log.warning(
                     "%s: was computed with %s: not used, this is %s", path, reached.transforms, transform_library()
@@ -242,7 +254,7 @@ class Keeper:
             path.unlink(missing_ok=True)
         self.rows.keep_first(0)
 
-    def passed(self, reached: Reached) -> None:
+    def passed(self, reached: Checkpoint) -> None:
         """Take note of an accepted step; write a checkpoint if it is time to.
 
         Raises

@@ -13,7 +13,7 @@ from typing import Any
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
-from roughvisc.study.storage.store import whole_file
+from roughvisc.study.storage.store import atomic_write
 
 log = logging.getLogger("roughvisc")
 
@@ -46,7 +46,7 @@ def record_failure(folder: Path, case: Case, message: str, error: str, trace: st
     }
     path = record_path(folder, case.key)
     try:
-        with whole_file(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_text(json.dumps(record, indent=1))
     except (OSError, InputError) as problem:
         log.warning("%s cannot be written: %s", path, problem)

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
-from roughvisc.study.storage.seal import seal, unsealed
-from roughvisc.study.storage.store import NETCDF, result_files, result_path, whole_file
-from roughvisc.study.storage.trust import UNSEALED, require_whole, warn_once
+from roughvisc.study.storage.seal import append_checksum, unsealed
+from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
+from roughvisc.study.storage.trust import UNSEALED, verify_checksum, warn_once
 from roughvisc.variables import RESULT_FORMAT, of_step
 from roughvisc.variables.rows import VOCABULARIES, Rows, rows_of
 
@@ -136,7 +136,7 @@ def read_entry(path: Path) -> Entry:
 
     try:
         stamp = _stamp(path)
-        sealed = require_whole(path)
+        sealed = verify_checksum(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}
@@ -259,12 +259,12 @@ def save_index(folder: Path, index: Index) -> None:
         if columns:
             arrays[name] = np.concatenate(columns)
     text = json.dumps({"layout": _LAYOUT, "entries": head})
-    with suppress(OSError, InputError), whole_file(folder / INDEX) as temporary:
+    with suppress(OSError, InputError), atomic_write(folder / INDEX) as temporary:
         np.savez(temporary, head=np.frombuffer(text.encode(), np.uint8), **arrays)
-        seal(temporary)
+        append_checksum(temporary)
     if index.sweep is not None and index.sweep != _latest(folder):
         keys = list(index.sweep)
-        with suppress(OSError, InputError), whole_file(folder / LATEST) as temporary:
+        with suppress(OSError, InputError), atomic_write(folder / LATEST) as temporary:
             temporary.write_text(json.dumps({"keys": keys, "checksum": _checksum(keys)}))
 
 

@@ -1,7 +1,7 @@
 """Links in a results folder: none is followed where a run writes, since what a link leads to is somebody else's.
 
 The folder itself may be a link. Results may be links, too: they are read, and a link whose name is written to gives way
-to the file, by a rename (:func:`roughvisc.study.storage.store.whole_file`), which touches nothing else.
+to the file, by a rename (:func:`roughvisc.study.storage.store.atomic_write`), which touches nothing else.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from xarray.core import indexing
 
 from roughvisc.errors import InputError
 from roughvisc.groups import carrying
-from roughvisc.study.storage.trust import require_whole
+from roughvisc.study.storage.trust import verify_checksum
 
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
@@ -30,7 +30,7 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
     InputError
         If the file is damaged, gone, or holds no such variable.
     """
-    require_whole(Path(path))
+    verify_checksum(Path(path))
     try:
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)

@@ -24,7 +24,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 _END_STATED = {0: 40, 1: 44, 2: 28, 3: 28}
 
 
-def seal(path: Path) -> None:
+def append_checksum(path: Path) -> None:
     """Put a seal behind the content of a file that is written."""
     with open(path, "rb+") as stream:
         length = os.fstat(stream.fileno()).st_size
@@ -41,7 +41,7 @@ def unsealed(path: Path) -> bytes | None:
     return content if sealed == (len(content), zlib.crc32(content)) else None
 
 
-def flaw(path: Path, *, again: bool = False) -> str:
+def checksum_error(path: Path, *, again: bool = False) -> str:
     """What is wrong with the bytes of a file of HDF5; empty if nothing, or if the file has no seal.
 
     Files of earlier versions have none, and one that another program has changed has lost it.

@@ -26,8 +26,8 @@ from roughvisc.labels import annotate, format_of
 from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
 from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
-from roughvisc.study.storage.seal import seal
-from roughvisc.study.storage.trust import is_news, require_whole
+from roughvisc.study.storage.seal import append_checksum
+from roughvisc.study.storage.trust import is_news, verify_checksum
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
@@ -76,7 +76,7 @@ def _nearest(folder: Path) -> Path:
     return next(place for place in (folder, *folder.absolute().parents) if place.exists())
 
 
-def torn_files(path: Path) -> list[Path]:
+def partial_files(path: Path) -> list[Path]:
     """What writes of a result that did not end have left beside it."""
     return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
 
@@ -87,7 +87,7 @@ def no_results(folder: Path) -> InputError:
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def atomic_write(path: str | Path) -> Iterator[Path]:
     """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.
 
     Parameters
@@ -172,14 +172,14 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     """
     parts = split(annotate(to_current(whole_of(dataset))))
     parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         try:
             with _new_file(temporary) as file:
                 # all are declared before any is written: each change of mode would write the file's metadata anew
                 declared = [pair for group, part in parts.items() for pair in _declared(file, group, part, precision)]
                 for written, variable in declared:
                     _write(written, variable)
-            seal(temporary)
+            append_checksum(temporary)
         except (
             RuntimeError,
             PermissionError,
@@ -288,7 +288,7 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     return plain
 
 
-def set_aside(path: Path, problem: str) -> None:
+def quarantine(path: Path, problem: str) -> None:
     """Give what is no whole result another name, by which nobody takes it for one, and say why."""
     aside = path.with_name(f"{path.name}.damaged")
     news = is_news(path, problem)
@@ -342,7 +342,7 @@ def _stored(path: str | Path) -> xr.Dataset:
         raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
     if path.is_dir():
         raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
-    require_whole(path)
+    verify_checksum(path)
     try:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError) as error:

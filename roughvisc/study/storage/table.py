@@ -15,7 +15,7 @@ from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.parameters import parameters_of
-from roughvisc.study.storage.store import no_results, whole_file
+from roughvisc.study.storage.store import atomic_write, no_results
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.rows import VOCABULARIES, Rows
@@ -84,7 +84,7 @@ def write_table(
         Key -> message, of the cases that another run was at work on.
     """
     try:
-        with whole_file(folder / CASES) as temporary:
+        with atomic_write(folder / CASES) as temporary:
             # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
             settings = {"encoding": "utf-8-sig", "float_format": "%.7g", "lineterminator": "\r\n"}
             _table(folder, index, cases, held or {}).to_csv(temporary, **settings)
@@ -108,7 +108,7 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
         headings = {name: heading(name, one.units) for name, one in VOCABULARIES[rows].items()}
         for name in _TOLD[rows]:
             column = columns.setdefault(headings[name], [np.nan] * len(keys))
-            column[:] = _filled(column, mine, name, _telling)
+            column[:] = _filled(column, mine, name, _summary_row)
         for name in _LARGEST[rows]:
             column = columns.setdefault(f"largest {headings[name]}", [np.nan] * len(keys))
             column[:] = _filled(column, mine, name, _largest)
@@ -159,7 +159,7 @@ def _filled(
     ]
 
 
-def _telling(entry: Entry, name: str) -> float:
+def _summary_row(entry: Entry, name: str) -> float:
     """The value at the end; of a curve of friction where that is largest."""
     row = -1 if entry.along == "time" else int(np.argmax(entry.histories["friction_coefficient"]))
     return float(entry.histories[name][row])

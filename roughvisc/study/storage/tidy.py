@@ -11,7 +11,7 @@ from pathlib import Path
 from roughvisc.errors import InputError, InUseError
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.lock import held, lock_path
-from roughvisc.study.storage.seal import flaw
+from roughvisc.study.storage.seal import checksum_error
 from roughvisc.study.storage.store import result_path
 from roughvisc.study.storage.versions import checkpoints, counted_versions, is_later
 from roughvisc.study.storage.versions import outdated as former_results
@@ -22,7 +22,7 @@ _PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
 _ABANDONED = 3600.0
 
 
-def tidy(
+def clean_folder(
     folder: str | Path, *, everything: bool = False, outdated: bool = False, superseded: bool = False
 ) -> list[Path]:
     """Remove what is of no use to anybody: torn files, locks of dead runs, checkpoints of finished cases.
@@ -114,7 +114,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdat
     if lock.is_symlink():  # nobody's lock
         return [path for path in [lock] if _removed(path)]
     former = [path for path in checkpoints(folder) if not is_later(path)] if outdated else []
-    finished = everything or (result.exists() and not flaw(result))
+    finished = everything or (result.exists() and not checksum_error(result))
     needed = [
         path
         for path in paths

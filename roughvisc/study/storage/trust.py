@@ -6,7 +6,7 @@ import logging
 from pathlib import Path
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.seal import flaw, is_sealed
+from roughvisc.study.storage.seal import checksum_error, is_sealed
 
 log = logging.getLogger("roughvisc")
 
@@ -19,7 +19,7 @@ UNSEALED = (
 _warned: set[tuple[Path, tuple[int, ...], str]] = set()
 
 
-def require_whole(path: Path) -> bool:
+def verify_checksum(path: Path) -> bool:
     """Refuse a result whose bytes are not those that were written; warn of one that nothing can be said of.
 
     Every read asks this, since a file may be damaged after it was opened. Once a process has looked at a file, and as
@@ -31,7 +31,7 @@ def require_whole(path: Path) -> bool:
         Whether the result has a checksum, which it then matches.
     """
     try:
-        found, sealed = flaw(path), is_sealed(path)
+        found, sealed = checksum_error(path), is_sealed(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a result") from error
     if found:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.seal import flaw, is_sealed
+from roughvisc.study.storage.seal import checksum_error, is_sealed
 from roughvisc.study.storage.store import NETCDF, no_results, result_files
 
 
@@ -59,7 +59,7 @@ def verify(place: str | Path) -> list[Verdict]:
 
 def _verdict(path: Path) -> Verdict:
     try:
-        found = flaw(path, again=True)
+        found = checksum_error(path, again=True)
         return Verdict(path, found or _unreadable(path), is_sealed(path))
     except OSError as error:
         return Verdict(path, f"it cannot be read: {error.strerror or error}", False)

@@ -15,8 +15,8 @@ from tomlkit.items import Float, Table, Trivia
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.settings import Settings
-from roughvisc.study.storage.store import whole_file
-from roughvisc.study.trade.ladder import short
+from roughvisc.study.storage.store import atomic_write
+from roughvisc.study.trade.ladder import format_tolerance
 
 #: What keys are that a study does not state, where they are to be as if it did not.
 _USUAL = {"time_step": Settings.time_step, "method": Settings.method, "memory": Settings.memory}
@@ -56,7 +56,7 @@ def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:
         if value
     ]
     if done:
-        with whole_file(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
             try:
                 read_cases(temporary)
@@ -92,7 +92,11 @@ def _set(document: Any, name: str, key: str, value: Any) -> str:
 
 def _item(value: Any) -> Any:
     if isinstance(value, float):
-        return Float(value, Trivia(), short(value) if value < 0.1 and float(short(value)) == value else f"{value:.12g}")
+        return Float(
+            value,
+            Trivia(),
+            format_tolerance(value) if value < 0.1 and float(format_tolerance(value)) == value else f"{value:.12g}",
+        )
     return tomlkit.item(value)
 
 

@@ -12,10 +12,10 @@ import xarray as xr
 
 from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.study.cost.estimate import March, Stopwatch, bytes_needed, march_of, solved_on, work
+from roughvisc.study.cost.estimate import ConvolutionTimer, CostEstimate, bytes_needed, march_of, solved_on, work
 from roughvisc.study.cost.stages import stages_of
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.simulation.scene import Ground, follows, memory_wanted
+from roughvisc.study.simulation.scene import Ground, memory_options, uses_window
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
@@ -66,7 +66,7 @@ class Run:
     disk_size: float
 
 
-class Bench:
+class TimedRuns:
     """Runs one case under settings, and tells how long they will take.
 
     Parameters
@@ -90,8 +90,8 @@ class Bench:
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         settings = replace(case.solving(), method="fast", missing="absent")
-        self._convolution = Stopwatch().seconds(height, settings.boundary, settings.kernel)
-        ground = Ground(height, settings.missing, follow=follows(settings), mirror=True, kernel=settings.kernel)
+        self._convolution = ConvolutionTimer().seconds(height, settings.boundary, settings.kernel)
+        ground = Ground(height, settings.missing, follow=uses_window(settings), mirror=True, kernel=settings.kernel)
         self._part = solved_on(stages_of(ground, grows=False), self._found).part  # of the cells
         self._calibration = 1.0
 
@@ -166,8 +166,8 @@ class Bench:
         """As a plan counts it, with the steps that were taken. [byte]"""
         settings, cells = case.solving(), dataset.sizes["x"] * dataset.sizes["y"]
         contact, rows = float(dataset["contact_area_counted"].max()) / nominal_area(dataset), dataset.sizes["time"]
-        choice = choose_memory(case.material(), **memory_wanted(case.program(), settings))
-        found = March(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
+        choice = choose_memory(case.material(), **memory_options(case.program(), settings))
+        found = CostEstimate(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
         increments = 8.0 * cells * steps if settings.method == "seed" else 0.0
         part = 1.0 if settings.method == "seed" else self._part
         return bytes_needed(settings, cells, found, choice, part) + increments

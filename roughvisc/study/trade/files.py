@@ -12,7 +12,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.formats import to_current
-from roughvisc.study.storage.store import plain_attributes, whole_file
+from roughvisc.study.storage.store import atomic_write, plain_attributes
 from roughvisc.units import quantity
 
 
@@ -35,7 +35,7 @@ def write_trade(dataset: xr.Dataset, path: str | Path) -> Path:
     kept = dataset.copy()
     kept.attrs = plain_attributes(dataset.attrs)
     numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
     return Path(path)
 

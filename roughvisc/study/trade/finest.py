@@ -11,7 +11,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.simulation.coarser import pressure_distance
 from roughvisc.study.simulation.grid_convergence import TWO_GRIDS, grid_uncertainty
-from roughvisc.study.trade.bench import Bench, NotRun, Run
+from roughvisc.study.trade.bench import NotRun, Run, TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, relative
 from roughvisc.study.trade.ladder import Setting
 
@@ -19,12 +19,12 @@ from roughvisc.study.trade.ladder import Setting
 _SHARPER = 5.0
 
 
-class Finest:
+class ReferenceRun:
     """The finest run of a case, on the finest grid that half of the time allows, and how far it may be off.
 
     Parameters
     ----------
-    bench : Bench
+    bench : TimedRuns
         Where it is run.
     rungs : sequence of Setting
         What is to be measured against it.
@@ -44,7 +44,7 @@ class Finest:
         If it would take longer than half of the time there is, or fails.
     """
 
-    def __init__(self, bench: Bench, rungs: Sequence[Setting], data: bool) -> None:
+    def __init__(self, bench: TimedRuns, rungs: Sequence[Setting], data: bool) -> None:
         fast = [setting for setting in rungs if setting.method == "fast"] or list(rungs)
         self.sharpest = min(setting.tolerance for setting in fast)
         measured = {setting.coarsening for setting in rungs}

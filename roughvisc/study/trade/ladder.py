@@ -80,13 +80,13 @@ class Setting:
         if self.time_step is not None:
             words.append(f"time_step = {step_text(self.time_step)}")
         else:
-            words.append(f"tolerance = {short(self.tolerance)}")
+            words.append(f"tolerance = {format_tolerance(self.tolerance)}")
         if self.coarsening != 1:
             words.append(f"{shape[0]} x {shape[1]} cells")
         if self.memory == "direct":
             words.append("memory = direct")
         if self.precision is not None:
-            words.append(f"precision = {short(self.precision)}")
+            words.append(f"precision = {format_tolerance(self.precision)}")
         return ", ".join(words)
 
 
@@ -104,13 +104,13 @@ def step_text(step: float) -> str:
     return f"{step:.6g} s"
 
 
-def short(value: float) -> str:
+def format_tolerance(value: float) -> str:
     """A tolerance as one writes it.
 
     Examples
     --------
-    >>> short(0.03), short(1e-3), short(2.0**-24), short(0.25)
-    ('3e-2', '1e-3', '6e-8', '2.5e-1')
+    >>> [format_tolerance(one) for one in (0.03, 1e-3, 2.0**-24, 0.25)]
+    ['3e-2', '1e-3', '6e-8', '2.5e-1']
     """
     digits, power = f"{value:.1e}".split("e")
     return f"{digits.removesuffix('.0')}e{int(power)}"

@@ -24,7 +24,7 @@ WORDS = {
 }
 
 
-def front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
+def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
     """The Pareto front: settings that no other one beats in wall time without being beaten in accuracy.
 
     Errors count to two digits: what differs by less is no gain.

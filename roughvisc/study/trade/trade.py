@@ -18,9 +18,9 @@ from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.study.progress import reporting
 from roughvisc.study.simulation.kept_times import kept_times
 from roughvisc.study.statement.case import Case, read_study, vary
-from roughvisc.study.trade.bench import Bench, NotRun, Report
+from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
-from roughvisc.study.trade.finest import Finest
+from roughvisc.study.trade.finest import ReferenceRun
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
 from roughvisc.variables import RESULT_FORMAT
@@ -95,9 +95,9 @@ def trade(
     times = np.array(kept_times(program, case.solving().times))
     exact = closed_form(case, times) if reference == "auto" else None
     with tempfile.TemporaryDirectory() as folder, reporting(progress) as report:
-        bench = Bench(case, height, Path(folder), budget, report)
+        bench = TimedRuns(case, height, Path(folder), budget, report)
         known = exact.quantities if exact else ()
-        finest = None if set(QUANTITIES) <= set(known) else Finest(bench, rungs, is_data(case))
+        finest = None if set(QUANTITIES) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
         rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
     order = [rungs.index(row["rung"]) for row in rows]
     rows = [rows[i] for i in np.argsort(order, kind="stable")]
@@ -114,7 +114,7 @@ def _comparable(case: Case) -> Case:
     return vary(case, changes)
 
 
-def _row(bench: Bench, setting: Setting, exact: ClosedForm | None, finest: Finest | None) -> dict[str, Any]:
+def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: ReferenceRun | None) -> dict[str, Any]:
     """What a setting cost and how wrong it was, or why that is not known."""
     shape = shape_of(bench.case, bench.shape, setting.coarsening)
     missing = dict.fromkeys(QUANTITIES, math.nan)
@@ -161,7 +161,7 @@ _COORDS = ("setting", "family", "method", "memory", "tolerance", "time_step", "c
 
 
 def _labelled(
-    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: Finest | None
+    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: ReferenceRun | None
 ) -> xr.Dataset:
     names = [name for name in rows[0] if name != "rung"]
     columns: dict[str, Any] = {}

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.errors import printable
-from roughvisc.study.trade.recommend import duration, front
+from roughvisc.study.trade.recommend import duration, pareto_front
 from roughvisc.views.console.tables import size
 
 #: Errors that are shown, and their headings.
@@ -29,7 +29,7 @@ def trade_table(dataset: xr.Dataset) -> Group:
     table.add_column("setting", min_width=18)
     for heading in ("time", "transf.", "memory", *_ERRORS.values()):
         table.add_column(heading, justify="right", no_wrap=True)
-    best = front(dataset, "contact_area")
+    best = pareto_front(dataset, "contact_area")
     for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
         if not np.isfinite(row["run_time"]):

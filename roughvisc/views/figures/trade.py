@@ -14,8 +14,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
-from roughvisc.study.trade.ladder import short, step_text
-from roughvisc.study.trade.recommend import WORDS, front, uncertainty
+from roughvisc.study.trade.ladder import format_tolerance, step_text
+from roughvisc.study.trade.recommend import WORDS, pareto_front, uncertainty
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.views.figures.axes import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, letter_panels, new_figure, styled
 
@@ -109,7 +109,7 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     bottom = floor / (3 if nothing else 1.8)
     height = np.maximum(wrong, floor)
     measured = wrong > np.nan_to_num(unsure)  # what the reference can tell from zero
-    best = np.flatnonzero(front(dataset, quantity) & measured)
+    best = np.flatnonzero(pareto_front(dataset, quantity) & measured)
     best = best[np.argsort(spent[best], kind="stable")]
     ax.plot(spent[best], height[best], color="0.35", lw=1.0, zorder=1, label="Pareto front")
     families = dataset["family"].values
@@ -142,7 +142,7 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
 def _brief(row: xr.Dataset) -> str:
     """What tells a setting from the others of its family."""
     step = float(row["time_step"])
-    text = step_text(step) if np.isfinite(step) else short(float(row["tolerance"]))
+    text = step_text(step) if np.isfinite(step) else format_tolerance(float(row["tolerance"]))
     if float(row["coarsening"]) != 1:
         text += f", {int(row['cells_x'])}×{int(row['cells_y'])}"
     return text

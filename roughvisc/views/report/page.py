@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.store import no_results, result_files, whole_file, whole_result
-from roughvisc.study.storage.trust import require_whole
+from roughvisc.study.storage.store import atomic_write, no_results, result_files, whole_result
+from roughvisc.study.storage.trust import verify_checksum
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables.rows import rows_of
@@ -89,7 +89,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         source = Path(results)
         sources: list[Any] = _files(source)
         for one in sources:
-            require_whole(one)  # before anything is drawn, and before the folder's index warns of it
+            verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
         failures = _failures(source) if source.is_dir() else []
         swept = _swept(source) if len(sources) > 1 else []
         out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)
@@ -101,7 +101,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
     page = _page(sources, failures, swept)
-    with whole_file(out) as temporary:
+    with atomic_write(out) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return out
 

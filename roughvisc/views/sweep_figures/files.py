@@ -16,7 +16,7 @@ from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import whole_file, whole_result
+from roughvisc.study.storage.store import atomic_write, whole_result
 from roughvisc.variables.rows import rows_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import verbatim
@@ -158,7 +158,7 @@ def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = ""
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
     box = _with_title(figure, title) if title else None
-    with whole_file(path) as temporary:
+    with atomic_write(path) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi, bbox_inches=box)
     return path
 

@@ -69,7 +69,7 @@ def test_first_guess__is_made_admissible(known, told):
     if told:
         guess = np.abs(guess) * CORNER
     displacement = case.halfspace.displacement(guess) if told else None
-    pressure, displaced = case.problem.feasible(guess.copy(), displacement)
+    pressure, displaced = case.problem.initial_iterate(guess.copy(), displacement)
     expected = np.maximum(guess, 0) * CORNER
     expected *= 3.0 / expected.sum() if "load" in known else 1.0
     assert pressure * case.problem.unit == pytest.approx(expected)
@@ -82,10 +82,10 @@ def test_first_guess__is_made_admissible(known, told):
 def test_first_guess__without_one_presses_what_lies_below_the_approach():
     under = Case(approach=2.0)
     for nothing in (None, np.zeros(SHAPE)):
-        pressure, displaced = under.problem.feasible(nothing, None)
+        pressure, displaced = under.problem.initial_iterate(nothing, None)
         assert displaced is None
         assert pressure * under.problem.length == pytest.approx(np.maximum(2.0 - under.gap, 0))
-        loaded = Case(load=3.0, present=CORNER).problem.feasible(nothing, None)[0]
+        loaded = Case(load=3.0, present=CORNER).problem.initial_iterate(nothing, None)[0]
         assert loaded == pytest.approx(CORNER / CORNER.sum())
 
 

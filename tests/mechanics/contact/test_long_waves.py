@@ -166,7 +166,7 @@ def test_both_levels__leave_no_work_behind_where_one_fails(on_small_grids, monke
     influence.threads = 2
     ended = threading.Event()
 
-    def answered(self, sums):
+    def precondition(self, sums):
         time.sleep(0.05)  # longer than the failure takes
         ended.set()
         return np.zeros_like(sums)
@@ -174,7 +174,7 @@ def test_both_levels__leave_no_work_behind_where_one_fails(on_small_grids, monke
     def fails(residual):
         raise MemoryError("of the cells")
 
-    monkeypatch.setattr(LongWaves, "_answered", answered)
+    monkeypatch.setattr(LongWaves, "_answered", precondition)
     with pytest.raises(MemoryError, match="of the cells"):
         waves.preconditioned(np.ones(spots().size), fails)
     assert ended.is_set()

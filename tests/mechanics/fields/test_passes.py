@@ -36,16 +36,16 @@ def test_passes__do_what_numpy_does_at_once(threads):
     flat = a.reshape(-1)
     found = passes.cells_where(lambda part: flat[part] > 0.5, a.size, threads)
     assert np.array_equal(found, np.flatnonzero(a > 0.5))
-    assert np.array_equal(passes.taken(a, found, threads), flat[found])
+    assert np.array_equal(passes.gather(a, found, threads), flat[found])
     values = rng.standard_normal(found.size)
     expected = np.zeros(a.size)
     expected[found] = values
-    passes.spread(out, found, values, threads)
+    passes.scatter_into_zeros(out, found, values, threads)
     assert np.array_equal(out.reshape(-1), expected)
     expected += 1
     out += 1
     expected[found] = values
-    passes.put(out, found, values, threads)
+    passes.scatter(out, found, values, threads)
     assert np.array_equal(out.reshape(-1), expected)
 
 
@@ -59,14 +59,14 @@ def test_values_of_some_cells__are_carried_over_to_others(threads, size, monkeyp
     values = rng.standard_normal(cells.size)
     field = np.zeros(99)
     field[cells] = values
-    found = passes.carried_over(values, cells, onto, field.size, threads)
+    found = passes.regather(values, cells, onto, field.size, threads)
     assert np.array_equal(found, field[onto])
     assert 0 < np.count_nonzero(found) < onto.size
-    assert passes.carried_over(values[:0], cells[:0], onto, field.size, threads).sum() == 0
+    assert passes.regather(values[:0], cells[:0], onto, field.size, threads).sum() == 0
     moved = np.append(cells[:-1], 98)  # the same but in the last part
     assert cells[-1] < 98
     field[cells[-1]] = 0
-    assert np.array_equal(passes.carried_over(values[:-1], cells[:-1], moved, field.size, threads), field[moved])
+    assert np.array_equal(passes.regather(values[:-1], cells[:-1], moved, field.size, threads), field[moved])
 
 
 @THREADS
@@ -95,7 +95,7 @@ def test_sums__are_those_of_the_parts_in_their_order_on_any_threads():
     for threads in (1, 2, 3):
         assert passes.total(a, threads) == sum(a[part].sum() for part in parts)
         assert passes.magnitude(a, threads) == sum(np.abs(a[part]).sum() for part in parts)
-        assert passes.apart(a, b, threads) == sum(np.abs(a[part] - b[part]).sum() for part in parts)
+        assert passes.l1_distance(a, b, threads) == sum(np.abs(a[part] - b[part]).sum() for part in parts)
         assert passes.largest(a - 1, threads) == np.abs(a - 1).max() > (a - 1).max()
         assert passes.largest(a[:0], threads) == passes.total(a[:0], threads) == 0
         cells = np.flatnonzero(a > 0)
@@ -119,23 +119,23 @@ def test_error_in_a_part__ends_all(threads, error):
         done.append(part)
 
     with pytest.raises(error, match="of the part"):
-        threads_module.side_by_side(work, range(1000), threads)
+        threads_module.parallel_map(work, range(1000), threads)
     assert len(done) < 1000 - 1
 
 
 @pytest.mark.parametrize("threads", [2, 3, 4])
 @pytest.mark.parametrize("count", [7, 12, 65])
 def test_parts_worked_on_at_a_time__do_not_lie_side_by_side(threads, count):
-    order = threads_module._far_apart(count, threads)
+    order = threads_module._interleaved(count, threads)
     assert sorted(order) == list(range(count))
     assert min(abs(a - b) for a, b in pairwise(order)) >= -(-count // threads) - 1
 
 
 def test_side_by_side__within_itself_ends():
     def inner(part):
-        return sum(threads_module.side_by_side(lambda number: number * part, range(4), 2))
+        return sum(threads_module.parallel_map(lambda number: number * part, range(4), 2))
 
-    assert threads_module.side_by_side(inner, range(20), 2) == [6 * part for part in range(20)]
+    assert threads_module.parallel_map(inner, range(20), 2) == [6 * part for part in range(20)]
 
 
 @pytest.mark.parametrize("size", [14, 26, 27, 39, 40, 131])
@@ -161,7 +161,7 @@ def test_any_positive__finds_one_cell_wherever_it_is(cell):
 def test_cells_of_a_part__are_found_without_a_copy_of_all(kind):
     cells = np.arange(0, 300_000, 3, dtype=kind)
     tracemalloc.start()
-    few = passes.lying_in(slice(100, 200), cells)
+    few = passes.slice_of_sorted(slice(100, 200), cells)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert cells[few].tolist() == list(range(102, 200, 3))
@@ -171,10 +171,10 @@ def test_cells_of_a_part__are_found_without_a_copy_of_all(kind):
 @THREADS
 def test_what_was_found_of_parts__is_joined_in_their_order(threads):
     parts = [np.arange(3, dtype=np.int32), np.empty(0, np.int32), np.array([9], np.int32)]
-    found = passes.joined(parts, threads)
+    found = passes.concatenate(parts, threads)
     assert found.dtype == np.int32
     assert found.tolist() == [0, 1, 2, 9]
-    assert passes.joined(parts[:1], threads) is parts[0]
+    assert passes.concatenate(parts[:1], threads) is parts[0]
 
 
 def test_work_beside__begins_at_once_on_another_thread():
@@ -184,20 +184,20 @@ def test_work_beside__begins_at_once_on_another_thread():
         begun.set()
         return threading.get_ident()
 
-    found = threads_module.beside(work, 2)
+    found = threads_module.submit(work, 2)
     assert begun.wait(30)
     assert found() != threading.get_ident()
     begun.clear()
-    found = threads_module.beside(work, 1)
+    found = threads_module.submit(work, 1)
     assert not begun.is_set()  # the only thread is the caller's
     assert found() == threading.get_ident()
 
 
 def test_work_beside__is_the_callers_where_no_other_thread_is_free():
     ended, busy = threading.Event(), threading.Event()
-    waiting = threads_module.beside(lambda: (busy.set(), ended.wait(30)), 2)
+    waiting = threads_module.submit(lambda: (busy.set(), ended.wait(30)), 2)
     assert busy.wait(30)
-    assert threads_module.beside(threading.get_ident, 2)() == threading.get_ident()
+    assert threads_module.submit(threading.get_ident, 2)() == threading.get_ident()
     ended.set()
     waiting()
 
@@ -207,7 +207,7 @@ def test_error_beside__comes_where_it_is_waited_for(threads):
     def work():
         raise KeyError("of the work")
 
-    found = threads_module.beside(work, threads)
+    found = threads_module.submit(work, threads)
     with pytest.raises(KeyError, match="of the work"):
         found()
 

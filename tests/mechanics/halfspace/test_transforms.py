@@ -9,7 +9,7 @@ from roughvisc.mechanics.halfspace import ducc, transforms
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.mechanics.halfspace.window import Reach, Window
+from roughvisc.mechanics.halfspace.window import FarFieldDisplacement, Window
 
 SHAPES = [(9, 15), (8, 14), (1, 11), (7, 1), (36, 25)]
 
@@ -71,7 +71,11 @@ def test_reach__is_the_same_by_both(mirrored, monkeypatch):
     found = []
     for engine in ("scipy", "ducc0"):
         monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
-        found.append(np.concatenate([rows.copy() for _, rows in Reach(window, (1.0, 0.7), HALF_SPACE).rows(pressure)]))
+        found.append(
+            np.concatenate(
+                [rows.copy() for _, rows in FarFieldDisplacement(window, (1.0, 0.7), HALF_SPACE).rows(pressure)]
+            )
+        )
     np.testing.assert_allclose(found[0], found[1], rtol=1e-13)
 
 

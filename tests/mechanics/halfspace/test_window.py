@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.halfspace.window import Reach, Window, mean_influence, whole_domain, window_around
+from roughvisc.mechanics.halfspace.window import (
+    FarFieldDisplacement,
+    Window,
+    mean_influence,
+    whole_domain,
+    window_around,
+)
 from roughvisc.mechanics.hereditary.exponentials import padded
 
 
@@ -77,10 +83,10 @@ def test_reach__is_the_displacement_of_the_whole_domain(spacing, first, shape):
     pressure = np.random.default_rng(0).random(shape)
     expected = HalfSpace(domain, spacing).displacement(padded(pressure, domain, first))
     window = Window(domain, first, shape)
-    found = np.concatenate([rows for _, rows in Reach(window, spacing, HALF_SPACE).rows(pressure)])
+    found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(pressure)])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     quick = np.concatenate(
-        [rows for _, rows in Reach(window, spacing, HALF_SPACE, single=True).rows(1e-300 * pressure)]
+        [rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE, single=True).rows(1e-300 * pressure)]
     )
     np.testing.assert_allclose(1e300 * quick, expected, rtol=0, atol=1e-6 * expected.max())
     mean = np.sum(pressure * mean_influence(window, spacing, HALF_SPACE))
@@ -119,9 +125,11 @@ def test_mirrored_reach__is_that_of_the_window_with_its_images(spacing, shape):
     first = (domain[0] - shape[0], domain[1] - shape[1])
     expected = HalfSpace((42, 54), spacing).displacement(padded(pressure, (42, 54), first))
     window = Window(domain, (0, 0), shape, mirrored=True)
-    found = np.concatenate([rows for _, rows in Reach(window, spacing, HALF_SPACE).rows(corner)])
+    found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(corner)])
     np.testing.assert_allclose(found, expected[21:, 27:], rtol=1e-12)
-    quick = np.concatenate([rows for _, rows in Reach(window, spacing, HALF_SPACE, single=True).rows(1e-300 * corner)])
+    quick = np.concatenate(
+        [rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE, single=True).rows(1e-300 * corner)]
+    )
     np.testing.assert_allclose(1e300 * quick, expected[21:, 27:], rtol=0, atol=1e-6 * expected.max())
     assert np.sum(corner * mean_influence(window, spacing, HALF_SPACE)) == pytest.approx(np.mean(expected), rel=1e-12)
 

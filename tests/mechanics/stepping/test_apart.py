@@ -16,7 +16,7 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import apart
 from roughvisc.mechanics.stepping import march as marching
 from roughvisc.mechanics.stepping.apart import _first_crossing, closing_time
-from roughvisc.mechanics.stepping.attempt import rest
+from roughvisc.mechanics.stepping.attempt import initial_state
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 
@@ -219,5 +219,5 @@ def test_turns_of_a_cycle__bound_the_search():
 def test_surfaces_that_touch_within_a_millionth_of_the_way__are_in_contact_now(part, apart_till):
     program = rv.Program().approach(1.0, over=1.0)
     scene = sphere(program)
-    found = closing_time(scene, rest(scene), program.segments[0], 1.0, lambda _: part)
+    found = closing_time(scene, initial_state(scene), program.segments[0], 1.0, lambda _: part)
     assert found == pytest.approx(apart_till, rel=1e-4, abs=0.0)

@@ -12,11 +12,11 @@ from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import attempt, companion
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.pace import Pace
+from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
-from roughvisc.study.simulation.rows import keeps_its_word
-from roughvisc.study.simulation.stated import stated
+from roughvisc.study.simulation.rows import meets_tolerance
+from roughvisc.study.simulation.stated import error_columns
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {
@@ -120,7 +120,7 @@ def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on(
 
 def test_force_error__is_nothing_where_the_load_is_given(matrix):
     for (_, what, _), (found, _) in matrix.items():
-        rows = [stated(step, 0.0) for step in found.values() if step.shown.force > 0]
+        rows = [error_columns(step, 0.0) for step in found.values() if step.shown.force > 0]
         given, sought = ("approach", "force") if what in ("held_approach", "pulled") else ("force", "approach")
         assert all(row[f"{given}_error"] == 0 for row in rows)
         assert all(row[f"{sought}_error"] > 0 for row in rows)
@@ -129,7 +129,7 @@ def test_force_error__is_nothing_where_the_load_is_given(matrix):
 def test_force_error__is_not_nothing_where_a_hold_keeps_what_was_found():
     program = rv.Program().approach(0.06, over=0.5).hold(1.0, control="load")
     found = kept(sphere(MATERIALS["zener"], program, times=(0.25, 1.0, 1.5), tolerance=TOLERANCE))
-    rows = [stated(step, 0.0) for step in found.values()]
+    rows = [error_columns(step, 0.0) for step in found.values()]
     assert [row["force_error"] > 0 for row in rows] == [True, True, True]
     assert [row["approach_error"] > 0 for row in rows] == [False, True, True]
 
@@ -138,7 +138,7 @@ def test_force_error__is_not_nothing_where_a_hold_keeps_what_was_found():
 @pytest.mark.parametrize("what", PROGRAMS)
 def test_every_step_that_is_a_row__keeps_the_tolerance(what, surface):
     scene = SURFACES[surface](MATERIALS["zener"], PROGRAMS[what], tolerance=TOLERANCE)
-    found = {step.shown.time: step for step in march(scene) if keeps_its_word(step, 0.0)}
+    found = {step.shown.time: step for step in march(scene) if meets_tolerance(step, 0.0)}
     exact = kept(replace(scene, times=tuple(found), tolerance=TOLERANCE / SHARPER))
     later = {time: step for time, step in found.items() if step.shown.force > 0}
     assert len(later) > 5
@@ -149,7 +149,7 @@ def same(one, other):
     """Whether two steps show the same and state the same, to the last bit."""
     pairs = [(getattr(one.uncertainty, f.name), getattr(other.uncertainty, f.name)) for f in fields(one.uncertainty)]
     pairs += [(getattr(one, name), getattr(other, name)) for name in ("stored", "dissipated", "work", "bound")]
-    pairs += zip(*(stated(step, 0.0).values() for step in (one, other)), strict=True)
+    pairs += zip(*(error_columns(step, 0.0).values() for step in (one, other)), strict=True)
     pairs += [(getattr(one.shown, name), getattr(other.shown, name)) for name in ("pressure", "force", "approach")]
     assert all(np.array_equal(*pair, equal_nan=True) for pair in pairs)
     assert np.array_equal(one.displacement, other.displacement)
@@ -214,7 +214,7 @@ def test_row_right_after_a_corner__is_judged():
     )
     off = np.abs(coarse.force - fine.force).values
     assert off[-1] < 1e-2 * float(fine.force.max())
-    assert np.all(off <= coarse.force_error.values / 0.8)
+    assert np.all(off <= coarse.roughvisc.accuracy.force_error.values / 0.8)
 
 
 @pytest.mark.parametrize("what", ["triangle", "pulled"])
@@ -247,19 +247,19 @@ def test_cell_that_may_enter__puts_the_mean_pressure_in_doubt_where_it_jumps(mon
 
 def test_work_in_doubt__shortens_steps_that_are_not_shown_too():
     *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
-    scene, state = last.scene, replace(last.state, pace=Pace())
+    scene, state = last.scene, replace(last.state, pace=ControllerState())
 
     def doubtful(part):
         return replace(state, uncertainty=Uncertainty(work=part * TOLERANCE * state.largest_work))
 
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 1.0, left=0.01).pace.sharpness == 0.5
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(1.0), 1.0, left=0.01).pace.sharpness == 1.0
-    assert companion.sharpened(scene, doubtful(0.5), doubtful(4.0), 2.0, left=0.01).pace.sharpness == 1.0
+    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(4.0), 1.0, left=0.01).pace.sharpness == 0.5
+    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(1.0), 1.0, left=0.01).pace.sharpness == 1.0
+    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(4.0), 2.0, left=0.01).pace.sharpness == 1.0
 
 
 def test_what_fades__shortens_steps_where_it_is_shown():
     *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
-    state = replace(last.state, pace=Pace())
+    state = replace(last.state, pace=ControllerState())
     far_off = replace(state, uncertainty=Uncertainty(pressure=2 * TOLERANCE * state.largest_force))
-    assert companion.sharpened(last.scene, state, far_off, 1.0, left=1.0).pace.sharpness == 0.5
-    assert companion.sharpened(last.scene, state, far_off, 1.0, left=0.01).pace.sharpness == 1.0
+    assert companion.adapt_tolerance_share(last.scene, state, far_off, 1.0, left=1.0).pace.sharpness == 0.5
+    assert companion.adapt_tolerance_share(last.scene, state, far_off, 1.0, left=0.01).pace.sharpness == 1.0

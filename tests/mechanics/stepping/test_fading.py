@@ -92,7 +92,9 @@ def test_one_kept_time__costs_less_and_is_as_right_as_asked(name, what, monkeypa
     made = scene(replace(SERIES[name], glassy=0.5), PROGRAMS[what], shape=(27, 24), tolerance=1e-3)
     last = list(march(replace(made, times=(2.0,))))[-1]
     exact = list(march(replace(made, times=(2.0,), tolerance=2e-5)))[-1]
-    monkeypatch.setattr(control, "counted", lambda scene, state, length: control.retarded(scene, length))
+    monkeypatch.setattr(
+        control, "counted", lambda scene, state, length: control.remaining_creep_fraction(scene, length)
+    )
     all_alike = list(march(replace(made, times=(2.0,))))[-1]
     assert last.state.convolutions < 0.9 * all_alike.state.convolutions
     off = np.abs(last.shown.pressure - exact.shown.pressure).sum() * made.halfspace.cell_area

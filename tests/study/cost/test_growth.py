@@ -13,7 +13,7 @@ from roughvisc.errors import EdgeContactError
 from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
-from roughvisc.study.cost.estimate import March, Passed, solved_on
+from roughvisc.study.cost.estimate import CostEstimate, Passed, solved_on
 from roughvisc.study.cost.stages import Stage, stage_at, stages_of
 from roughvisc.study.simulation import scene as scene_module
 from roughvisc.study.simulation.footprint import march_bytes
@@ -128,7 +128,7 @@ def test_stages__are_the_windows_and_grids_that_a_ground_comes_through(monkeypat
     height = rv.sphere(1e-2, (1e-3 * shape[0], 1e-3 * shape[1]), shape)
     ground = Ground(height, follow=follow, mirror=True)
     program = rv.Program().load(1e-3, over=1.0)
-    scene, _ = scene_module.prepare(ground, rv.elastic(1e6), program, Settings(boundary="free"))
+    scene, _ = scene_module.build_scene(ground, rv.elastic(1e6), program, Settings(boundary="free"))
     found = [(ground.height.shape, np.prod(ground.window.shape), ground.window.outside)]
     while (larger := ground.enlarge(scene)) is not None:
         scene = larger[0]
@@ -153,7 +153,7 @@ def test_stage_at__is_the_first_that_holds_the_contact():
 def test_solved_on__shares_the_convolutions_among_the_stages_and_does_not_shrink_again():
     stages = (Stage((10, 10), 100, width=(1.0, 1.0)), Stage((20, 20), 400, width=(2.0, 2.0)), Stage((40, 40), 1600))
     course = tuple(Passed(0.1, (width, width), work) for width, work in [(0.5, 10), (1.5, 30), (0.5, 40)])
-    solved = solved_on(stages, March(3, 3, 80, 0.0, 0.1, True, level=0.1, course=course))
+    solved = solved_on(stages, CostEstimate(3, 3, 80, 0.0, 0.1, True, level=0.1, course=course))
     assert (solved.shares, solved.cells, solved.part, solved.growths) == ((0.125, 0.875), 400, 1.0, 1)
     assert solved.mean(float) == 0.125 * 100 + 0.875 * 400
 

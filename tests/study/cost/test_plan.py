@@ -18,7 +18,7 @@ from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost import plan as plan_module
 from roughvisc.study.cost import totals as totals_module
-from roughvisc.study.cost.estimate import March, Solved, coarse, wall_time
+from roughvisc.study.cost.estimate import CostEstimate, Solved, coarse, wall_time
 from roughvisc.study.cost.stages import Stage
 from roughvisc.study.simulation.available import Available
 from roughvisc.study.simulation.simulate import simulate
@@ -247,7 +247,7 @@ def test_plan__counts_the_coarser_solve_of_a_grid_error(study):
     plain = study(ROUGH)[0]
     asked = vary(plain, {"solve.grid_error": True})
     engine = choose_memory(plain.material(), 0.51, 2e-3)
-    found = March(20, 10, 400, 0.0, 0.1, True)
+    found = CostEstimate(20, 10, 400, 0.0, 0.1, True)
     seconds = [wall_time(case.solving(), whole(90 * 108), found, engine, 1e-3) for case in (plain, asked)]
     assert seconds[0] + 0.25 * 0.4 <= seconds[1] <= 2 * seconds[0], "a quarter of the cells, at least"
 
@@ -380,7 +380,7 @@ def remembered(material):
 
 
 def test_bytes__are_fields_of_the_cells_and_what_the_process_takes(study):
-    settings, found, cells = study(ROUGH)[0].solving(), March(20, 0, 400, 0.0, 0.1, True), 10_000
+    settings, found, cells = study(ROUGH)[0].solving(), CostEstimate(20, 0, 400, 0.0, 0.1, True), 10_000
 
     def fields_of(material, part=1.0, rows=0):
         needed = estimate.bytes_needed(settings, cells, replace(found, rows=rows), remembered(material), part)
@@ -398,16 +398,16 @@ def test_bytes__are_fields_of_the_cells_and_what_the_process_takes(study):
 
 def test_disk__takes_the_fields_and_fifteen_histories_of_each_row(study):
     case = vary(study(ROUGH)[0], {"keep.fields": ["pressure", "gap"], "keep.precision": None})
-    empty, ten = (estimate.disk(case, 1000, March(20, rows, 400, 0.0, 0.1, True)) for rows in (0, 10))
+    empty, ten = (estimate.disk(case, 1000, CostEstimate(20, rows, 400, 0.0, 0.1, True)) for rows in (0, 10))
     assert empty == 40e3 + 8 * 1000 + 8 * 20 * len(STEPPED), "and the histories of twenty steps"
     assert ten - empty == 10 * (2 * 8 * 1000 + 15 * 8)
-    rare = estimate.disk(case, 1000, March(20, 10, 400, 0.0, 0.01, True))
+    rare = estimate.disk(case, 1000, CostEstimate(20, 10, 400, 0.0, 0.01, True))
     assert rare - empty == pytest.approx(10 * (1.02 * 8 * 1000 + 15 * 8)), "a sparse pressure is compressed"
 
 
 def test_wall_time__is_that_of_the_convolutions_of_the_fields_passed_through_and_of_writing(study):
     settings = study(ROUGH)[0].solving()
-    march, cells = March(1000, 0, 400, 0.0, 0.1, True), 2**20 - 2
+    march, cells = CostEstimate(1000, 0, 400, 0.0, 0.1, True), 2**20 - 2
     passed = [wall_time(settings, whole(cells), march, remembered(m), 0.0) for m in (rv.elastic(1e6), ZENER)]
     byte = 0.3e-9
     assert passed == pytest.approx([1000 * 8 * cells * n * byte for n in (10, 14)])
@@ -438,7 +438,7 @@ def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
     monkeypatch.setattr(estimate, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
     monkeypatch.setattr(estimate, "_TIMED", 15**2)
     monkeypatch.setattr(estimate, "_CALIBRATION", 100.0)
-    watch = estimate.Stopwatch()
+    watch = estimate.ConvolutionTimer()
 
     def seconds(shape):
         return watch.seconds(rv.sphere(1e-3, 2e-4, shape), "free", HALF_SPACE)
@@ -458,7 +458,7 @@ def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
 @pytest.mark.parametrize(("time_step", "steps"), [("auto", 12 * 1.2), (0.01, 12)])
 def test_cost__grows_from_grid_to_grid_as_between_the_coarse_ones(study, monkeypatch, time_step, steps):
     """An octave beyond the second one; steps of a given length are as many on any grid."""
-    found = [March(10, 5, 100, 0.0, 0.1, True), March(12, 6, 150, 0.0, 0.1, True)]
+    found = [CostEstimate(10, 5, 100, 0.0, 0.1, True), CostEstimate(12, 6, 150, 0.0, 0.1, True)]
     monkeypatch.setattr(estimate, "_march", lambda case, program, height, _: found[height.sizes["x"] > 20])
     case = vary(study(ROUGH)[0], {"solve.time_step": time_step})
     grown = estimate.march_of(case, rv.sphere(1e-3, 2e-4, 66))

@@ -12,7 +12,7 @@ import roughvisc as rv
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import whole_result
@@ -133,9 +133,9 @@ def test_sweep__on_a_cluster_ends_with_the_same_bits(tmp_path, by_hand):
     (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES + '"friction.direction" = ["x", "-y"]\n')
     cases = read_cases(tmp_path / "slide.toml")
     with connect(file=by_hand) as client:
-        outcomes = run_cases(cases, tmp_path / "there", watch=Silence(), client=client)
+        outcomes = run_cases(cases, tmp_path / "there", watch=NullMonitor(), client=client)
     assert [one.kind for one in outcomes.values()] == ["done"] * 4
-    run_cases(cases, tmp_path / "here", watch=Silence(), workers=0)
+    run_cases(cases, tmp_path / "here", watch=NullMonitor(), workers=0)
     assert_same(numbers(tmp_path / "there"), numbers(tmp_path / "here"))
 
 

@@ -11,10 +11,10 @@ from support import BALL
 from roughvisc.errors import ChangedError, InputError, RoughviscError
 from roughvisc.groups import whole_of
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.baggage import serialize_with_inputs
 from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import Case, read_cases, read_study
 from roughvisc.study.storage.failures import record_path
 from roughvisc.topography import readers
@@ -63,7 +63,7 @@ def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan
     before = hashlib.sha256(scan.read_bytes()).hexdigest()
     cases = read_cases(study)
     pressed = after_the_first(monkeypatch, lambda: bump(scan, 2e-5))
-    outcomes = list(run_cases(cases, tmp_path / "out", watch=Silence(), workers=0).values())
+    outcomes = list(run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0).values())
     assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
     assert len(pressed) == 1
     assert f"{scan}: was changed after the study was read" in outcomes[1].message
@@ -82,7 +82,7 @@ def test_sweep__a_scan_that_is_gone_for_a_while_fails_no_case(study, scan, tmp_p
     cases = read_cases(study)
     content = scan.read_bytes()
     after_the_first(monkeypatch, lambda: scan.write_bytes(content[: len(content) // 2]))
-    outcomes = list(run_cases(cases, tmp_path / "out", watch=Silence(), workers=0).values())
+    outcomes = list(run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0).values())
     assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
     scan.write_bytes(content)
     assert sweep(study, tmp_path / "out", workers=0, progress=False).sizes["case"] == 2
@@ -114,16 +114,16 @@ def test_open_scan__a_file_that_changes_while_it_is_read(scan, monkeypatch):
 
 def test_pack__a_copy_is_what_was_asked_for(study, scan, tmp_path):
     case = read_cases(study)[0]
-    packed = Case.from_json(pack(case, tmp_path / "inputs"))
+    packed = Case.from_json(serialize_with_inputs(case, tmp_path / "inputs"))
     copy = type(scan)(json.loads(packed.to_json())["surface"]["file"])
     assert packed.key == case.key
     copy.write_bytes(b"damaged")
-    assert Case.from_json(pack(case, tmp_path / "inputs")).key == case.key
+    assert Case.from_json(serialize_with_inputs(case, tmp_path / "inputs")).key == case.key
     assert copy.read_bytes() == scan.read_bytes()
 
 
 def test_pack__a_file_that_changes_while_it_is_copied(study, scan, tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.copyfile", lambda _, to: bump(to.open("wb"), 3e-5).close())
     with pytest.raises(RoughviscError, match=r"scan\.npy: was changed while it was copied"):
-        pack(read_cases(study)[0], tmp_path / "inputs")
+        serialize_with_inputs(read_cases(study)[0], tmp_path / "inputs")
     assert not [path for path in (tmp_path / "inputs").rglob("*") if path.is_file()]

@@ -13,7 +13,7 @@ from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.simulation import malloc, rows
 from roughvisc.study.simulation.footprint import march_bytes
-from roughvisc.study.simulation.scene import memory_wanted
+from roughvisc.study.simulation.scene import memory_options
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage.store import whole_result
 from roughvisc.topography.grid import nominal_area
@@ -85,7 +85,7 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
         rows, cells = ds.sizes["time"], ds.sizes["x"] * ds.sizes["y"]
         steps = ds.sizes.get("step", 0)
     settings = case.solving()
-    memory = choose_memory(case.material(), **memory_wanted(case.program().on_area(1e-6), settings)).memory
+    memory = choose_memory(case.material(), **memory_options(case.program().on_area(1e-6), settings)).memory
     stated = march_bytes(settings, cells, memory, contact=contact, rows=rows, steps=steps)
     assert stated == pytest.approx(taken, rel=0.1), (
         f"{taken / 8 / cells:.1f} fields taken, {stated / 8 / cells:.1f} stated"
@@ -96,7 +96,7 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
 def test_file_of_many_frames__is_written_a_layer_of_chunks_at_a_time(study, cells, layer):
     """Which no solution of an elastic case takes as much as: the state, the surface and a layer count."""
     settings = vary(study[0], ELASTIC).solving()
-    elastic = choose_memory(rv.elastic(1e6), **memory_wanted(study[0].program().on_area(1e-6), settings)).memory
+    elastic = choose_memory(rv.elastic(1e6), **memory_options(study[0].program().on_area(1e-6), settings)).memory
     few, many = (march_bytes(settings, cells, elastic, rows=rows) / 8 / cells for rows in (1, 24))
     assert (many - few > 1) == (layer > 1)
     if layer > 1:

@@ -5,7 +5,7 @@ import pytest
 from support import friction_whole
 
 import roughvisc as rv
-from roughvisc.study.simulation.faces import Face, Turn
+from roughvisc.study.simulation.faces import AxisTransform, SlidingGrid
 from roughvisc.study.simulation.scene import Ground
 from roughvisc.variables.sliding import SLIDING
 
@@ -70,7 +70,7 @@ def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
 def test_coarser_face__has_the_same_waves_where_its_cells_can_hold_them():
     x = (np.arange(48) + 0.5) / 48
     height = rv.from_array(1e-6 * np.cos(2 * np.pi * x)[:, None] * np.cos(4 * np.pi * x), 1e-3 / 48)
-    face = Face.of(Ground(height), Turn.of("x"))
+    face = SlidingGrid.of(Ground(height), AxisTransform.of("x"))
     half = face.coarser(2.0)
     assert half.gap.shape == (24, 24)
     np.testing.assert_allclose(half.spacing, 2e-3 / 48)

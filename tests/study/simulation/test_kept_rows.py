@@ -12,9 +12,9 @@ from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
-from roughvisc.study.simulation.rows import Rows, keeps_its_word
-from roughvisc.study.simulation.scene import Ground, prepare
-from roughvisc.study.simulation.stated import stated
+from roughvisc.study.simulation.rows import Rows, meets_tolerance
+from roughvisc.study.simulation.scene import Ground, build_scene
+from roughvisc.study.simulation.stated import error_columns
 from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.records import RowsInMemory
 from roughvisc.variables import FIELDS, STATUS_MEANINGS
@@ -37,13 +37,13 @@ def stood(**changes):
             pressure=0.3, force=0.07, approach=0.011, work=0.13, dissipated=0.17, inside=0.6, outside=0.9
         ),
         "state": SimpleNamespace(largest_force=8.0, largest_approach=0.5),
-        "scene": SimpleNamespace(remembers=True, tolerance=0.1),
+        "scene": SimpleNamespace(is_viscoelastic=True, tolerance=0.1),
     }
     return SimpleNamespace(**given | changes)
 
 
 def test_stated_errors__add_up_those_of_time_solver_and_series():
-    found = stated(stood(), 0.03)
+    found = error_columns(stood(), 0.03)
     solved = 0.01 + 0.02 * 0.1  # now, and what of before is left
     assert found["pressure_error"] == pytest.approx((0.3 + solved * 4.0) / 8.0 + 0.03)
     assert found["force_error"] == 0, "given"
@@ -60,7 +60,7 @@ def test_stated_errors__add_up_those_of_time_solver_and_series():
      ("approach", False, True, True)],
 )  # fmt: skip
 def test_stated_error__of_what_the_program_gives_is_none(control, given, force, approach):
-    found = stated(stood(control=control, given=given), 0.03)
+    found = error_columns(stood(control=control, given=given), 0.03)
     solved = 0.01 + 0.02 * 0.1
     assert found["force_error"] == pytest.approx((0.07 + solved * 4.0 + 0.03 * 8.0) * force)
     assert found["approach_error"] == pytest.approx((0.011 + 0.045 * 0.2 + 0.03 * 0.5 + 0.005 * 0.1 * 0.5) * approach)
@@ -72,9 +72,9 @@ def test_stated_error__is_the_largest_relative_one(worst, expected):
     sizes[worst] *= expected / 0.2
     unknown = SimpleNamespace(**sizes, work=0.0, dissipated=0.0, inside=0.0, outside=0.0)
     exact = {"residual": 0.0, "bound": 0.0, "given": False, "uncertainty": unknown}
-    scene = SimpleNamespace(remembers=False, tolerance=0.1)
+    scene = SimpleNamespace(is_viscoelastic=False, tolerance=0.1)
     least = 0.015 * 0.1 * 4.0 / 8.0  # stated of an elastic pressure in any case
-    found = stated(stood(**exact, scene=scene), 0.0)["stated_error"]
+    found = error_columns(stood(**exact, scene=scene), 0.0)["stated_error"]
     assert found == pytest.approx(expected + least * (worst != "approach"))
 
 
@@ -83,11 +83,11 @@ def test_stated_errors__of_surfaces_that_never_touched_are_those_of_the_solver()
     nothing = SimpleNamespace(force=0.0, approach=0.0)
     unknown = SimpleNamespace(**dict.fromkeys(("pressure", "force", "approach", "work", "dissipated"), 0.0))
     unknown.inside = unknown.outside = 0.0
-    found = stated(stood(state=rest, shown=nothing, uncertainty=unknown), 0.03)
+    found = error_columns(stood(state=rest, shown=nothing, uncertainty=unknown), 0.03)
     assert found["pressure_error"] == found["stated_error"] == 0.01
     assert found["force_error"] == found["approach_error"] == 0
     # without a past there is none whose errors are left
-    found = stated(stood(scene=SimpleNamespace(remembers=False, tolerance=0.1)), 0.0)
+    found = error_columns(stood(scene=SimpleNamespace(is_viscoelastic=False, tolerance=0.1)), 0.0)
     assert found["pressure_error"] == pytest.approx((0.3 + 0.01 * 4.0) / 8.0)
 
 
@@ -99,14 +99,14 @@ def judged(*, soft=False, fixed=None, since=1.0, step=0.5, entered=False, contro
         largest_force=8.0, largest_approach=0.5, largest_work=5.0, now=now, before=before, began=3.0
     )
     scene = SimpleNamespace(
-        remembers=True,
+        is_viscoelastic=True,
         tolerance=0.1,
         time_step=fixed,
         motions=(),
         program=SimpleNamespace(duration=7.0),
-        is_soft=lambda length: soft and length == 7.0,
+        lacks_instantaneous_compliance=lambda length: soft and length == 7.0,
     )
-    return keeps_its_word(stood(state=state, scene=scene, control=control, **changes), 0.0)
+    return meets_tolerance(stood(state=state, scene=scene, control=control, **changes), 0.0)
 
 
 def off(approach=0.0, pressure=0.0):
@@ -140,7 +140,7 @@ class Kept:
         self.height, self.seed = height, 0
         settings = Settings(tolerance=tolerance, fields=FIELDS, **settings)
         self.ground = Ground(height, settings.missing, follow=follow, mirror=mirror)
-        self.scene = prepare(self.ground, MATERIAL, PROGRAM, settings)[0]
+        self.scene = build_scene(self.ground, MATERIAL, PROGRAM, settings)[0]
         self.rows = Rows(self.ground, settings, RowsInMemory(), 0.0)
 
     def add(self, level, *, part=0.3, converged=True, force=1.0, iterations=5, time=0.5):

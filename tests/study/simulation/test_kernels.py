@@ -27,7 +27,7 @@ class Scaled(Kernel):
     """A half-space of so many times the compliance."""
 
     factor: float
-    bulges: bool = False
+    raises_surface: bool = False
 
     def influence(self, shape, spacing):
         return self.factor * love_kernel(shape, spacing)
@@ -42,7 +42,7 @@ class Screened(Kernel):
     """``exp(-k r) / (pi r)``, whose transform is ``2 / sqrt(q^2 + k^2)``: beyond ``1/k`` pressure is not felt."""
 
     k: float
-    bulges: bool = False
+    raises_surface: bool = False
 
     def influence(self, shape, spacing):
         nodes, weights = np.polynomial.legendre.leggauss(6)
@@ -149,7 +149,7 @@ def test_cases__keep_their_kernel(no_half_space, monkeypatch, tmp_path):
 
 
 def test_cases__that_bulge_have_no_window(monkeypatch, tmp_path):
-    case = case_on(replace(Screened(5e4), bulges=True), monkeypatch)
+    case = case_on(replace(Screened(5e4), raises_surface=True), monkeypatch)
     assert "too deep" not in str(rv.plan([case], tmp_path).left_out.values[0])
     assert "too deep" not in rv.run(case, tmp_path, progress=False).attrs["left_out"]
 
@@ -159,7 +159,7 @@ def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeyp
     kernel = Screened(5e4)
     quick = pressed(path, kernel)
     monkeypatch.setattr(scene, "is_mirrored", lambda height: False)
-    slow = pressed(path, replace(kernel, bulges=True))
+    slow = pressed(path, replace(kernel, raises_surface=True))
     assert quick.attrs["left_out"] != slow.attrs["left_out"]
     for name in ("force", "approach", "mean_gap"):
         assert quick[name].values == pytest.approx(slow[name].values, rel=2e-3), name

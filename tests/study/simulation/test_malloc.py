@@ -8,7 +8,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.study.simulation import malloc, simulate
-from roughvisc.study.simulation.malloc import keep_memory, keeping
+from roughvisc.study.simulation.malloc import keep_memory, retain_arena
 
 MB = 1 << 20
 MMAP, TRIM = -3, -1
@@ -40,7 +40,7 @@ def library(monkeypatch):
 
 def test_wide_grid__keeps_what_is_freed_till_its_end(library):
     def failing():
-        with keeping(8 * MB):
+        with retain_arena(8 * MB):
             assert library.told == [(MMAP, 32 * MB), (TRIM, 2047 * MB)]
             library.told.clear()
             raise ZeroDivisionError
@@ -61,7 +61,7 @@ def test_memory_of_a_march__is_given_back_when_the_result_is_described(library, 
 
 
 def test_narrow_grid__changes_nothing(library):
-    with keeping(8 * MB - 1):
+    with retain_arena(8 * MB - 1):
         pass
     assert library.told == []
 
@@ -69,14 +69,14 @@ def test_narrow_grid__changes_nothing(library):
 def test_process_that_keeps_memory__goes_on_to(library):
     assert keep_memory()
     library.told.clear()
-    with keeping(8 * MB):
+    with retain_arena(8 * MB):
         library.told.clear()
     assert library.told == ["trim"]
 
 
 def test_other_libraries__are_left_alone(monkeypatch):
     monkeypatch.setattr(malloc, "_library", lambda: None)
-    with keeping(8 * MB):
+    with retain_arena(8 * MB):
         pass
 
 
@@ -97,8 +97,8 @@ def test_memory_freed_in_a_wide_march__is_used_again(tmp_path):
     """128 arrays of a megabyte, freed and had again."""
     script = (
         "import numpy as np\n"
-        "from roughvisc.study.simulation.malloc import keeping\n"
-        "with keeping(int(sys.argv[1])):\n"
+        "from roughvisc.study.simulation.malloc import retain_arena\n"
+        "with retain_arena(int(sys.argv[1])):\n"
         "    for _ in range(6):\n"
         "        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "        arrays = [np.ones(1 << 17) for _ in range(128)]\n"

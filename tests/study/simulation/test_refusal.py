@@ -11,7 +11,7 @@ import pytest
 from scipy import fft
 
 import roughvisc as rv
-from roughvisc.errors import HinderedError, InputError, TooLargeError
+from roughvisc.errors import InputError, TooLargeError, TransientError
 from roughvisc.mechanics.fields import threads as threads_module
 from roughvisc.study.execution import side_by_side as side_module
 from roughvisc.study.execution.run import run_case
@@ -77,7 +77,7 @@ def test_run__refuses_what_cannot_fit(study, limited, tmp_path, monkeypatch, inv
         rv.run(path, tmp_path / "out", progress=False)
     assert "40 MB are free in this machine: what would fit: 300 x 256 cells, 2 times as long, need" in str(found.value)
     assert isinstance(found.value, InputError)
-    assert isinstance(found.value, HinderedError)
+    assert isinstance(found.value, TransientError)
     assert not list(tmp_path.glob("out/*")), "nothing is kept of it"
     status, _, wrong = invoke("run", str(path), "--no-plots")
     assert status == 2

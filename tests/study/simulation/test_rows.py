@@ -12,8 +12,8 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.simulation import rows
-from roughvisc.study.simulation.rows import keeps_its_word
-from roughvisc.study.simulation.stated import stated
+from roughvisc.study.simulation.rows import meets_tolerance
+from roughvisc.study.simulation.stated import error_columns
 from roughvisc.variables import FIELDS
 
 BALL = rv.sphere(1.0, 1.6, 17)
@@ -92,7 +92,7 @@ def test_dent_left_by_a_load__is_as_uncertain_as_the_load_made_it():
 def test_steps_in_which_cells_enter__are_rows_unless_the_force_jumps_with_them(control):
     steps = soft_steps(control, tolerance=5e-2)  # within three of which a cell may enter
     entered = np.array([np.any(step.state.now.pressure[step.state.before.pressure == 0] > 0) for step in steps])
-    kept = np.array([keeps_its_word(step, 0.0) for step in steps])
+    kept = np.array([meets_tolerance(step, 0.0) for step in steps])
     assert kept[~entered].any()
     assert kept[entered].any() == (control == "load")
 
@@ -111,8 +111,8 @@ def soft_steps(control, tolerance=1e-2):
 def test_steps_that_state_more_than_three_tolerances__are_no_rows(control):
     over = []
     for step in soft_steps(control):
-        found = stated(step, 0.0)
+        found = error_columns(step, 0.0)
         over.append(max(found["stated_error"], found["work_error"] / step.state.largest_work) / step.scene.tolerance)
-        if keeps_its_word(step, 0.0):
+        if meets_tolerance(step, 0.0):
             assert over[-1] <= 3
     assert max(over) > 3

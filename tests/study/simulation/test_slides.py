@@ -9,7 +9,7 @@ from support import friction_whole, simulate_whole
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.simulation.kept_times import kept_times
-from roughvisc.study.simulation.slides import on_cells
+from roughvisc.study.simulation.slides import snap_to_cells
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words
@@ -88,7 +88,7 @@ def test_kept_times__come_to_whole_cells():
     asked = [1e-3, 2e-3, 2.1e-3, 2.55e-3, 2.56e-3, program.duration]
     cell = 0.01 / 24
     expected = [1e-3, 2e-3, 2e-3 + cell, program.duration]
-    np.testing.assert_allclose(on_cells(program, asked, (SIDE / 24, 1.0)), expected, rtol=1e-12)
+    np.testing.assert_allclose(snap_to_cells(program, asked, (SIDE / 24, 1.0)), expected, rtol=1e-12)
     ds = slid(program, times=asked)
     np.testing.assert_allclose(ds.time, expected, rtol=1e-12)
     np.testing.assert_allclose(ds.sliding_distance, [0, 0, SIDE / 24, SIDE], rtol=1e-12)

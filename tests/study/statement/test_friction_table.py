@@ -6,7 +6,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.study.statement import identity as identity_module
 from roughvisc.study.statement.case import Case, read_cases, read_study
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.schema.units import unit_of
 
 SURFACE = BALL[BALL.index("[surface]") : BALL.index("[[program]]")]
@@ -32,12 +32,12 @@ def read(tmp_path):
     ],
 )
 def test_speeds__are_in_order_and_each_once(read, speeds, found):
-    assert read(f'load = "2 N"\nspeeds = {speeds}').experiment() == Curve(speeds=found, load=2.0)
+    assert read(f'load = "2 N"\nspeeds = {speeds}').experiment() == SteadySliding(speeds=found, load=2.0)
 
 
 def test_case__states_a_curve_and_survives_its_text(read):
     case = read('pressure = "0.2 MPa"\nspeeds = [1, 2]\ndirection = "-y"\nlast_octave = true')
-    assert case.experiment() == Curve(speeds=[1, 2], pressure=2e5, direction="-y", last_octave=True)
+    assert case.experiment() == SteadySliding(speeds=[1, 2], pressure=2e5, direction="-y", last_octave=True)
     again = Case.from_json(case.to_json())
     assert (again.key, again.experiment()) == (case.key, case.experiment())
     assert "2 speeds from 1 m/s to 2 m/s along -y, under 200 kPa" in case._repr_html_()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.study.execution.baggage import pack
+from roughvisc.study.execution.baggage import serialize_with_inputs
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.statement.treatment import treatment
@@ -75,7 +75,7 @@ def test_second__a_file_travels_with_the_case(one, tmp_path):
     scan = tmp_path / "scan.toml"
     scan.write_text('generate = "sphere"\nradius = 1e-2\nsize = 1e-3\nshape = 20\n')
     case = vary(one, {"surface.second": {"file": str(scan)}})
-    moved = Case.from_json(pack(case, tmp_path / "inputs"))
+    moved = Case.from_json(serialize_with_inputs(case, tmp_path / "inputs"))
     assert Path(moved.settings.surface.second.file).is_relative_to(tmp_path / "inputs")
     assert moved.key == case.key
 

@@ -168,7 +168,7 @@ NEW_SETTING = {
     ),
     "study/simulation/notes.py": ("def accuracy_note(", "PATIENCE = Settings.patience\n\n\n"),
 }
-HANDED_ON = ("        kernel=body(material, thickness, base, kernel),\n", "        patience=patience,\n")
+HANDED_ON = ("        kernel=make_body(material, thickness, base, kernel),\n", "        patience=patience,\n")
 
 USED = """
 import sys, tomllib

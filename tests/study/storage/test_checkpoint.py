@@ -25,7 +25,7 @@ from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.stepping.pace import Pace
+from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.scene import Instant, State
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
@@ -33,7 +33,7 @@ from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage import records
-from roughvisc.study.storage.checkpoint import Keeper, Reached, load_checkpoint, save_checkpoint
+from roughvisc.study.storage.checkpoint import Checkpoint, CheckpointWriter, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import whole_result
@@ -226,8 +226,8 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     modes = ModesState(np.zeros((0, 2, 3)), strange, None, 1 / 3)
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
-        state = State(now, strange, memory, before=None, pace=Pace(0.1, 0.5, True), convolutions=2**40)
-        reached = Reached(state, False, 3, 2, 1e-17)
+        state = State(now, strange, memory, before=None, pace=ControllerState(0.1, 0.5, True), convolutions=2**40)
+        reached = Checkpoint(state, False, 3, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
         back = load_checkpoint(tmp_path / "c", "key")
         assert repr(replace(back, state=None)) == repr(replace(reached, state=None))
@@ -256,7 +256,7 @@ def after_steps(count):
     """How far a run has come after so many steps of a second."""
     nothing = np.zeros((3, 2))
     at_rest = Sparse.of(nothing)
-    return [Reached(State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
+    return [Checkpoint(State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
 
 
 def last_saved(folder):
@@ -266,13 +266,13 @@ def last_saved(folder):
 
 
 def test_rows__count_with_and_without_fields():
-    reached = Reached(rows=4, converged=False)
+    reached = Checkpoint(rows=4, converged=False)
     assert (reached.noted().rows, reached.noted().converged) == (5, False)
     assert (reached.kept().rows, reached.kept().converged) == (5, True)
 
 
 def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
-    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=1e9, steps=3)
+    keeper = CheckpointWriter(tmp_path / "run", "key", lambda: None, seconds=1e9, steps=3)
     saved = []
     for reached in after_steps(7):
         keeper.passed(reached)
@@ -291,7 +291,7 @@ def test_keeper__takes_no_more_than_a_twentieth_of_the_time(tmp_path, monkeypatc
         write(*given)
 
     monkeypatch.setattr(checkpoint_module, "save_checkpoint", slowly)
-    keeper = Keeper(tmp_path / "run", "key", lambda: None, seconds=30.0)
+    keeper = CheckpointWriter(tmp_path / "run", "key", lambda: None, seconds=30.0)
     saved = []
     for reached in after_steps(20):
         clock[0] += 10.0

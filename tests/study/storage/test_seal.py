@@ -17,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage import trust
-from roughvisc.study.storage.seal import flaw, is_sealed, unsealed
+from roughvisc.study.storage.seal import checksum_error, is_sealed, unsealed
 from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.study.storage.verify import verify
 
@@ -33,7 +33,7 @@ def test_seal__is_the_length_and_the_checksum_of_what_is_before_it(result):
     content, sealed = result.read_bytes()[:-24], result.read_bytes()[-24:]
     assert struct.unpack("<8sQI", sealed[:20]) == (b"rvseal1\n", len(content), zlib.crc32(content))
     assert is_sealed(result)
-    assert flaw(result) == ""
+    assert checksum_error(result) == ""
     assert unsealed(result) == content
 
 
@@ -43,7 +43,7 @@ def test_seal__is_no_matter_to_readers_and_goes_with_what_another_program_writes
         np.testing.assert_array_equal(file["pressure"], whole_result(result)["pressure"])
     with netCDF4.Dataset(result, "a") as file:
         file.note = "mine"
-    assert flaw(result) == ""
+    assert checksum_error(result) == ""
     assert not is_sealed(result)
     assert whole_result(result).attrs["note"] == "mine"
 

@@ -14,7 +14,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.storage import records, store
 from roughvisc.study.storage.encoding import MAY_BE_MISSING
-from roughvisc.study.storage.store import whole_file, whole_result, write_result
+from roughvisc.study.storage.store import atomic_write, whole_result, write_result
 
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
 MISSING = {
@@ -98,21 +98,21 @@ def test_write_result__leaves_nothing_behind_when_it_fails(tmp_path, monkeypatch
 
 
 def test_whole_file__appears_at_the_end_only(tmp_path):
-    with whole_file(tmp_path / "a" / "x.png") as temporary:
+    with atomic_write(tmp_path / "a" / "x.png") as temporary:
         temporary.write_text("new")
         assert temporary.suffix == ".png"
         assert not (tmp_path / "a" / "x.png").exists()
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
 
     def interrupted():
-        with whole_file(tmp_path / "a" / "y.png") as temporary:
+        with atomic_write(tmp_path / "a" / "y.png") as temporary:
             temporary.write_text("half")
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["x.png"]
-    with pytest.raises(InputError, match="cannot be made"), whole_file(tmp_path / "a" / "x.png" / "z.nc"):
+    with pytest.raises(InputError, match="cannot be made"), atomic_write(tmp_path / "a" / "x.png" / "z.nc"):
         pass
 
 

@@ -10,7 +10,7 @@ from support import BALL, run_whole
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import Silence
+from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.table import CASES
@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
     """Results of a sweep of four cases, two of which fail."""
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "balls.toml").write_text(SMALL.replace('"A ball"', '"Bälle, größer"') + SWEEP, encoding="utf-8")
-    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=Silence())
+    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=NullMonitor())
     return folder / "out"
 
 
@@ -85,7 +85,7 @@ def test_table__leaves_out_what_is_not_known(folder, tmp_path):
 
 
 def test_table__names_cases_that_were_not_reached(tmp_path):
-    class Stop(Silence):
+    class Stop(NullMonitor):
         def ended(self, outcome):
             raise KeyboardInterrupt
 

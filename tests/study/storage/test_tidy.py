@@ -13,7 +13,7 @@ from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.lock import STALE, held
 from roughvisc.study.storage.store import write_result
-from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.tidy import clean_folder
 
 KEYS = [f"{i:016x}" for i in range(4)]
 
@@ -43,10 +43,10 @@ def folder(tmp_path):
 
 
 def test_tidy__keeps_results_and_what_a_run_goes_on_from(folder):
-    tidy(folder)
+    clean_folder(folder)
     kept = {f"{KEYS[0]}.nc", f".{KEYS[1]}.unfinished", ".new.1a2b3c4d.part.png", ".mine"}
     assert {path.name for path in folder.iterdir()} == kept | {f"{KEYS[3]}.failed.json", f"{KEYS[3]}.nc.damaged"}
-    assert tidy(folder) == []
+    assert clean_folder(folder) == []
 
 
 def test_clean__removes_all_but_results_if_asked_to(folder, invoke):
@@ -61,9 +61,9 @@ def test_clean__removes_all_but_results_if_asked_to(folder, invoke):
 def test_tidy__leaves_a_case_alone_that_is_being_computed(folder):
     before = {path.name for path in folder.glob(f".{KEYS[0]}.*")}
     with held(folder / f".{KEYS[0]}.lock"):
-        tidy(folder, everything=True)
+        clean_folder(folder, everything=True)
         assert {path.name for path in folder.glob(f".{KEYS[0]}.*")} == before
-    tidy(folder)
+    clean_folder(folder)
     assert not list(folder.glob(f".{KEYS[0]}.*"))
 
 
@@ -86,7 +86,7 @@ def test_lock__does_not_follow_a_link(tmp_path):
     with pytest.raises(InputError, match=r"\.lock: is a link: expected the lock of a run"), held(lock):
         pass
     assert target.read_text() == "mine"
-    assert tidy(tmp_path) == [lock]
+    assert clean_folder(tmp_path) == [lock]
     assert target.exists()
 
 

@@ -15,7 +15,7 @@ from roughvisc.study.statement import identity
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage import checkpoint, versions
 from roughvisc.study.storage.lock import held, lock_path
-from roughvisc.study.storage.tidy import tidy
+from roughvisc.study.storage.tidy import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -134,7 +134,7 @@ def test_clean__removes_the_checkpoints_of_earlier_versions(tmp_path, invoke, ve
         with version("0.0.7", revision):
             left[revision] = interrupted(read_study(path), out)
     assert len(set(left.values())) == 3
-    tidy(out)
+    clean_folder(out)
     assert all(place.is_dir() for place in left.values()), "a sweep leaves them all"
     status, _, err = invoke("run", study(tmp_path, SMALL.replace("5 mN", "7 mN"), "b.toml"), "--out", out, "-q")
     assert status == 0

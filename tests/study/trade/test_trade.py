@@ -23,7 +23,7 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.study.simulation import grid_convergence
 from roughvisc.study.statement.case import vary
-from roughvisc.study.trade.bench import Bench
+from roughvisc.study.trade.bench import TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, closed_form
 from roughvisc.study.trade.files import open_trade, write_trade
 from roughvisc.study.trade.ladder import FLOAT32, Setting, changed, ladder, shape_of
@@ -104,7 +104,7 @@ def test_budget__leaves_out_what_would_take_longer(tmp_path):
 
 def test_budget__stops_a_run_that_takes_longer_than_expected(tmp_path):
     case = case_of(tmp_path, keep__fields=["pressure"])
-    bench = Bench(case, case.height(), tmp_path, 1e4, lambda *_: setattr(bench, "_until", 0.0))
+    bench = TimedRuns(case, case.height(), tmp_path, 1e4, lambda *_: setattr(bench, "_until", 0.0))
     with pytest.raises(rv.RoughviscError, match="stopped when the budget was spent"):
         bench.run(Setting(1e-2))
 
@@ -113,7 +113,7 @@ def test_time__is_the_least_of_three_runs(tmp_path, monkeypatch):
     """What else the machine does only adds to it."""
     monkeypatch.undo()
     case = case_of(tmp_path, keep__fields=["pressure"])
-    bench = Bench(case, case.height(), tmp_path, 1e4, lambda *_: None)
+    bench = TimedRuns(case, case.height(), tmp_path, 1e4, lambda *_: None)
     timed, clock = bench._timed, [3e-3, 1e-3, 2e-3]
     monkeypatch.setattr(bench, "_timed", lambda *given: (clock.pop(0), *timed(*given)[1:]))
     assert bench.run(Setting(1e-1)).seconds == 1e-3
@@ -124,7 +124,7 @@ def test_expected_time__counts_the_window_and_not_the_whole_domain(tmp_path):
     """A contact a twentieth as wide as its domain: all that differs is whether it may reach the border."""
     case = vary(case_of(tmp_path), {"surface.shape": [301, 307], "program.0.load": 1e-5})
     benches = [
-        Bench(vary(case, {"solve.edge": edge}), case.height(), tmp_path, 1e4, print) for edge in ("error", "accept")
+        TimedRuns(vary(case, {"solve.edge": edge}), case.height(), tmp_path, 1e4, print) for edge in ("error", "accept")
     ]
     for bench in benches:
         bench._convolution = 1.0
@@ -138,7 +138,7 @@ def test_reference__that_would_take_too_long_is_refused(tmp_path):
 
 
 def test_settings__finer_than_the_affordable_reference_are_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(Bench, "expected", lambda _self, setting: 1e9 if setting.coarsening < 1 else 0.0)
+    monkeypatch.setattr(TimedRuns, "expected", lambda _self, setting: 1e9 if setting.coarsening < 1 else 0.0)
     ds = measured(case_of(tmp_path), Setting(1e-2), Setting(1e-2, coarsening=0.5), reference="run")
     assert set(ds.reference.values) == {"finest run: tolerance = 2e-3"}
     assert ds.note[0] == ""
@@ -146,7 +146,7 @@ def test_settings__finer_than_the_affordable_reference_are_left_out(tmp_path, mo
 
 
 def test_reference__is_not_on_a_coarser_grid_than_the_study(tmp_path, monkeypatch):
-    monkeypatch.setattr(Bench, "expected", lambda _self, setting: 1e9 if setting.coarsening < 2 else 0.0)
+    monkeypatch.setattr(TimedRuns, "expected", lambda _self, setting: 1e9 if setting.coarsening < 2 else 0.0)
     with pytest.raises(rv.InputError, match=r"would take about 1e\+09 s"):
         measured(case_of(tmp_path), Setting(1e-2), Setting(1e-2, coarsening=2.0), reference="run")
 

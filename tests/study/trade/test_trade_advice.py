@@ -112,9 +112,9 @@ def test_cheapest__takes_none_that_was_not_measured():
 
 
 def test_front__is_what_nothing_beats():
-    assert np.flatnonzero(recommend.front(made_up(), AREA)).tolist() == [2, 3, 4]
+    assert np.flatnonzero(recommend.pareto_front(made_up(), AREA)).tolist() == [2, 3, 4]
     alike = [(Setting(1e-2), 1.0, 0.01), (Setting(1e-3), 2.0, 0.00999), (Setting(1e-4), 3.0, 0.009)]
-    assert recommend.front(made_up(alike), AREA).tolist() == [True, False, True]
+    assert recommend.pareto_front(made_up(alike), AREA).tolist() == [True, False, True]
 
 
 def test_words__name_setting_and_time():

@@ -8,9 +8,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.statement.curve import Curve
+from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.schema.audit import AuditSection
-from roughvisc.study.statement.schema.entries import Text, a_list, optional
+from roughvisc.study.statement.schema.entries import Text, a_list, nullable
 from roughvisc.study.statement.schema.friction import FrictionSection, refuse_beside_friction
 from roughvisc.study.statement.schema.material import AnyMaterial
 from roughvisc.study.statement.schema.meanings import with_meanings
@@ -43,7 +43,7 @@ class Study(Section):
     title: Text = "untitled"
     surface: AnySurface
     material: AnyMaterial
-    friction: optional(FrictionSection) = None
+    friction: nullable(FrictionSection) = None
     program: Annotated[
         tuple[AnySegment, ...] | None,
         BeforeValidator(_segments),
@@ -51,8 +51,8 @@ class Study(Section):
     ] = None
     solve: SolveSection = SolveSection()
     keep: KeepSection = KeepSection()
-    observe: optional(ObserveSection) = Field(None, description="a table")
-    audit: optional(AuditSection) = None
+    observe: nullable(ObserveSection) = Field(None, description="a table")
+    audit: nullable(AuditSection) = None
 
     def loading(self) -> Program:
         """The program as the solver takes it.
@@ -69,7 +69,7 @@ class Study(Section):
             program = segment.extend(program)
         return program
 
-    def experiment(self) -> Program | Curve:
+    def experiment(self) -> Program | SteadySliding:
         """What is done with the surface: a program that presses it, or a curve of speeds at which it slides."""
         return self.loading() if self.friction is None else self.friction.curve()
 
@@ -86,7 +86,7 @@ class Study(Section):
         return Settings(**dict(self.solve), fields=self.keep.fields, times=times, missing=self.surface.missing)
 
     @model_validator(mode="after")
-    def _goes_together(self) -> Study:
+    def _check_consistency(self) -> Study:
         if self.friction is not None:
             refuse_beside_friction(self.solve, self.keep, self.surface.missing)
             return self

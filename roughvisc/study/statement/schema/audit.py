@@ -7,7 +7,7 @@ from typing import Any, get_args
 from pydantic import create_model, model_validator
 
 from roughvisc.mechanics.halfspace.sheet import Base
-from roughvisc.study.statement.schema.entries import choice, measured, optional
+from roughvisc.study.statement.schema.entries import choice, measured, nullable
 from roughvisc.study.statement.schema.section import Section, refuse
 
 #: key -> unit, and the bounds of its values
@@ -40,5 +40,5 @@ AuditSection: type[Section] = create_model(
     "AuditSection",
     __base__=_Stated,
     __doc__=_Stated.__doc__,
-    **{key: (optional(kind), None) for key, kind in _KINDS.items()},
+    **{key: (nullable(kind), None) for key, kind in _KINDS.items()},
 )

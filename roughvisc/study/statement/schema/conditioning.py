@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, optional, paired, shown, whole
+from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, nullable, paired, shown, whole
 from roughvisc.study.statement.schema.section import Section
 from roughvisc.study.statement.settings import WORDS, Settings
 from roughvisc.topography.arguments import FILL, KEEP, ORDER, TURNS, WINDOW, Argument
@@ -52,8 +52,8 @@ def _argument(argument: Argument, schema: dict[str, Any], when_true: Any = None)
 class Crop(Section):
     """The part of the scan that is used."""
 
-    x: optional(LIMITS) = None
-    y: optional(LIMITS) = None
+    x: nullable(LIMITS) = None
+    y: nullable(LIMITS) = None
 
 
 class Outliers(Section):
@@ -98,8 +98,8 @@ def _filter(value: Any) -> Any:
 class Prepared(Section):
     """What every face may have done to it; the steps act in the order of surface cards, which is this one."""
 
-    crop: optional(Crop) = None
-    rotate90: optional(_argument(TURNS, {"type": "integer"})) = None
+    crop: nullable(Crop) = None
+    rotate90: nullable(_argument(TURNS, {"type": "integer"})) = None
     invert: Flag = False
     level: _argument(ORDER, {"type": ["boolean", "integer"]}, 1) = False
     outliers: either(_outliers, ["boolean", "object"], _OUTLIERS, Outliers) = False
@@ -114,9 +114,9 @@ class Prepared(Section):
 class Conditioned(Prepared):
     """What every surface may have done to it: the steps of a face, then those of the profile that is pressed."""
 
-    band_limit: optional(SHAPE) = None
-    resample: optional(SHAPE) = None
-    taper: optional(SIZE) = None
+    band_limit: nullable(SHAPE) = None
+    resample: nullable(SHAPE) = None
+    taper: nullable(SIZE) = None
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 

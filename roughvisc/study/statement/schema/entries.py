@@ -49,19 +49,19 @@ def measured(
     return Annotated[float, BeforeValidator(check), WithJsonSchema(schema), Field(description=wanted), Unit(unit)]
 
 
-def checked(kind: Any, value: Any) -> Any:
+def validate(kind: Any, value: Any) -> Any:
     """The value as the check of a kind leaves it."""
     return kind.__metadata__[0].func(value)
 
 
-def word_or(word: str, kind: Any, wanted: str) -> Any:
+def literal_or(word: str, kind: Any, wanted: str) -> Any:
     """Kind: a word, or a quantity of another kind."""
 
     def check(value: Any) -> Any:
         if value == word:
             return value
         try:
-            return checked(kind, value)
+            return validate(kind, value)
         except InputError:
             raise InputError(f"found {shown(value)}: expected {wanted}") from None
 
@@ -104,7 +104,7 @@ def paired(kind: Any, name: str) -> Any:
     def spread(value: Any) -> Any:
         if isinstance(value, list | tuple):
             return a_list(value, wanted, 2)
-        checked(kind, value)  # so that a problem is told of the value that was written
+        validate(kind, value)  # so that a problem is told of the value that was written
         return (value, value)
 
     return Annotated[tuple[kind, kind], BeforeValidator(spread), Field(description=wanted)]
@@ -142,7 +142,7 @@ def flag(value: Any) -> bool:
 Flag = Annotated[bool, BeforeValidator(flag), Field(description="true or false")]
 
 
-def optional(kind: Any) -> Any:
+def nullable(kind: Any) -> Any:
     """Kind: the same, or nothing; without a union, whose errors name branches that no user knows of."""
     return Annotated[kind, WrapValidator(lambda value, check: None if value is None else check(value))]
 

@@ -9,15 +9,15 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, mod
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import INSTEAD
-from roughvisc.study.statement.curve import DIRECTIONS, Curve
+from roughvisc.study.statement.curve import DIRECTIONS, SteadySliding
 from roughvisc.study.statement.schema.entries import (
     Flag,
     Unit,
-    checked,
     choice,
     measured,
-    optional,
+    nullable,
     shown,
+    validate,
     whole,
 )
 from roughvisc.study.statement.schema.section import Section, refuse
@@ -46,11 +46,11 @@ def _speeds(value: Any, info: ValidationInfo) -> tuple[float, ...]:
             raise InputError(f"found from {ends.from_:g} to {ends.to:g} m/s: expected the lower end first")
         found = np.geomspace(ends.from_, ends.to, ends.count).tolist()
     elif isinstance(value, list | tuple):
-        found = [checked(_SPEED, one) for one in value]
+        found = [validate(_SPEED, one) for one in value]
         if not 0 < len(found) <= _MOST_SPEEDS:
             raise InputError(f"found {len(found)} speeds: expected 1 to {_MOST_SPEEDS}")
     elif isinstance(value, str | int | float) and not isinstance(value, bool):
-        found = [checked(_SPEED, value)]
+        found = [validate(_SPEED, value)]
     else:
         raise InputError(f"found {shown(value)}: expected {_WANTED}")
     return tuple(sorted({float(f"{speed:.12g}") for speed in found}))
@@ -68,10 +68,10 @@ class FrictionSection(Section):
         Field(description=_WANTED),
         Unit("m/s"),
     ]
-    load: optional(measured("N", above=0, instead=INSTEAD["load"])) = None
-    pressure: optional(measured("Pa", above=0, instead=INSTEAD["pressure"])) = None
-    direction: choice(*DIRECTIONS) = Curve.direction
-    last_octave: Flag = Curve.last_octave
+    load: nullable(measured("N", above=0, instead=INSTEAD["load"])) = None
+    pressure: nullable(measured("Pa", above=0, instead=INSTEAD["pressure"])) = None
+    direction: choice(*DIRECTIONS) = SteadySliding.direction
+    last_octave: Flag = SteadySliding.last_octave
 
     @model_validator(mode="after")
     def _has_one_load(self) -> FrictionSection:
@@ -81,9 +81,9 @@ class FrictionSection(Section):
             raise refuse("pressure", "found beside load: expected one of them")
         return self
 
-    def curve(self) -> Curve:
+    def curve(self) -> SteadySliding:
         """What is asked, as the solver takes it."""
-        return Curve(**dict(self))
+        return SteadySliding(**dict(self))
 
 
 def refuse_beside_friction(solve: SolveSection, keep: KeepSection, missing: str) -> None:

@@ -17,9 +17,9 @@ from roughvisc.mechanics.halfspace.kernel import Kernel
 from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.temperature import shifted
-from roughvisc.study.statement.body import BASE, body
+from roughvisc.study.statement.body import BASE, make_body
 from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
-from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, optional, shown
+from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
 from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.study.statement.schema.temperature import shift_factor
@@ -169,7 +169,7 @@ class MaterialSection(Section):
         """What its surface does under pressure: a half-space's, or a sheet's."""
         if self.sheet == dict.fromkeys(THICKNESS):  # a half-space asks nothing of the material, which may take a fit
             return HALF_SPACE
-        return body(self.build(), **self.sheet)
+        return make_body(self.build(), **self.sheet)
 
     @property
     def sheet(self) -> dict[str, Any]:
@@ -216,12 +216,12 @@ def _section(name: str) -> type[MaterialSection]:
             default = None  # missing with a file, and asked for by _with_columns without one
         elif default is inspect.Parameter.empty:
             default = ...
-        fields[key] = (optional(kind) if default is None else kind, default)
+        fields[key] = (nullable(kind) if default is None else kind, default)
     if columns:
-        fields["file"] = (optional(FilePath), None)
+        fields["file"] = (nullable(FilePath), None)
         keys = {column.unit_key for column in columns.values()} - {"", *kinds}
-        fields |= {key: (optional(Text), None) for key in sorted(keys)}
-    fields |= {key: (optional(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS}.items()}
+        fields |= {key: (nullable(Text), None) for key in sorted(keys)}
+    fields |= {key: (nullable(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS}.items()}
     return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
 
 

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.resistivity import WANTED, Kind, resistivities
-from roughvisc.study.statement.schema.entries import choice, measured, optional
+from roughvisc.study.statement.schema.entries import choice, measured, nullable
 from roughvisc.study.statement.schema.section import Section, refuse
 
 
@@ -37,7 +37,7 @@ class LeakageTable(Observable):
     viscosity: measured("Pa s", above=0) = 1e-3
     pressure_drop: measured("Pa", above=0) = 1e5
     along: choice("x", "y") = "x"
-    sides: optional(choice("closed", "periodic")) = None
+    sides: nullable(choice("closed", "periodic")) = None
 
     def problem(self, boundary: str) -> tuple[str, str] | None:
         if self.sides == "periodic" and boundary != "periodic":
@@ -51,7 +51,7 @@ class ConductanceTable(Observable):
     NEEDS = ("pressure", "gap")
 
     resistivity: Annotated[tuple[float, float], Field(description=WANTED)]
-    kind: optional(choice(*get_args(Kind))) = None
+    kind: nullable(choice(*get_args(Kind))) = None
 
     @model_validator(mode="before")
     @classmethod
@@ -68,8 +68,8 @@ class ConductanceTable(Observable):
 class ObserveSection(Section):
     """What is derived from the result."""
 
-    leakage: optional(LeakageTable) = Field(None, description="a table")
-    conductance: optional(ConductanceTable) = Field(None, description="a table")
+    leakage: nullable(LeakageTable) = Field(None, description="a table")
+    conductance: nullable(ConductanceTable) = Field(None, description="a table")
 
     def asked(self) -> Iterator[tuple[str, Observable]]:
         """Name and table of each observable that is asked for."""

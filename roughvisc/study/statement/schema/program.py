@@ -23,7 +23,16 @@ from roughvisc.mechanics.stepping.segment import Control
 from roughvisc.mechanics.stepping.words import INSTEAD
 from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
-from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, shown, word_or
+from roughvisc.study.statement.schema.entries import (
+    FilePath,
+    Text,
+    choice,
+    listed,
+    literal_or,
+    located,
+    measured,
+    shown,
+)
 from roughvisc.study.statement.schema.section import Section, close, of_file
 
 LOAD = measured("N", least=0, instead=INSTEAD["load"])
@@ -179,7 +188,7 @@ class _Recording(Section):
 
     file: FilePath
     time: Text = "time"
-    start: word_or("first", measured("s"), "'first', or a time in s") = "first"
+    start: literal_or("first", measured("s"), "'first', or a time in s") = "first"
     end: measured("s") | None = None
     factor: measured("1") = 1.0
     decimal: choice(".", ",") | None = None

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema.entries import Flag, a_list, checked, choice, measured, shown, whole, word_or
+from roughvisc.study.statement.schema.entries import Flag, a_list, choice, literal_or, measured, shown, validate, whole
 from roughvisc.study.statement.schema.section import Section, nearest
 from roughvisc.study.statement.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
 from roughvisc.units import range_in_words
@@ -21,11 +21,11 @@ def _times(value: Any) -> Any:
     if value == "all":
         return value
     if isinstance(value, int) and not isinstance(value, bool):
-        return checked(whole(1, MOST_TIMES), value)
+        return validate(whole(1, MOST_TIMES), value)
     instants = a_list(value, _TIMES_WANTED)
     if not instants:
         raise InputError(f"found an empty list: expected {_TIMES_WANTED}")
-    return tuple(sorted({checked(_INSTANT, instant) for instant in instants}))
+    return tuple(sorted({validate(_INSTANT, instant) for instant in instants}))
 
 
 def _fields(value: Any) -> Any:
@@ -48,7 +48,7 @@ def _kind(name: str) -> Any:
     if name not in WORD_OR_NUMBER:
         return number
     word = WORD_OR_NUMBER[name]
-    return word_or(word, number, f"{word!r}, or {entry.noun} in {entry.unit}{range_in_words(**entry.bounds)}")
+    return literal_or(word, number, f"{word!r}, or {entry.noun} in {entry.unit}{range_in_words(**entry.bounds)}")
 
 
 SolveSection = create_model(

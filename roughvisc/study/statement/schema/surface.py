@@ -16,7 +16,7 @@ from roughvisc.study.statement.schema.entries import (
     Text,
     choice,
     measured,
-    optional,
+    nullable,
     paired,
     shown,
     whole,
@@ -46,7 +46,7 @@ def _kind(recipe: str, key: str, default: Any) -> Any:
     if recipe == "self_affine" and key == "shape":
         return SHAPE  # roughness needs waves both ways
     kind = _KINDS[key] if key in _KINDS else _LENGTH_OR_RATIO[UNITS[key]]
-    return optional(kind) if default is None else kind
+    return nullable(kind) if default is None else kind
 
 
 #: name of a recipe -> the kind of each of its keys, and its default (``...``: none)
@@ -77,11 +77,11 @@ class FromFile(Raw):
     """An instrument file or a surface card."""
 
     file: FilePath
-    format: optional(Text) = None
+    format: nullable(Text) = None
     channel: either(_channel, ["string", "integer"], _CHANNEL) = None
-    unit: optional(Text) = None
-    height_unit: optional(Text) = None
-    spacing: optional(SIZE) = None
+    unit: nullable(Text) = None
+    height_unit: nullable(Text) = None
+    spacing: nullable(SIZE) = None
 
     def raw(self) -> xr.DataArray:
         from roughvisc.topography.scans import open_scan
@@ -165,7 +165,7 @@ AnySecond = Annotated[
 class SurfaceSection(Conditioned, Raw):
     """A surface, what is done to its heights, and the face that lies on it if there is one."""
 
-    second: optional(AnySecond) = None
+    second: nullable(AnySecond) = None
 
     def height(self) -> xr.DataArray:
         """The heights as conditioned, peaks up; of two faces: their sum. [m]"""

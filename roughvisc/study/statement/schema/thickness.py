@@ -8,7 +8,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.mechanics.halfspace.sheet import Base
-from roughvisc.study.statement.schema.entries import Unit, checked, choice, measured
+from roughvisc.study.statement.schema.entries import Unit, choice, measured, validate
 
 _THICKNESS = measured("m", above=0)
 
@@ -16,7 +16,7 @@ _THICKNESS = measured("m", above=0)
 def _thickness(value: Any) -> float:
     """A length, or an infinite one: a half-space among the sheets of a sweep."""
     endless = isinstance(value, float) and value == math.inf
-    return math.inf if endless else float(checked(_THICKNESS, value))
+    return math.inf if endless else float(validate(_THICKNESS, value))
 
 
 #: key -> its kind; every model takes them, and a half-space has none of them
