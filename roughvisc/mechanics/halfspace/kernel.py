@@ -33,12 +33,17 @@ class Kernel(Protocol):
 
     Attributes
     ----------
-    bulges : bool
+    raises_surface : bool
         Whether pressure may raise the surface anywhere. Where it may not, nothing that lies deeper than the approach
         touches, and the contact in free space is followed by a window. Default: it may.
     """
 
     raises_surface: bool = True
+
+    def __init_subclass__(cls, *args: Any, **settings: Any) -> None:
+        super().__init_subclass__(*args, **settings)
+        if "bulges" in cls.__dict__:  # until release 0.1.0
+            raise InputError(f"{cls.__name__}: bulges is now raises_surface: expected that name")
 
     @abstractmethod
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:

@@ -2,7 +2,7 @@
 
 Pressure is not negative, and where the kernel does not bulge it pushes the surface away everywhere: beyond the window
 the gap exceeds the undeformed gap less the approach. As long as that is positive at the lowest place outside, no
-contact there is missed. Under a kernel that bulges there is no window.
+contact there is missed. Under a kernel that raises the surface there is no window.
 """
 
 from __future__ import annotations

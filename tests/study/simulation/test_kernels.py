@@ -198,3 +198,9 @@ def test_a_kernel_with_a_mean__has_an_approach_under_uniform_pressure(control):
     assert float(ds.approach[0]) == pytest.approx(full, rel=1e-3)
     assert float(ds.force[0]) == pytest.approx(load, rel=1e-3)
     assert float(ds.contact_fraction[0]) == 1
+
+
+def test_kernel__with_an_older_name_is_refused():
+    """It would count as one that raises the surface, and lose its window without a word."""
+    with pytest.raises(rv.InputError, match="Mattress: bulges is now raises_surface"):
+        type("Mattress", (Kernel,), {"bulges": False})
