@@ -77,6 +77,13 @@ def carrying(root: xr.Dataset, groups: dict[str, xr.Dataset]) -> xr.Dataset:
     return root
 
 
+def with_groups_of(root: xr.Dataset, dataset: xr.Dataset) -> xr.Dataset:
+    """A Dataset that xarray alone has opened, or a selection of it, carrying the groups of the same root."""
+    found = dataset.copy(deep=False)
+    found.encoding = {**dataset.encoding, _CARRIED: root.encoding[_CARRIED]}
+    return found
+
+
 def groups_of(root: xr.Dataset) -> dict[str, xr.Dataset]:
     """The groups that a root carries."""
     return root.encoding[_CARRIED][1] if _CARRIED in root.encoding else {}

@@ -131,6 +131,17 @@ def test_file__has_the_groups_and_gives_them_back(ball, tmp_path):
         assert set(tree.children) == set(GROUPS)
 
 
+def test_file__that_xarray_alone_has_opened_gives_its_groups(ball, heavier, tmp_path):
+    paths = [write_result(one, tmp_path / f"{name}.nc") for name, one in (("ball", ball), ("heavier", heavier))]
+    with xr.open_dataset(paths[0]) as plain, xr.open_dataset(paths[1]) as other:
+        xr.testing.assert_equal(plain.roughvisc.accuracy, ball.roughvisc.accuracy)
+        xr.testing.assert_equal(plain.isel(time=-1).roughvisc.cost, ball.isel(time=-1).roughvisc.cost)
+        assert plain.roughvisc.steps.sizes == ball.roughvisc.steps.sizes
+        together = xr.concat([plain.isel(time=[-1]), other.isel(time=[-1])], "time", data_vars="minimal")
+        with pytest.raises(InputError, match="carries no group 'cost'"):
+            _ = together.roughvisc.cost
+
+
 def test_variables__refer_to_those_of_their_own_group(ball):
     for part in split(whole_of(ball)).values():
         named = [one.attrs.get("ancillary_variables", "").split() for one in part.variables.values()]

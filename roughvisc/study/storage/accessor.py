@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from roughvisc.groups import group_of
+from roughvisc.groups import group_of, groups_of, with_groups_of
 
 #: Before the name of a figure.
 _PLOT = "plot_"
 #: Module that gives a result of a former version the names of today.
 _FORMATS = "roughvisc.study.storage.formats"
+#: Module that opens a result.
+_STORE = "roughvisc.study.storage.store"
 #: beginning of a method's name -> module whose public names follow
 _ROOMS = {"": "roughvisc.views.observables", _PLOT: "roughvisc.views.plot"}
 
@@ -39,17 +42,24 @@ class ResultAccessor:
     @property
     def steps(self) -> xr.Dataset:
         """Histories of every accepted step, over ``step``."""
-        return group_of(self._dataset, "steps")
+        return self._group("steps")
 
     @property
     def accuracy(self) -> xr.Dataset:
         """Stated errors of the rows, the parts of them, and bounds of the contact area."""
-        return group_of(self._dataset, "accuracy")
+        return self._group("accuracy")
 
     @property
     def cost(self) -> xr.Dataset:
         """Iterations and convolutions since the row before, and the time since the start."""
-        return group_of(self._dataset, "cost")
+        return self._group("cost")
+
+    def _group(self, name: str) -> xr.Dataset:
+        """A group, from the file where xarray alone has opened it."""
+        dataset, source = self._dataset, Path(self._dataset.encoding.get("source", ""))
+        if not groups_of(dataset) and source.is_file():
+            dataset = with_groups_of(import_module(_STORE).open_result(source), dataset)
+        return group_of(dataset, name)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # what notebooks and copies ask every object for
