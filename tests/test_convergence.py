@@ -137,6 +137,7 @@ def test_no_instantaneous_compliance__approach_of_second_order_on_graded_steps(n
     assert orders(MATERIALS[name], PROGRAMS[program], graded, counts)[1] > 1.7
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["zener_equal", "kelvin_voigt", pytest.param("maxwell", marks=pytest.mark.thorough)])
 def test_opening_and_closing__approach_of_second_order(name):
     assert orders(MATERIALS[name], PROGRAMS["opening"], graded, (16, 32, 64))[1] > 1.7

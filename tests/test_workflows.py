@@ -19,7 +19,14 @@ APART = ("stability_map", "creeping_seal", "friction", "stop_and_go")
 STUDIES = sorted(path for path in FOLDER.glob("*.toml") if path.stem not in APART)
 
 
-@pytest.mark.parametrize("path", STUDIES, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        path if path.stem in ("quickstart", "load_sweep") else pytest.param(path, marks=pytest.mark.thorough)
+        for path in STUDIES
+    ],
+    ids=lambda p: p.stem,
+)
 def test_study__runs(path, tmp_path):
     for case in read_cases(path):
         ds = run(case, tmp_path, progress=False)

@@ -35,6 +35,7 @@ def test_campaign__finds_no_fault(kind, count, tmp_path):
     assert all(one.differs and one.change for one in outcomes if one.end == "other")
 
 
+@pytest.mark.thorough
 @needs_fork
 def test_campaign__finds_no_fault_in_runs_that_are_killed(tmp_path, monkeypatch):
     monkeypatch.setattr("killed_runs._WAYS", ("operation", "function", "command"))

@@ -268,6 +268,7 @@ def test_given_approach__is_finite_down_to_rounding(approach, shape, boundary, t
     assert state.load > 0
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("error")
 def test_given_approach__near_full_contact_is_finite_where_the_kernel_is_singular():
     """A uniform step displaces nothing with periodic boundaries: its curvature is that of rounding, or none."""

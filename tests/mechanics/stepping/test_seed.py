@@ -33,7 +33,7 @@ def test_coded_gradients__reach_hertz():
     assert found.level == pytest.approx(exact.approach, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", ["maxwell", "zener"])
+@pytest.mark.parametrize("name", ["zener", pytest.param("maxwell", marks=pytest.mark.thorough)])
 def test_seed_and_fast__agree_as_both_are_refined(name):
     material = MATERIALS[name]
 

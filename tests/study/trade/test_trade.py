@@ -186,7 +186,9 @@ def test_all_times__become_common_ones(tmp_path):
             {"surface": {"generate": "cone", "slope": 0.02, "size": [2e-3, 1.9e-3], "shape": [41, 38]}},
             marks=pytest.mark.thorough,
         ),
-        {"program": [{"load": 0.05, "over": 0.1}, {"load": 0.1, "over": 0.1}]},
+        pytest.param(
+            {"program": [{"load": 0.05, "over": 0.1}, {"load": 0.1, "over": 0.1}]}, marks=pytest.mark.thorough
+        ),
     ],
     ids=["33 x 31", "48 x 44", "cone", "ramps"],
 )

@@ -68,7 +68,14 @@ DRAWN = [(name, sample) for name, sample in DRAWN if name in OF_THE_PLANE or not
 DRAWN = [(name, sample) for name, sample in DRAWN if sample in FLOWS.get(name, SAMPLES)]
 
 
-@pytest.mark.parametrize(("name", "sample"), DRAWN)
+def _members():
+    """Two histories and a strip of every figure, and of those of the plane all samples, in the default suite."""
+    for name, sample in DRAWN:
+        quick = sample in ("rough", "open", "thin strip") or name in ("section", "maps")
+        yield (name, sample) if quick else pytest.param(name, sample, marks=pytest.mark.thorough)
+
+
+@pytest.mark.parametrize(("name", "sample"), list(_members()))
 def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
     figure = FIGURES[name](SAMPLES[sample]())
     assert isinstance(figure, Figure)

@@ -216,6 +216,7 @@ def test_fifty_cases__stay_below_ten_megabytes(tmp_path, monkeypatch, count):
     assert min(len(view["frames"]) for view in views(text)) >= 3
 
 
+@pytest.mark.thorough
 def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
     loads = ["1 mN", "2 mN"]
     for number, load in enumerate(loads):
@@ -231,6 +232,7 @@ def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
     assert 'title="program.0.load"' not in text
 
 
+@pytest.mark.thorough
 def test_datasets__without_a_study_say_so(tmp_path):
     out = report(made.rough_creep(), tmp_path / "one.html")
     assert "does not record the whole computation" in out.read_text()
