@@ -218,7 +218,7 @@ def test_load_beyond_the_grid__is_refused():
         simulate(rv.from_array(BALL.values, 0.1), ZENER, rv.Program().load(1e12, over=0))
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1e-6, 1e3])
+@pytest.mark.parametrize("scale", [1e-9, 1e3, pytest.param(1e-6, marks=pytest.mark.thorough)])
 def test_lengths__are_neutral(scale):
     """Nanometres to kilometres, at the same modulus: loads scale with the square."""
     runs = []

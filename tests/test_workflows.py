@@ -69,6 +69,7 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+@pytest.mark.thorough
 def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(FOLDER))
     figure = importlib.import_module("thin_sheet").main(cells=21, figure=tmp_path / "figure.png")

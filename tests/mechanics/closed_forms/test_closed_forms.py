@@ -332,7 +332,9 @@ REDUCED = {
 
 
 @pytest.mark.parametrize("name", REDUCED)
-@pytest.mark.parametrize("indenter", [SPHERE, cf.Cone(0.3)], ids=["sphere", "cone"])
+@pytest.mark.parametrize(
+    "indenter", [SPHERE, pytest.param(cf.Cone(0.3), marks=pytest.mark.thorough)], ids=["sphere", "cone"]
+)
 def test_reduced_contact__growth_is_lee_radok(name, indenter):
     times = [0.1, 1.0, 10.0]
     step = Program().load(1.0, over=0.0).hold(10.0)

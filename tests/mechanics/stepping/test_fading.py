@@ -87,7 +87,7 @@ PROGRAMS = {
 
 
 @pytest.mark.parametrize("what", PROGRAMS)
-@pytest.mark.parametrize("name", ["zener", "three"])
+@pytest.mark.parametrize("name", ["three", pytest.param("zener", marks=pytest.mark.thorough)])
 def test_one_kept_time__costs_less_and_is_as_right_as_asked(name, what, monkeypatch):
     made = scene(replace(SERIES[name], glassy=0.5), PROGRAMS[what], shape=(27, 24), tolerance=1e-3)
     last = list(march(replace(made, times=(2.0,))))[-1]

@@ -95,7 +95,10 @@ def said_of(planned):
     return " ".join(console.export_text().split())
 
 
-@pytest.mark.parametrize("name", GROWING)
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ("window", "jump") else pytest.param(name, marks=pytest.mark.thorough) for name in GROWING],
+)
 def test_plan__foresees_the_grid_in_the_end_and_the_work_till_then(study, convolved, name):
     case = study(HEAD + GROWING[name])
     planned = rv.plan([case]).isel(case=0)

@@ -17,7 +17,7 @@ SLOW = {"Ting", "histories"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long if n in SLOW else ()) for n in CASES])
-@pytest.mark.parametrize("cells", [33, 52])
+@pytest.mark.parametrize("cells", [33, pytest.param(52, marks=pytest.mark.thorough)])
 def test_case__is_within_what_is_expected(name, cells):
     found = rv.validate(cells, cases=[name])
     assert found
