@@ -395,6 +395,7 @@ def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_p
     assert [p.name for p in tmp_path.iterdir()] == ["tilted.nc"]
 
 
+@pytest.mark.thorough
 def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures):
     from sample_results import rough_creep
 

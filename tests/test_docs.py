@@ -84,6 +84,7 @@ def test_studies__are_accepted(path, there):
             assert case.material().contact_compliance(1.0) > 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("path", [p for p in PAGES if blocks(p, "python")], ids=named)
 def test_python__runs(path, there):
     for text in blocks(path, "toml")[:1]:

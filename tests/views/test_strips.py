@@ -67,6 +67,7 @@ def test_strip__deformed_surface_has_the_strips_cells(strip):
     assert float(rv.parameters(surface).Sz) < float(rv.parameters(strip.height).Sz)
 
 
+@pytest.mark.thorough
 def test_strip__in_the_report_and_in_the_table_of_a_scan(strip, tmp_path):
     along_x = strip.sizes["y"] == 1
     page = rv.report(strip, tmp_path / "strip.html").read_text(encoding="utf-8")

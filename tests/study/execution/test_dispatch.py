@@ -357,6 +357,7 @@ def test_told__is_seen_whoever_watches(capsys):
     assert capsys.readouterr().err == "roughvisc: no worker\nno worker\n"
 
 
+@pytest.mark.thorough
 def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
     """SIGTERM reaches every process of a job; another worker goes on from where the case was then."""
     (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))

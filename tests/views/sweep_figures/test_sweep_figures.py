@@ -381,6 +381,7 @@ def test_files__of_a_folder(folder, tmp_path):
     assert results_of(tmp_path) is None
 
 
+@pytest.mark.thorough
 def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures):
     from click.testing import CliRunner
 
