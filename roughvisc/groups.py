@@ -53,6 +53,7 @@ def split(whole: xr.Dataset) -> dict[str, xr.Dataset]:
 
 def _with_references_inside(part: xr.Dataset) -> xr.Dataset:
     """A part of a result whose variables refer to variables of this part alone."""
+    part = part.copy(deep=False)  # its variables may be those of the whole, whose attributes stay
     for name, one in part.variables.items():
         if stated := one.attrs.get("ancillary_variables"):
             others = [other.removeprefix(_PREFIX) if "step" in one.dims else other for other in stated.split()]
@@ -143,11 +144,15 @@ def group_of(dataset: xr.Dataset, group: str) -> xr.Dataset:
     """
     if group not in GROUPS:
         raise InputError(f"group is {group!r}: expected one of {', '.join(GROUPS)}")
-    whole = whole_of(dataset)
-    found = split(whole).get(group)
-    every_step = [name for name in STEPPED if name in whole]
-    if found is None and group == "steps" and every_step and "time" in whole.dims:
-        rows = whole[every_step]
+    rows, found = rows_of(dataset.variables), None
+    if not _is_known(dataset, rows):
+        found = split(dataset).get(group)
+    elif group in groups_of(dataset):
+        found = _selected(groups_of(dataset)[group], dataset, rows)
+    every_step = [name for name in STEPPED if name in dataset]
+    if found is None and group == "steps" and every_step and "time" in dataset.dims:
+        whole = whole_of(dataset)
+        rows = whole[[name for name in STEPPED if name in whole]]
         rows = rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
         found = rows.drop_indexes("time").rename_dims(time="step")
         found.encoding, found.attrs = {}, {"title": GROUPS[group]}

@@ -238,3 +238,29 @@ def test_new_variable__touches_two_files(tmp_path):
     command = [sys.executable, "-c", NEW_VARIABLE, study, tmp_path / "out"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_group__leaves_the_attributes_of_its_whole(ball):
+    whole = whole_of(ball).copy()
+    whole.encoding = {}
+    whole["force"].attrs["ancillary_variables"] = "force_error"
+    assert "force_error" in group_of(whole, "accuracy")
+    assert whole["force"].attrs["ancillary_variables"] == "force_error"
+
+
+def test_result_rewritten_without_its_groups__is_summed_up_all_the_same(tmp_path):
+    """xarray alone reads and writes the root of a file."""
+    study = tmp_path / "ball.toml"
+    study.write_text((FORMER.parent / "format_1" / "slide.toml").read_text())
+    path = rv.run(study, progress=False).encoding["source"]
+    with xr.open_dataset(path, decode_timedelta=False) as plain:
+        plain.load()
+    plain.to_netcdf(path)
+    command = [sys.executable, "-m", "roughvisc", "run", study, "--no-plots"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "Force at the end" in done.stdout
+    assert "Cost" not in done.stdout
+    assert rv.open_result(path).status.size > 1
+    with pytest.raises(InputError, match="carries no group 'cost'"):
+        rv.open_result(path, group="cost")

@@ -182,9 +182,8 @@ def adapt_tolerance_share(scene: Scene, before: State, state: State, ahead: floa
 def _used(scene: Scene, state: State) -> float:
     """What is stated of a state, over the tolerance."""
     unknown = state.uncertainty
-    if scene.lacks_instantaneous_compliance(
-        scene.program.duration
-    ):  # pressure and force jump with every cell that enters
+    # pressure and force jump with every cell that enters
+    if scene.lacks_instantaneous_compliance(scene.program.duration):
         unknown = replace(unknown, pressure=0.0, force=0.0)
     return unknown.relative(state.largest_force, state.largest_approach) / scene.tolerance
 

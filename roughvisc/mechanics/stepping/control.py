@@ -116,11 +116,8 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
     if length >= distance * (1 - 1e-9):
         # steps go in pairs up to what is shown: a single one would not tell what it got wrong
         single = state.behind == 0 and event == end and (state.before is None or scene.keeps(end))
-        return (
-            distance / 2
-            if single and remaining_creep_fraction(scene, distance) > _NOT_SEEN * scene.tolerance
-            else distance
-        )
+        seen = remaining_creep_fraction(scene, distance) > _NOT_SEEN * scene.tolerance
+        return distance / 2 if single and seen else distance
     return distance / 2 if length > distance / 2 else length
 
 
@@ -195,9 +192,8 @@ def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: 
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
     difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.halfspace.threads)
-    pressure_error = (
-        difference * scene.halfspace.cell_area / force if force > 0 and not state.pace.ignore_pressure_error else 0.0
-    )
+    counts = force > 0 and not state.pace.ignore_pressure_error
+    pressure_error = difference * scene.halfspace.cell_area / force if counts else 0.0
     ratio = trial.length / last
     if segment.control == "load":
         found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach

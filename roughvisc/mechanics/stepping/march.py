@@ -267,10 +267,8 @@ def _estimate_error(
     step = with_error_estimate(scene, step, companion_trial, state.companion.now.contact, asked)
     if companion_trial.length > trial.length:
         ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
-        return replace(
-            step,
-            state=adapt_tolerance_share(scene, state, step.state, ahead, 1.0 if asked else remaining(scene, accepted)),
-        )
+        left = 1.0 if asked else remaining(scene, accepted)
+        return replace(step, state=adapt_tolerance_share(scene, state, step.state, ahead, left))
     return with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
 
 

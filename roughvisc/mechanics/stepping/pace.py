@@ -58,11 +58,9 @@ class ControllerState:
         Where it was accepted since shortening was in vain, the pressure has jumped: the next estimate would see that
         jump once more.
         """
-        ignore_pressure_error = self.shortening_failed(error) and error > allowed
+        ignored = self.shortening_failed(error) and error > allowed
         rejected_error = self.rejected_error if fresh else math.inf
-        return replace(
-            self, suggestion=suggestion, ignore_pressure_error=ignore_pressure_error, rejected_error=rejected_error
-        )
+        return replace(self, suggestion=suggestion, ignore_pressure_error=ignored, rejected_error=rejected_error)
 
     def with_pressure_error(self) -> ControllerState:
         """After a step: the next estimate sees the pressure."""

@@ -257,14 +257,8 @@ def run_on(
     watch = ProgressForwarder(progress) if callable(progress) else watcher(progress)
     book = SweepLog(folder, {case.key: case}, {}, watch, [])
     try:
-        distribute(
-            {case.key: serialize_with_inputs(case, folder / INPUTS)},
-            book,
-            client,
-            threads,
-            client.dashboard_link,
-            same_bits,
-        )
+        packed = {case.key: serialize_with_inputs(case, folder / INPUTS)}
+        distribute(packed, book, client, threads, client.dashboard_link, same_bits)
     finally:
         watch.close()
     outcome = book.outcomes[case.key]

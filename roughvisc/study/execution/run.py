@@ -31,11 +31,11 @@ from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import (
     is_writable,
+    open_result,
     partial_files,
     quarantine,
     require_writable,
     result_path,
-    whole_result,
     write_result,
 )
 from roughvisc.study.storage.trust import warn_once
@@ -294,7 +294,7 @@ def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
     """Whether a file is the whole result of a case, and on request of the transforms that are here."""
     if not path.exists() or _problem(case, path):
         return False
-    with whole_result(path) as dataset:
+    with open_result(path) as dataset:
         made_with = str(dataset.attrs.get("transforms", ""))
     if made_with != transform_library():
         warn_once(path, f"{path}: {other_transforms([made_with])}")
@@ -305,7 +305,7 @@ def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
 def _problem(case: Case, path: Path) -> str:
     """Why a file is not the whole result of a case; empty if it is."""
     try:
-        with whole_result(path) as dataset:
+        with open_result(path) as dataset:
             found = dataset.attrs.get("case_key")
     except InputError as error:
         return str(error)
@@ -346,8 +346,9 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
-    left = np.asarray(histories[RESIDUALS[rows]], dtype=float)[bad]
-    known = left[np.isfinite(left)]  # the seed paper's algorithm estimates nothing
+    # the seed paper's algorithm estimates nothing, and another program may have left the estimates out
+    left = np.asarray(histories[RESIDUALS[rows]], dtype=float)[bad] if RESIDUALS[rows] in histories else np.zeros(0)
+    known = left[np.isfinite(left)]
     by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
     what, place, advice = _UNCONVERGED[rows]
     first = place.format(float(histories[rows][bad[0]]))

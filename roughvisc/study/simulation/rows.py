@@ -129,7 +129,7 @@ class Rows:
         """All rows, on the final domain; fields in a file are read when they are asked for."""
         height, kept = self._ground.height, self._kept()
         rows = [plain["row"] | self._rescaled_to_domain(i) for i, plain in enumerate(self._store.plain)]
-        columns = {name: np.array([rows[number][name] for number in kept]) for name in (rows[kept[0]] if kept else ())}
+        columns = {name: np.array([rows[number][name] for number in kept]) for name in rows[kept[0]]}
         for counter in ("iterations", "convolutions"):
             columns[counter] = np.diff(columns[counter], prepend=0)
         columns["nominal_pressure"] = columns["force"] / self._ground.nominal_area

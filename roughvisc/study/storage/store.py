@@ -176,8 +176,8 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
         try:
             with _new_file(temporary) as file:
                 # all are declared before any is written: each change of mode would write the file's metadata anew
-                declared = [pair for group, part in parts.items() for pair in _declared(file, group, part, precision)]
-                for written, variable in declared:
+                declared = [_declare_part(file, group, part, precision) for group, part in parts.items()]
+                for written, variable in [pair for pairs in declared for pair in pairs]:
                     _write(written, variable)
             append_checksum(temporary)
         except (
@@ -192,9 +192,9 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     return Path(path)
 
 
-def _declared(
+def _declare_part(
     file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None
-) -> Iterator[tuple[netCDF4.Variable, xr.Variable]]:
+) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """The variables of the root or of a group as they are declared in the file, and what is to be written to them."""
     with NETCDF:
         place = file.createGroup(group) if group else file
@@ -202,8 +202,7 @@ def _declared(
         for dimension, size in part.sizes.items():
             if dimension not in file.dimensions:  # the root's are the groups' too
                 place.createDimension(str(dimension), size)
-    for name, variable in part.variables.items():
-        yield _declare(place, str(name), variable, precision), variable
+    return [(_declare(place, str(name), variable, precision), variable) for name, variable in part.variables.items()]
 
 
 def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
@@ -61,9 +62,7 @@ def _curve_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
         ),
         *([("Shortest octave of waves", _octave(dataset))] if "last_octave_friction" in dataset else []),
         *((label, dataset.attrs[note]) for note, label in NOTES.items() if note in dataset.attrs),
-        ("Cost: contact problems", f"{int(dataset['outer_iterations'].sum())}"),
-        ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
-        ("Cost: wall time", readable(float(dataset["wall_time"].max()), "s")),
+        *_cost(dataset, {"outer_iterations": "contact problems", "iterations": "solver iterations"}),
     ]
 
 
@@ -92,10 +91,15 @@ def _history_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
             if name in dataset
         ),
         *((label, dataset.attrs[note]) for note, label in NOTES.items() if note in dataset.attrs),
-        ("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"),
-        ("Cost: solver iterations", f"{int(dataset['iterations'].sum())}"),
-        ("Cost: wall time", readable(float(last["wall_time"]), "s")),
+        *_cost(dataset, {"convolutions": "convolutions", "iterations": "solver iterations"}),
     ]
+
+
+def _cost(dataset: xr.Dataset, counters: Mapping[str, str]) -> list[tuple[str, str]]:
+    """What it took, as far as that is known: a file that another program has written may not say."""
+    counts = [(f"Cost: {label}", f"{int(dataset[name].sum())}") for name, label in counters.items() if name in dataset]
+    took = [("Cost: wall time", readable(float(dataset["wall_time"].max()), "s"))] if "wall_time" in dataset else []
+    return counts + took
 
 
 def _octave(dataset: xr.Dataset) -> str:
@@ -117,7 +121,8 @@ def _slid(last: xr.Dataset) -> list[tuple[str, str]]:
     """Distance and friction at the end, of a program that slides."""
     if "sliding_distance" not in last:
         return []
-    force, error = (readable(float(last[name]), "N") for name in ("friction_force", "friction_force_error"))
+    force = readable(float(last["friction_force"]), "N")
+    error = readable(float(last["friction_force_error"]), "N") if "friction_force_error" in last else "not known"
     note = last.attrs.get("slide_note", "")
     return [
         ("Slid", readable(float(last["sliding_distance"]), "m") + (f": {note}" if note else "")),
