@@ -8,9 +8,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
+from roughvisc.groups import group_of
 from roughvisc.labels import describe
-from roughvisc.variables import STEPPED, of_step
 from roughvisc.views.observables.derived import along_time, need
 
 
@@ -36,16 +35,8 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     need(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
-    dataset = whole_of(dataset)
-    names = [name for name in STEPPED if name in dataset]
-    if of_step("time") not in dataset:
-        return dataset[names]
-    steps = dataset[[of_step(name) for name in names if of_step(name) in dataset]]
-    steps = steps.assign_coords(time=("step", dataset[of_step("time")].values)).drop_vars(
-        ["step", of_step("time")], errors="ignore"
-    )
-    steps = steps.isel(step=np.isfinite(steps["time"].values)).swap_dims(step="time")
-    return describe(steps.rename({name: str(name).removeprefix(of_step("")) for name in steps.data_vars}))
+    steps = group_of(dataset, "steps")
+    return steps.isel(step=np.isfinite(steps["time"].values)).swap_dims(step="time").drop_attrs(deep=False)
 
 
 def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:
