@@ -1,11 +1,15 @@
 """The public names of roughvisc and the modules that define them: for editors, for mypy, and for ``__init__.py``."""
 
+from roughvisc.api import friction as friction
+from roughvisc.api import simulate as simulate
 from roughvisc.errors import ConvergenceError as ConvergenceError
 from roughvisc.errors import EdgeContactError as EdgeContactError
 from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
+from roughvisc.mechanics.bodies.body import Body as Body
+from roughvisc.mechanics.bodies.body import sheet as sheet
 from roughvisc.mechanics.materials.models import PowerLaw as PowerLaw
 from roughvisc.mechanics.materials.models import Prony as Prony
 from roughvisc.mechanics.materials.models import Tabulated as Tabulated
@@ -26,8 +30,6 @@ from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
-from roughvisc.study.simulation.friction import friction as friction
-from roughvisc.study.simulation.simulate import simulate as simulate
 from roughvisc.study.statement.case import read_cases as read_cases
 from roughvisc.study.statement.case import read_study as read_study
 from roughvisc.study.statement.case import study_schema as study_schema

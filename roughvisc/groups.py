@@ -13,7 +13,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.variables import STEPPED, of_step
-from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,8 +30,8 @@ _PREFIX = of_step("")
 
 def split(whole: xr.Dataset) -> dict[str, xr.Dataset]:
     """Root and groups of a whole result: the root under an empty name, and no group that would be empty."""
-    rows = rows_of(whole.variables)
-    known = VOCABULARIES[rows]
+    rows = axis_of(whole.variables)
+    known = AXES[rows].variables
     names: dict[str, list[str]] = {}
     for name in map(str, whole.data_vars):
         names.setdefault(known[name].group if name in known else "", []).append(name)
@@ -71,7 +71,7 @@ def root_of(whole: xr.Dataset) -> xr.Dataset:
 
 def carrying(root: xr.Dataset, groups: dict[str, xr.Dataset]) -> xr.Dataset:
     """The root, which carries these groups from now on, and by what it is known again."""
-    known = root[[name for name in NEEDED[rows_of(root.variables)] if name in root.variables]]
+    known = root[[name for name in AXES[axis_of(root.variables)].needed if name in root.variables]]
     known = known.drop_vars([name for name, one in known.coords.items() if not one.dims])
     known.encoding = {}
     root.encoding = {**root.encoding, _CARRIED: (known, groups)}
@@ -95,7 +95,7 @@ def whole_of(dataset: xr.Dataset) -> xr.Dataset:
 
     What xarray puts together of several results keeps the encoding of the first: its groups belong to that alone.
     """
-    rows, found = rows_of(dataset.variables), {}
+    rows, found = axis_of(dataset.variables), {}
     if not _is_known(dataset, rows):
         return dataset
     for group, part in groups_of(dataset).items():
@@ -144,7 +144,7 @@ def group_of(dataset: xr.Dataset, group: str) -> xr.Dataset:
     """
     if group not in GROUPS:
         raise InputError(f"group is {group!r}: expected one of {', '.join(GROUPS)}")
-    rows, found = rows_of(dataset.variables), None
+    rows, found = axis_of(dataset.variables), None
     if not _is_known(dataset, rows):
         found = split(dataset).get(group)
     elif group in groups_of(dataset):

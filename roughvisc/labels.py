@@ -14,7 +14,7 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.units import quantity, shown
 from roughvisc.variables import FLAGS, NAMES_OF_TODAY, OLDER_NAMES, RESULT_FORMAT, VARIABLES, Variable
-from roughvisc.variables.rows import VOCABULARIES, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,10 +90,7 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
         If a variable is not declared.
     ValueError
         If a variable's dimensions do not end in the declared ones.
-    InputError
-        If it lies over the speed of steady sliding.
     """
-    expect_history(dataset)
     described = dataset.copy()
     for name, variable in described.variables.items():
         if name in described.coords and (name not in VARIABLES or name not in described.dims):
@@ -106,9 +103,10 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def expect_history(dataset: xr.Dataset) -> None:
-    """Refuse a curve of friction, where a history over time is needed."""
-    if "speed" in dataset.dims:
-        raise InputError("the result lies over the speed of steady sliding: expected a history over time")
+    """Refuse a result over another axis than time, where what happened before a row matters."""
+    axis = axis_of(dataset.dims)
+    if axis != "time":
+        raise InputError(f"the result lies over {axis}: expected a history over time")
 
 
 def format_of(names: Container[Hashable], attributes: Mapping[Any, Any]) -> int:
@@ -190,7 +188,7 @@ def _same_unit(found: str, declared: str) -> bool:
 
 
 def _vocabulary(dims: tuple[Hashable, ...]) -> dict[str, Variable]:
-    return VOCABULARIES[rows_of(dims)]
+    return AXES[axis_of(dims)].variables
 
 
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:

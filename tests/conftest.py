@@ -19,7 +19,7 @@ import strategies  # noqa: F401  (loads the profile of the random examples)
 from matplotlib.figure import Figure
 
 from roughvisc.cli import main
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.study.execution import run as run_module
 
 
@@ -76,11 +76,11 @@ def coarse_pictures(monkeypatch):
 @pytest.fixture
 def stubborn(monkeypatch):
     """Every run ends with a kept time, the second, that did not converge."""
-    press = run_module.carry_out
+    press = run_module.solve
 
     def one_missed(*args, **settings):
         ds = press(*args, **settings)
         ds["status"][1] = 1
         return ds
 
-    monkeypatch.setattr(run_module, "carry_out", one_missed)
+    monkeypatch.setattr(run_module, "solve", one_missed)

@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import roughvisc as rv
 from roughvisc.groups import whole_of
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.halfspace.love import love_kernel
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.love import love_kernel
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary

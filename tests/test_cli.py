@@ -164,7 +164,7 @@ def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
     def interrupted(*args, **settings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run_module, "carry_out", interrupted)
+    monkeypatch.setattr(run_module, "solve", interrupted)
     status, _, err = invoke("run", write_study())
     assert status == 130
     assert err == "roughvisc: interrupted; what was finished is kept\n"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene

@@ -11,7 +11,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.groups import whole_of
-from roughvisc.mechanics.halfspace import operator as halfspace
+from roughvisc.mechanics.bodies import operator as halfspace
 
 long = pytest.mark.long
 ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1

@@ -12,67 +12,61 @@ ROOT = pathlib.Path(__file__).parents[1]
 PACKAGE = ROOT / "roughvisc"
 
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
-_LABELS = {"errors", "groups", "labels", "notebook", "variables", "units"}
-_STATEMENT = {*_LABELS, "mechanics.materials", "mechanics.halfspace", "mechanics.stepping", "topography"}
-_STORAGE = {*_STATEMENT, "study.statement", "mechanics.contact", "mechanics.hereditary", "mechanics.fields"}
-_SIMULATION = {
-    *_STORAGE,
-    "study.storage",
-    "study.progress",
-    "mechanics.contact",
-    "mechanics.sliding",
-}
-_EXECUTION = {*_SIMULATION, "study.simulation"}
-_AUDIT = {*_SIMULATION, "study.simulation", "mechanics.closed_forms"}
+_LABELS = {"errors", "groups", "labels", "notebook", "units", "variables"}
+_BODY = {"mechanics.bodies", "mechanics.materials"}
+_MARCH = {*_BODY, "mechanics.contact", "mechanics.fields", "mechanics.hereditary", "mechanics.stepping"}
+_PROBLEM = {*_LABELS, *_BODY, "topography", "settings"}
+_EXPERIMENT = {*_PROBLEM, *_MARCH, "mechanics.sliding", "problem", "recorder"}
+_SOLVE = {*_EXPERIMENT, "experiment", "progress", "result"}
+_STATEMENT = {*_PROBLEM, "mechanics.stepping", "experiment"}
+_STORAGE = {*_STATEMENT, *_MARCH, "recorder", "study.statement"}
+_EXECUTION = {*_SOLVE, *_STORAGE, "solve", "study.storage"}
+_AUDIT = {*_STORAGE, "mechanics.closed_forms", "study.storage"}
 _COST = {*_EXECUTION, "study.execution", "study.audit"}
 _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
-    "variables": set(),
-    "groups": {"errors", "variables"},
-    "labels": {"errors", "units", "variables"},
     "units": {"errors"},
+    "variables": {"errors", "units"},
+    "labels": {"errors", "units", "variables"},
+    "groups": {"errors", "variables"},
     "notebook": set(),
+    "progress": {"errors"},
     "mechanics.materials": {"errors", "notebook", "units"},
     "mechanics.fields": set(),
-    "mechanics.halfspace": {"errors", "mechanics.fields"},
-    "mechanics.contact": {"errors", "mechanics.fields", "mechanics.halfspace"},
+    "mechanics.bodies": {"errors", "mechanics.fields", "mechanics.materials"},
+    "mechanics.contact": {"errors", "mechanics.fields", "mechanics.bodies"},
     "mechanics.hereditary": {"errors", "mechanics.fields", "mechanics.materials"},
-    "mechanics.stepping": {
-        "errors",
-        "mechanics.contact",
-        "mechanics.fields",
-        "mechanics.halfspace",
-        "mechanics.hereditary",
-        "mechanics.materials",
-        "notebook",
-        "units",
-    },
-    "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.halfspace"},
-    "mechanics.transport": {"errors", "mechanics.contact", "mechanics.halfspace"},
-    "mechanics.closed_forms": {"errors", "mechanics.halfspace", "mechanics.materials", "mechanics.stepping"},
+    "mechanics.stepping": {*_MARCH, "errors", "notebook", "units"} - {"mechanics.stepping"},
+    "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.bodies"},
+    "mechanics.transport": {"errors", "mechanics.contact", "mechanics.bodies"},
+    "mechanics.closed_forms": {*_BODY, "errors", "mechanics.stepping"},
     "topography": _LABELS,
+    "settings": {"errors", "mechanics.bodies", "units", "variables"},
+    "problem": _PROBLEM,
+    "recorder": {"mechanics.bodies"},
+    "experiment": _EXPERIMENT,
+    "result": {*_EXPERIMENT, "experiment"},
+    "solve": _SOLVE,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,
-    "study.progress": {"errors"},
-    "study.simulation": _SIMULATION,
     "study.execution": _EXECUTION,
     "study.audit": _AUDIT,
     "study.cost": _COST,
     "study.trade": _TRADE,
-    "study.validation": {*_SIMULATION, "study.simulation", "mechanics.closed_forms"},
-    "views.observables": {*_LABELS, "mechanics.transport", "study.statement", "topography"},
+    "study.validation": {*_SOLVE, "solve", "mechanics.closed_forms"},
+    "views.observables": {*_LABELS, "mechanics.bodies", "mechanics.transport", "study.statement", "topography"},
     "views.observed": {*_LABELS, "study.statement", "study.storage", "study.execution", "views.observables"},
-    "views.figures": {*_LABELS, "study.statement", "study.trade", "topography", "views.observables"},
-    "views.sweep_figures": {*_LABELS, "study.statement", "study.storage", "views.observables", "views.figures"},
+    "views.figures": {*_LABELS, "study.trade", "topography", "views.observables"},
+    "views.sweep_figures": {*_LABELS, "study.statement", "study.storage", "views.figures", "views.observables"},
     "views.plot": {*_LABELS, "views.figures", "views.sweep_figures"},
     "views.export": {*_LABELS, "study.storage", "views.figures"},
     "views.report": {
         *_LABELS,
+        "topography",
         "study.statement",
         "study.storage",
         "study.audit",
-        "topography",
         "views.observables",
         "views.figures",
         "views.sweep_figures",
@@ -87,9 +81,10 @@ ALLOWED = {
         "study.validation",
         "views.figures",
     },
+    "api": {*_SOLVE, "solve", "study.storage"},
     "cli": {
         *_LABELS,
-        "study.progress",
+        "progress",
         "topography",
         "study.statement",
         "study.storage",

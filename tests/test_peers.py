@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 tamaas = pytest.importorskip("tamaas")
 

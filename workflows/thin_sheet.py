@@ -52,7 +52,7 @@ def by_integral_equation(x):
 
 def computed(x, radius, cells):
     ball, press = rv.sphere(RADIUS, 2.6 * radius, cells), rv.Program().approach(BALL.reduced(x * THICKNESS), over=0)
-    ds = rv.simulate(ball, rv.elastic(MODULUS), press, thickness=THICKNESS, tolerance=1e-4, progress=False)
+    ds = rv.simulate(ball, rv.sheet(rv.elastic(MODULUS), THICKNESS), press, tolerance=1e-4, progress=False)
     return float(ds.force[-1]) / (4 * MODULUS * BALL.scaled_force(x * THICKNESS))  # contact modulus 4 G
 
 

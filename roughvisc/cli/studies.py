@@ -84,9 +84,9 @@ def _run_one(
     case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool, threads: int | None
 ) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
+    from roughvisc.progress import Bar
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.execution.side_by_side import threads_each
-    from roughvisc.study.progress import Bar
     from roughvisc.study.storage.store import is_writable, require_writable, result_path, whole_result
     from roughvisc.study.storage.versions import upgrade_note
     from roughvisc.views.console.result_tables import result_table
@@ -245,7 +245,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from rich.console import Console
     from scipy import fft
 
-    from roughvisc.study.progress import reporting
+    from roughvisc.progress import reporting
     from roughvisc.study.statement.case import read_study
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend

@@ -8,6 +8,7 @@ through the gap and of the contact spots have files of their own.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import replace
 
 from roughvisc.variables.entry import Variable as Variable
@@ -484,3 +485,32 @@ def _over_steps(name: str) -> Variable:
 VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
 #: Variables whose values are words, and these in order.
 FLAGS = {name: variable.meanings for name, variable in VARIABLES.items() if variable.meanings}
+
+#: Of the surface, whatever the rows lie over.
+_SURFACE = ("x", "y", "height", "filled", "taper_x", "taper_y")
+#: What is derived of a row alone, whatever the rows lie over.
+OF_A_ROW = (
+    *(name for name in VARIABLES if name.startswith(("cluster_", "pressure_", "gap_")) and "error" not in name),
+    "percolates_x",
+    "percolates_y",
+    *TRANSPORT,
+    *(name for name in SPOTS if not name.endswith("contact_area")),
+)
+
+
+def over_axis(name: str, shared: Iterable[str]) -> dict[str, Variable]:
+    """Variables of a history over time, over another axis.
+
+    Parameters
+    ----------
+    name : str
+        Of the axis.
+    shared : iterable of str
+        Names of the variables. Those of the surface, and what is derived of a row alone, are among them in any case.
+    """
+    known = {one: VARIABLES[one] for one in _SURFACE}
+    for one in (*shared, *OF_A_ROW):
+        dims = tuple(name if dim == "time" else dim for dim in VARIABLES[one].dims)
+        ancillary = VARIABLES[one].ancillary if one in OF_A_ROW else ()
+        known[one] = replace(VARIABLES[one], dims=dims, ancillary=ancillary, every_step=False)
+    return known

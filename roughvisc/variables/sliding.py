@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from roughvisc.variables import VARIABLES, Variable
+from roughvisc.variables import Variable, over_axis
 
 #: What steady sliding has in common with a history over time.
 _SHARED = (
@@ -18,20 +16,13 @@ _SHARED = (
     "contact_fraction",
     "mean_gap",
     "iterations",
+    "convolutions",
     "status",
     "wall_time",
 )
 
 
-def _over_speed(name: str) -> Variable:
-    """The same variable over the speeds of steady sliding."""
-    one = VARIABLES[name]
-    dims = tuple("speed" if dim == "time" else dim for dim in one.dims)
-    return replace(one, dims=dims, ancillary=(), every_step=False)
-
-
 SLIDING: dict[str, Variable] = {
-    **{name: VARIABLES[name] for name in ("x", "y", "height", "filled", "taper_x", "taper_y")},
     "speed": Variable(("speed",), "m/s", "sliding speed", short="speed", in_table="last"),
     "reduced_speed": Variable(
         ("speed",),
@@ -75,10 +66,18 @@ SLIDING: dict[str, Variable] = {
         "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
         may_be_missing=True,
     ),
-    **{name: _over_speed(name) for name in _SHARED},
+    **over_axis("speed", _SHARED),
     "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
     "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
     "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32", group="cost"),
+    "stated_error": Variable(
+        ("speed",),
+        "1",
+        "stated relative error: the larger one of pressure (L1) and friction",
+        "what the iteration leaves; comparable to the tolerance; the grid's part is stated apart",
+        may_be_missing=True,
+        in_table="largest",
+    ),
     "pressure_residual": Variable(
         ("speed",),
         "1",

@@ -11,8 +11,8 @@ from roughvisc.groups import whole_of
 from roughvisc.labels import heading
 from roughvisc.study.storage.store import atomic_write
 from roughvisc.variables import FLAGS
-from roughvisc.variables.rows import rows_of
-from roughvisc.views.figures.axes import frame_at, require
+from roughvisc.variables.axes import axis_of
+from roughvisc.views.figures.axes import frame_at, require, row_text, rows_of
 from roughvisc.views.figures.sections import deformed_surface
 
 
@@ -41,7 +41,7 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     --------
     >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
     """
-    rows = rows_of(dataset)
+    rows = axis_of(dataset)
     require(dataset, rows)
     dataset = whole_of(dataset)
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
@@ -63,7 +63,7 @@ def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:
     dataset : xarray.Dataset
         One case's result with ``height``, and ``gap`` or ``displacement``.
     time : float
-        The nearest kept time is taken; a negative whole number counts frames from the end. [s]
+        The nearest kept time [s] is taken, or place of another axis; a negative whole number counts rows from the end.
 
     Returns
     -------
@@ -76,13 +76,13 @@ def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:
     InputError
         If the Dataset is not one case's result, or lacks the variables.
     """
-    require(dataset, "time", "x", "y", "height")
-    frame = frame_at(dataset["time"], time)
-    surface = deformed_surface(dataset, frame).drop_vars("time", errors="ignore").rename("height")
-    stamp = float(dataset["time"][frame])
+    require(dataset, "x", "y", "height")
+    rows = rows_of(dataset)
+    frame = frame_at(rows, time)
+    surface = deformed_surface(dataset, frame).drop_vars(str(rows.name), errors="ignore").rename("height")
     surface.attrs = {
         "units": "m",
         "long_name": "height of the deformed surface of the half-space",
-        "history": f"{dataset.attrs.get('history', '')}\ndeformed surface at t = {stamp:g} s".lstrip("\n"),
+        "history": f"{dataset.attrs.get('history', '')}\ndeformed surface at {row_text(rows[frame])}".lstrip("\n"),
     }
     return surface

@@ -13,11 +13,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.animate import animate, animation
 from roughvisc.views.figures.area_load import area_against_load
-from roughvisc.views.figures.axes import fullest_frame, require
+from roughvisc.views.figures.axes import fullest_frame, require, rows_of
 from roughvisc.views.figures.conductance import conductance
 from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
 from roughvisc.views.figures.fields import maps
@@ -70,32 +70,36 @@ def __dir__() -> list[str]:
 FIGURES = {
     "friction": (friction, ("speed", "friction_coefficient", "contact_fraction"), ()),
     "pressure_maps": (friction_maps, ("speed", "x", "y", "pressure"), ()),
-    "history": (history, ("time",), ("force", "approach", "contact_area")),
-    "maps": (maps, ("time", "x", "y"), ("pressure", "gap")),
-    "section": (section, ("time", "height"), ("gap", "displacement")),
-    "distributions": (distributions, ("time",), ("pressure", "gap")),
-    "clusters": (contact_clusters, ("time", "x", "y"), ("pressure", "gap")),
+    "history": (history, (), ("force", "approach", "contact_area")),
+    "maps": (maps, ("x", "y"), ("pressure", "gap")),
+    "section": (section, ("height",), ("gap", "displacement")),
+    "distributions": (distributions, (), ("pressure", "gap")),
+    "clusters": (contact_clusters, ("x", "y"), ("pressure", "gap")),
     "hysteresis": (hysteresis, ("time", "force", "approach"), ()),
-    "leakage": (leakage, ("time", "leak_rate", "gap"), ()),
-    "conductance": (conductance, ("time",), CONDUCTANCES),
+    "leakage": (leakage, ("leak_rate", "gap"), ()),
+    "conductance": (conductance, (), CONDUCTANCES),
     "slide": (friction_against_distance, ("time", "sliding_distance", "friction_coefficient"), ()),
     "surface": (surface, ("height",), ()),
 }
 
 #: Those of them that are drawn only where they say something.
-TELLING = {"clusters": has_clusters, "hysteresis": has_loop}
+TELLING = {
+    "clusters": has_clusters,
+    "hysteresis": has_loop,
+    "maps": lambda dataset: "speed" not in dataset.dims,  # these have maps with arrows
+}
 
 
 def figures_of(dataset: xr.Dataset, leave: str = "") -> Iterator[tuple[str, Figure]]:
     """Name and figure of all that the variables of a result allow and that says something of it, but of one to leave.
 
-    The section is drawn at the last time of the largest contact area.
+    The section is drawn in the last row of the largest contact area.
     """
     for name, (draw, needed, wanted) in FIGURES.items():
         stored = all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
         if name == leave or not stored or (name in TELLING and not TELLING[name](dataset)):
             continue
-        options = {"time": float(dataset["time"][fullest_frame(dataset)])} if name == "section" else {}
+        options = {"time": float(rows_of(dataset)[fullest_frame(dataset)])} if name == "section" else {}
         yield name, draw(dataset, **options)
 
 
@@ -132,7 +136,7 @@ def save_figures(
     InputError
         If the Dataset is not one case's result or allows no figure.
     """
-    require(dataset, rows_of(dataset))
+    require(dataset, axis_of(dataset))
     written = [
         write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title) for name, figure in figures_of(dataset)
     ]

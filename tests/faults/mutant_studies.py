@@ -277,7 +277,7 @@ def begun(path):
     cases = read_cases(path)
     case = cases[0]
     steps = itertools.count(1)
-    case.experiment(), case.material(), case.kernel(), case.solving(), case.key
+    case.experiment(), case.material(), case.body(), case.solving(), case.key
     if math.prod(case.made_shape or (1, 1)) > _MADE:
         return cases
     if case.height().size > _PRESSED or case.settings.friction is not None:  # a speed is one step, however long

@@ -14,9 +14,9 @@ from support import direct, rough_gap
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import descent, iteration, solve_contact, solver
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
 def check_optimal(halfspace, gap, state, precision, present=None):

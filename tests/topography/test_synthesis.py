@@ -211,7 +211,7 @@ def test_self_affine__gaussian_amplitudes_scatter_as_those_of_a_random_field():
 def test_self_affine__a_recipe_that_no_longer_gives_the_heights_makes_no_other_surface():
     """A file written when seeds meant other surfaces holds a surface like any other."""
     import roughvisc as rv
-    from roughvisc.study.simulation.coarser import coarser
+    from roughvisc.experiment.coarser import coarser
     from roughvisc.topography.indenters import remade
     from roughvisc.topography.synthesis import is_analytic
 

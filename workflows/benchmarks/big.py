@@ -27,9 +27,9 @@ from scenes import load_for_area, rough_gap, sphere_gap
 from scipy import fft
 
 import roughvisc as rv
+from roughvisc.experiment.malloc import retain_arena
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact, solver
-from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation.malloc import retain_arena
 
 AREAS = (0.05, 0.3, 0.95)
 REFERENCE = 1e-12

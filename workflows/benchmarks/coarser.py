@@ -10,8 +10,8 @@ import sys
 import numpy as np
 
 import roughvisc as rv
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 PRESSURES = (0.003, 0.02)  # over the contact modulus
 

@@ -3,8 +3,8 @@
 import numpy as np
 from scenes import load_for_area, rough_gap, seconds
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.transport.spots import frozen_contact
 
 

@@ -10,10 +10,10 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
+from roughvisc.experiment.footprint import PROCESS, march_bytes
+from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.simulation.footprint import PROCESS, march_bytes
-from roughvisc.study.simulation.scene import memory_options
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage.store import open_result
 from roughvisc.topography.grid import nominal_area

@@ -66,7 +66,11 @@ def scenes():
         "opening cycle": lambda: rv.simulate(ball, zener, opening, **few),
         "slide": lambda: rv.simulate(rough, zener, slide, **periodic),
         "friction": lambda: rv.friction(rough, zener, speeds=[1e-4, 1e-3], load=0.02, progress=False),
-        "sheet": lambda: rv.simulate(ball, zener, hold, thickness=1e-3, base="bonded", **few),
+        "sheet": lambda: (
+            rv.simulate(ball, rv.sheet(zener, 1e-3), hold, **few)
+            if hasattr(rv, "sheet")
+            else rv.simulate(ball, zener, hold, thickness=1e-3, base="bonded", **few)
+        ),
         "absent cells": lambda: rv.simulate(holes, zener, light, missing="absent", **periodic),
         "elastic": lambda: rv.simulate(rough, rv.elastic(1e6, 0.5), light, **periodic),
     }

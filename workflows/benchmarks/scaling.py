@@ -6,7 +6,7 @@ import numpy as np
 from scenes import RADIUS, seconds, with_symmetry_and_without, without_window
 
 import roughvisc as rv
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.study.execution.profile import profiled
 
 

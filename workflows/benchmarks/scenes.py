@@ -7,21 +7,21 @@ import numpy as np
 
 import roughvisc as rv
 from roughvisc import closed_forms
+from roughvisc.experiment import profile
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.simulation import scene
 
 RADIUS = 1.0
 
 
 def without_symmetry():
     """Context in which all of a surface is solved, also where it is its own mirror image."""
-    return mock.patch.object(scene, "is_mirrored", return_value=False)
+    return mock.patch.object(profile, "is_mirrored", return_value=False)
 
 
 def without_window():
     """Context in which the whole domain is solved, also where the contact is small."""
-    return mock.patch.object(scene, "_WORTH_FOLLOWING", 10**9)
+    return mock.patch.object(profile, "_WORTH_FOLLOWING", 10**9)
 
 
 def with_symmetry_and_without():

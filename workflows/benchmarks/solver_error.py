@@ -18,8 +18,8 @@ import sys
 import numpy as np
 from scenes import rough_gap, sphere_gap
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 TOLERANCES = (1e-2, 3e-3, 1e-3, 3e-4, 3e-5, 3e-6, 3e-7)
 QUANTILES = (0.02, 0.5, 0.98, 1.0)

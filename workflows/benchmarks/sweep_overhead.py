@@ -15,10 +15,10 @@ from pathlib import Path
 import psutil
 from dask.system import CPU_COUNT
 
+from roughvisc import solve as driver
 from roughvisc.study.execution import run
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.execution.watch import NullMonitor
-from roughvisc.study.simulation import rows
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage import records
 
@@ -76,7 +76,7 @@ def storing(cells, boundary):
     base = Case.from_json(STUDY)
     solve = {"solve.boundary": boundary, "solve.edge": "accept", "solve.tolerance": 1e-3}
     case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 5e-3 / cells, "keep.times": "all"} | solve)
-    places = ((records.RowFile, "append"), (run, "keep"), (run.CheckpointWriter, "save"), (rows.Rows, "dataset"))
+    places = ((records.RowFile, "append"), (run, "keep"), (run.CheckpointWriter, "save"), (driver, "dataset_of"))
     inside, found = [], {place: getattr(*place) for place in places}
 
     def timed(function):

@@ -4,6 +4,7 @@ Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2
 material with the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
 """
 
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms.adhesion import (
     adhesive_load,
     conformal_energy,
@@ -56,7 +57,6 @@ from roughvisc.mechanics.closed_forms.validity import (
     radiation_lag,
     sticking_stiffness,
 )
-from roughvisc.mechanics.halfspace.sheet import Sheet
 
 __all__ = [
     "AxisymmetricContact",

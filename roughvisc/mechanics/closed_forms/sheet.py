@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import j0
 
+from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, complement, panels
 from roughvisc.mechanics.closed_forms.indenters import Indenter, positive, punch_pressure
-from roughvisc.mechanics.halfspace.sheet import SHORTEST_WAVE, Sheet, complement, panels
 
 Array = NDArray[np.float64]
 

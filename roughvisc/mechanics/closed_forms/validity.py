@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms.indenters import Paraboloid, positive
 from roughvisc.mechanics.closed_forms.sheet import OnSheet
-from roughvisc.mechanics.halfspace.sheet import Sheet
 
 #: Contact radii in thicknesses up to which the equation of a sheet is solved to its precision.
 _WIDEST = 10.0

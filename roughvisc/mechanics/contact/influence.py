@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.sparse import Scattered
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

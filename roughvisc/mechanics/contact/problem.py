@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.threads import is_wide
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 Mask = NDArray[np.bool_]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.kernel import Kernel
+from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.sliding.interior_point import solve_complementarity
 
 Array = NDArray[np.float64]
@@ -52,6 +52,8 @@ class SteadyState:
         Interior-point iterations.
     vectors : int
         Vectors of the linear solver in all; each costs two convolutions.
+    convolutions : int
+        Forward and inverse transforms in pairs, those of the preconditioner too.
     loss_tangent : float
         The largest on the grid.
     """
@@ -65,6 +67,7 @@ class SteadyState:
     converged: bool
     iterations: int
     vectors: int
+    convolutions: int
     loss_tangent: float
 
 
@@ -134,6 +137,8 @@ class Sliding:
         self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
+        #: Pairs of transforms so far.
+        self.convolutions = 0
         self.cell_area = dx * dy
         one = np.zeros(shape)
         one[0, 0] = 1.0
@@ -146,6 +151,7 @@ class Sliding:
 
     def full_contact(self, displacement: Array) -> Array:
         """Pressure of a displacement of all of the surface, to single precision: it is for a preconditioner. [Pa]"""
+        self.convolutions += 1
         symbol, unit = self._stiffness
         largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
         found = fft.rfft2((displacement / largest).astype(np.float32)) * symbol
@@ -173,6 +179,7 @@ class Sliding:
         return -float((pressure * inclined).sum()) * self.cell_area
 
     def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
+        self.convolutions += 1
         return np.asarray(fft.irfft2(fft.rfft2(field) * symbol, s=self.shape, overwrite_x=True))
 
 
@@ -198,7 +205,7 @@ def steady_state(
     -------
     SteadyState
     """
-    cell = sliding.cell_area
+    cell, before = sliding.cell_area, sliding.convolutions
 
     def drag(pressure: Array) -> float:
         return -float((pressure * sliding.lagging(pressure)).sum()) * cell
@@ -236,4 +243,5 @@ def steady_state(
         iterations=found.iterations,
         vectors=found.vectors,
         loss_tangent=sliding.loss_tangent,
+        convolutions=sliding.convolutions - before,  # last: those above are counted
     )

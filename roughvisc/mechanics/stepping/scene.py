@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields.reuse import empty
 from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.fields.threads import threads_of
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.energy import Energy

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.fields.sparse import Sparse, Sum
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.stepping.attempt import work_between
 from roughvisc.mechanics.stepping.domain import at_edge, edge_error

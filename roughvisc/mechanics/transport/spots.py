@@ -26,11 +26,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
-from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

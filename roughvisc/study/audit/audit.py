@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.notebook import table
 from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface
@@ -120,7 +120,7 @@ def audit(
     Parameters
     ----------
     result : xarray.Dataset or Case
-        A result of one case over time; or a case that has not run, of which less is known.
+        A result of one case; or a case that has not run, of which less is known.
     work_of_adhesion : float or str, optional
         Of the two surfaces. [J/m2]
     yield_strength : float or str, optional
@@ -148,13 +148,13 @@ def audit(
     Raises
     ------
     InputError
-        If a value is of another kind or out of range, or the result is none of one case over time.
+        If a value is of another kind or out of range, or the result is none of one case.
 
     Notes
     -----
     The limits of the verdicts, and their sources, are :data:`roughvisc.study.audit.limits.LIMITS`. Where a modulus is
-    needed it is that of the end of the program, the softest, which is the least favourable to neglecting adhesion and
-    inertia.
+    needed it is the softest: that of the end of the program, or of the longest wave at the lowest speed. It is the
+    least favourable to neglecting adhesion and inertia.
 
     Examples
     --------

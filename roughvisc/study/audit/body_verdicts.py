@@ -8,6 +8,8 @@ from dataclasses import replace
 
 from scipy.optimize import bisect, brentq
 
+from roughvisc.mechanics.bodies.body import BASE
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms.validity import (
     dundurs_coupling,
     flash_temperature,
@@ -16,12 +18,10 @@ from roughvisc.mechanics.closed_forms.validity import (
     moving_load_excess,
     radiation_lag,
 )
-from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.study.audit.evidence import Evidence
 from roughvisc.study.audit.finding import Finding, as_text, percent, unknown
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.limits import LIMITS
-from roughvisc.study.statement.body import BASE
 
 #: Poisson's ratio by which the shear modulus behind a contact modulus is the least.
 _SOFTEST = 0.5
@@ -179,20 +179,20 @@ def inertia(evidence: Evidence, given: AuditInputs) -> Finding:
 
 def heating(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Rise of temperature of the spots by friction, in a slide; None where nothing slides."""
-    contact, speed, power = evidence.contact, evidence.speed, evidence.friction_power
+    area, spots, speed, power = evidence.rubbed_area, evidence.rubbed_spots, evidence.speed, evidence.friction_power
     if speed == 0:
         return None
     if not evidence.ran:
         return unknown("heating", "Known after the run, by the friction.")
     if math.isnan(power):
         return unknown("heating", "The speed of the slides is not known: audit the result with all of its steps.")
-    if contact is None or not evidence.area > 0:
+    if not spots or not area > 0:
         return unknown("heating", 'Keep the pressure, fields = ["pressure"], for the spots that friction heats.')
-    radius = math.sqrt(evidence.area / (math.pi * contact.spots))
-    spots = "one spot" if contact.spots == 1 else f"{contact.spots} spots"
-    about = f"{as_text(max(power, 0.0), 'W')} of friction heat {spots} of radius {as_text(radius, 'm')}"
+    radius = math.sqrt(area / (math.pi * spots))
+    many = "one spot" if spots == 1 else f"{spots} spots"
+    about = f"{as_text(max(power, 0.0), 'W')} of friction heat {many} of radius {as_text(radius, 'm')}"
     flux, conductivity, capacity = (
-        max(power, 0.0) / evidence.area,
+        max(power, 0.0) / area,
         given.heat_conductivity,
         given.volumetric_heat_capacity,
     )

@@ -1,4 +1,4 @@
-"""The contact of one instant as its pressures show it: spots, their curvature, the largest pressure of all times."""
+"""The contact of one row as its pressures show it: spots, their curvature, the largest pressure of all rows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-from roughvisc.mechanics.halfspace.sheet import Sheet, complement
+from roughvisc.mechanics.bodies.sheet import Sheet, complement
 from roughvisc.topography.grid import spacing
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ class Contact:
     Attributes
     ----------
     peak : float
-        Largest pressure of all kept times. [Pa]
+        Largest pressure of all rows. [Pa]
     spots : int
         Connected regions in contact where the force is largest; one across a border that repeats counts twice.
     curvature : float
@@ -58,17 +58,17 @@ class Contact:
 
 
 def contact_of(dataset: xr.Dataset, row: xr.Dataset) -> Contact | None:
-    """The contact of a result at one of its times; None if nothing touches.
+    """The contact of a result in one of its rows; None if nothing touches.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         With ``pressure``, which is read a frame at a time.
     row : xarray.Dataset
-        The same at that time.
+        The same in that row.
     """
-    pressures = dataset["pressure"].transpose("time", "x", "y")
-    peak = max(float(np.nanmax(pressures[number].values)) for number in range(pressures.sizes["time"]))
+    pressures = dataset["pressure"].transpose(..., "x", "y")
+    peak = max(float(np.nanmax(frame.values)) for frame in pressures)
     pressure = np.nan_to_num(row["pressure"].transpose("x", "y").values)
     touching = pressure > 0
     if not touching.any():

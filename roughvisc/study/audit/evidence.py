@@ -13,19 +13,20 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.labels import expect_declared_units
-from roughvisc.mechanics.halfspace.sheet import Sheet
+from roughvisc.mechanics.bodies.body import BASE, separability_error
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.study.audit.contact import Contact, contact_of
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
-from roughvisc.study.statement.body import BASE, separability_error
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import of_step
+from roughvisc.variables.axes import axis_of
 
 
 @dataclass(frozen=True)
 class Body:
-    """A deformable body: contact compliance at once and at the end of the program [1/Pa], and Poisson's ratio."""
+    """A deformable body: contact compliance at once and after the creep that there is [1/Pa], and Poisson's ratio."""
 
     early: float
     late: float
@@ -46,7 +47,7 @@ class Evidence:
     slope : float
         Root mean square slope where it may be loaded. [-]
     early, late : float
-        Contact compliance at once, and at the end of the program. [1/Pa]
+        Contact compliance at once, and when the material has crept as far as it does. [1/Pa]
     bodies : tuple of Body
         One or two of constant Poisson's ratio; none where these are not known.
     sheet : Sheet or None
@@ -54,9 +55,11 @@ class Evidence:
     time_scale : float
         Shortest time in which what is prescribed changes. [s]
     speed, friction_power : float
-        The largest of all slides; the speed is zero where nothing slides. [m/s], [W]
+        The largest; the speed is zero where nothing slides. [m/s], [W]
+    rubbed_area, rubbed_spots : float, int
+        Contact area and number of spots where the friction power is largest; none: not known. [m2]
     force, approach, area : float
-        Where the force is largest, at the last such time. [N], [m], [m2]
+        Where the force is largest, and of such rows the contact area. [N], [m], [m2]
     fraction : float
         Contact fraction there.
     contact : Contact or None
@@ -76,6 +79,8 @@ class Evidence:
     time_scale: float = math.nan
     speed: float = 0.0
     friction_power: float = math.nan
+    rubbed_area: float = math.nan
+    rubbed_spots: int = 0
     force: float = math.nan
     approach: float = math.nan
     area: float = math.nan
@@ -86,7 +91,7 @@ class Evidence:
 
     @property
     def modulus(self) -> float:
-        """Contact modulus at the end of the program, where the material is softest. [Pa]"""
+        """Contact modulus where the material is softest. [Pa]"""
         return 1 / self.late if self.late > 0 else math.nan
 
     @property
@@ -103,14 +108,14 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     Raises
     ------
     InputError
-        If it is no result of one case over time.
+        If it is no result of one case.
     """
     _check(dataset)
     dataset = whole_of(dataset)
     case = Case.from_json(dataset.attrs["case"]) if "case" in dataset.attrs else None
-    attrs = _with_the_case(dataset.attrs, case)
-    force = dataset["force"].values
-    row = dataset.isel(time=int(np.flatnonzero(force >= force.max() * (1 - 1e-9))[-1]))  # crept as far as it has
+    longest = _longest(dataset["height"]) if "height" in dataset else math.inf
+    attrs = _with_the_case(dataset.attrs, case, longest)
+    row = dataset.isel({axis_of(dataset): _fullest(dataset)})
     area = float(row.get("contact_area", math.nan))
     texture, size, slope = None, (math.nan, math.nan), math.nan
     if "height" in dataset:
@@ -118,6 +123,12 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         texture = texture_of(height, attrs["boundary"], str(attrs.get("recipe", "")))
         size, slope = texture.size, loaded_slope(height, attrs["boundary"], float(dataset["approach"].max()))
     speed, friction_power = _sliding(dataset)
+    has_pressure = {"pressure", "height"} <= set(dataset.data_vars)
+    contact = contact_of(dataset, row) if has_pressure else None
+    rubbed, spots = row, contact
+    if "dissipated_power" in dataset:
+        rubbed = dataset.isel(speed=int(dataset["dissipated_power"].values.argmax()))
+        spots = contact_of(dataset, rubbed) if has_pressure else None
     thickness = float(attrs.get("thickness", math.inf))
     poisson = attrs.get("poisson", 0.5)
     return Evidence(
@@ -127,16 +138,18 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         slope=slope,
         early=float(attrs.get("compliance_at_once", math.nan)),
         late=float(attrs.get("compliance_at_end", math.nan)),
-        bodies=_bodies(attrs, case),
+        bodies=_bodies(attrs, case, longest),
         sheet=None if thickness == math.inf else Sheet(thickness, float(poisson), attrs.get("base", BASE)),
         time_scale=float(attrs.get("time_scale", math.nan)),
         speed=speed,
         friction_power=friction_power,
+        rubbed_area=float(rubbed.get("contact_area", math.nan)),
+        rubbed_spots=0 if spots is None else spots.spots,
         force=float(row["force"]),
         approach=float(row["approach"]),
         area=area,
         fraction=float(row.get("contact_fraction", math.nan)),
-        contact=contact_of(dataset, row) if {"pressure", "height"} <= set(dataset.data_vars) else None,
+        contact=contact,
         given=_stated(case),
     )
 
@@ -162,10 +175,10 @@ def of_case(
     force, approach, fraction : float
         The largest that are foreseen. [N], [m], [-]
     """
-    boundary, kernel = case.settings.solve.boundary, case.kernel()
-    program = case.program().on_area(nominal_area(height))
-    material = case.material()
-    early, late = (float(complete(material).contact_compliance(t)) for t in (0.0, program.duration))
+    boundary, kernel = case.settings.solve.boundary, case.body().kernel
+    experiment = case.experiment().on_area(nominal_area(height))
+    end = experiment.creep_time(_longest(height))
+    early, late = (float(complete(case.material()).contact_compliance(t)) for t in (0.0, end))
     texture = texture or texture_of(height, boundary, str(height.attrs.get("recipe", "")))
     return Evidence(
         boundary=boundary,
@@ -174,10 +187,10 @@ def of_case(
         slope=loaded_slope(height, boundary, approach),
         early=early,
         late=late,
-        bodies=bodies_of(case),
+        bodies=bodies_of(case, end),
         sheet=kernel if isinstance(kernel, Sheet) else None,
-        time_scale=program.time_scale,
-        speed=max((one.slide.distance / one.duration for one in program.segments if one.slide), default=0.0),
+        time_scale=experiment.time_scale,
+        speed=experiment.largest_speed,
         force=force,
         approach=approach,
         area=fraction * math.prod(texture.size),
@@ -187,8 +200,23 @@ def of_case(
     )
 
 
+def _longest(height: xr.DataArray) -> float:
+    """Longer side of a surface, between the centres of its cells. [m]"""
+    return max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
+
+
+def _fullest(dataset: xr.Dataset) -> int:
+    """Number of the row with the largest force: of such rows that with the largest contact area, the last of these."""
+    force = dataset["force"].values
+    most = force >= force.max() * (1 - 1e-9)
+    area = np.where(most, dataset["contact_area"].values, -1.0) if "contact_area" in dataset else most.astype(float)
+    return int(np.flatnonzero(area >= area.max() * (1 - 1e-9))[-1])
+
+
 def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
-    """Largest speed and friction power of the accepted steps [m/s], [W]; zero and NaN where nothing slides."""
+    """Largest speed and friction power [m/s], [W]; zero and NaN where nothing slides."""
+    if "speed" in dataset.dims:
+        return float(dataset["speed"].max()), float(dataset.get("dissipated_power", xr.DataArray(math.nan)).max())
     if "sliding_distance" not in dataset:
         return 0.0, math.nan
     names = ["time", "sliding_distance", "friction_force"]
@@ -202,54 +230,50 @@ def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
     return float(speeds.max()), float(np.max(force[1:][lasts] * speeds))
 
 
-def bodies_of(case: Case) -> tuple[Body, ...]:
-    """The deformable bodies of a case; none if Poisson's ratio of one changes in time."""
+def bodies_of(case: Case, end: float) -> tuple[Body, ...]:
+    """The deformable bodies of a case after a time [s]; none if Poisson's ratio of one changes in time."""
     stated = case.settings.material
     parts = [stated.a, stated.b] if stated.model == "pair" else [stated]
     materials = [complete(part.build()) for part in parts]
     if any(map(separability_error, materials)):
         return ()
-    end = case.program().duration
     return tuple(Body(*(float(one.contact_compliance(t)) for t in (0.0, end)), float(one.poisson)) for one in materials)
 
 
 def _check(dataset: Any) -> None:
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"audit: found {type(dataset).__name__}: expected a result (xarray.Dataset), or a Case")
-    if "speed" in dataset.dims:
-        raise InputError(
-            "audit: found a result over speed: expected one over time, as simulate gives it for the same load"
-        )
-    if extra := [str(dim) for dim in dataset.dims if dim not in ("time", "step", "x", "y")]:
+    axis = axis_of(dataset.variables)
+    if extra := [str(dim) for dim in dataset.dims if dim not in (axis, "step", "x", "y")]:
         raise InputError(
             f"audit: found a dimension {extra[0]!r}: expected the result of one case, as open_result opens its file"
         )
-    for name in ("time", "force", "approach"):
+    for name in (axis, "force", "approach"):
         if name not in dataset.variables:
-            raise InputError(f"audit: the result holds no {name!r}: expected a result of one case over time")
-    if not dataset.sizes.get("time"):
-        raise InputError("audit: the result holds no time at all: expected one at least")
+            raise InputError(f"audit: the result holds no {name!r}: expected a result of one case")
+    if not dataset.sizes.get(axis):
+        raise InputError(f"audit: the result holds no {axis} at all: expected one at least")
     expect_declared_units(dataset)
 
 
-def _with_the_case(attrs: Mapping[Any, Any], case: Case | None) -> dict[str, Any]:
+def _with_the_case(attrs: Mapping[Any, Any], case: Case | None, size: float) -> dict[str, Any]:
     """Attributes of a result, with what those of an earlier version lack and their case says."""
     known = {"boundary": "free", **attrs}
     if case is None or "compliance_at_end" in known:
         return known
-    material, program = complete(case.material()), case.program()
+    material, experiment = complete(case.material()), case.experiment()
     found = {
         "compliance_at_once": float(material.contact_compliance(0.0)),
-        "compliance_at_end": float(material.contact_compliance(program.duration)),
-        "time_scale": program.time_scale,
+        "compliance_at_end": float(material.contact_compliance(experiment.creep_time(size))),
+        "time_scale": experiment.time_scale,
     }
     return found | ({} if separability_error(material) else {"poisson": material.poisson}) | known
 
 
-def _bodies(attrs: Mapping[str, Any], case: Case | None) -> tuple[Body, ...]:
+def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[Body, ...]:
     if "poisson" in attrs and "compliance_at_end" in attrs:
         return (Body(*(float(attrs[name]) for name in ("compliance_at_once", "compliance_at_end", "poisson"))),)
-    return bodies_of(case) if case is not None else ()
+    return bodies_of(case, case.experiment().creep_time(size)) if case is not None else ()
 
 
 def _stated(case: Case | None) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.schema.audit import BOUNDS
 from roughvisc.units import stated_quantity

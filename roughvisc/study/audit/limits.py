@@ -164,6 +164,6 @@ LIMITS: dict[str, Limit] = {
         0.03,
         0.1,
         "contact area over that of the grid 8 % too small; 17 %, and the mean gap as much",
-        "tests/study/simulation/test_taper.py: periodic surfaces pressed as they are and tapered",
+        "tests/experiment/test_taper.py: periodic surfaces pressed as they are and tapered",
     ),
 }

@@ -167,7 +167,11 @@ def _without_shorter(z: np.ndarray, cells: tuple[float, float], waves: tuple[flo
     """Whether heights that repeat have next to nothing beyond the ellipse of these wavelengths."""
     q_x, q_y, power, count = modes(z - z.mean(), cells, "forward")
     squares = count * (q_x**2 + q_y**2) * power
-    beyond = np.hypot(q_x * waves[0], q_y * waves[1]) > 2 * np.pi * (1 + 1e-9)
+    # a profile that is the same along an axis has waves of infinite length there, and none that is shorter
+    across = (
+        np.multiply(q, wave, out=np.zeros_like(q), where=q != 0) for q, wave in zip((q_x, q_y), waves, strict=True)
+    )
+    beyond = np.hypot(*across) > 2 * np.pi * (1 + 1e-9)
     return bool(squares[beyond].sum() <= _SHORTER * squares.sum())
 
 

@@ -12,9 +12,17 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.experiment.footprint import PROCESS, march_bytes
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.loading import staircase_area
+from roughvisc.experiment.profile import GROWTH, MOST_CELLS, Profile
+from roughvisc.experiment.scene import build_scene
+from roughvisc.experiment.slides import check_slides
+from roughvisc.experiment.stated import in_slide
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.operator import Boundary, HalfSpace
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
@@ -23,17 +31,11 @@ from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.settings import Settings
 from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
 from roughvisc.study.cost.short_slides import shortened, slid_cells
 from roughvisc.study.cost.stages import Stage, stage_at
-from roughvisc.study.simulation.coarser import coarser_shape
-from roughvisc.study.simulation.footprint import PROCESS, march_bytes
-from roughvisc.study.simulation.kept_times import kept_times
-from roughvisc.study.simulation.rows import in_slide, staircase_area
-from roughvisc.study.simulation.scene import GROWTH, MOST_CELLS, Ground, build_scene
-from roughvisc.study.simulation.slides import check_slides
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.settings import Settings
 from roughvisc.topography.grid import axis_step, nominal_area, resampled_taper, spacing, with_taper_weights
 from roughvisc.topography.indenters import grown, grown_shape, remade
 from roughvisc.variables import STEPPED
@@ -203,7 +205,7 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         return _march(case, program, few, outgrowing)
 
     def pressed(grid: int, push: Push | None, most: int = MOST_PRESSED) -> Pressed:
-        return press(copies.of(shapes[grid], most), push or Push(load=0.0), settings.boundary, settings.kernel)
+        return press(copies.of(shapes[grid], most), push or Push(load=0.0), settings.boundary, case.body().kernel)
 
     last, grid = len(shapes) - 1, 0
     first = marched(0, _COARSE[0], last > 0)
@@ -267,8 +269,8 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     settings = replace(case.solving(), missing="absent", edge="accept")
     if program.slides:  # its corners will do: the times that are kept lie elsewhere in a shorter program
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
-    ground = Ground(height, settings.missing, kernel=settings.kernel)
-    scene, _ = build_scene(ground, case.material(), program, settings)
+    profile = Profile(height, settings.missing, kernel=case.body().kernel)
+    scene, _ = build_scene(profile, case.material(), program, settings)
     steps = rows = damped = 0
     reached = contact = fraction = level = force = 0.0
     work, instants = 0, [0.0]
@@ -289,7 +291,7 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
         taken_off = staircase_area(touching, scene) / (scene.halfspace.cell_area * touching.size)
         fraction = max(fraction, share - taken_off)
         level, force = max(level, step.level), max(force, step.shown.force)
-        course.append(Passed(step.level, width_of(touching, ground), step.state.convolutions - work))
+        course.append(Passed(step.level, width_of(touching, profile), step.state.convolutions - work))
         bordering = bordering or at_border(scene, step.shown.contact)
         if in_slide(step):
             slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
@@ -349,15 +351,15 @@ class ConvolutionTimer:
         if cells > _TIMED:
             height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
-        ground = Ground(height, "absent", kernel=kernel)
-        halfspace: HalfSpace = ground.halfspace("free" if boundary == "free" else "periodic")
-        gap = ground.gap
+        profile = Profile(height, "absent", kernel=kernel)
+        halfspace: HalfSpace = profile.halfspace("free" if boundary == "free" else "periodic")
+        gap = profile.gap
         load = 0.02 * float(np.mean(gap)) / (halfspace.self_influence or halfspace.spacing[0]) * gap.size
         seconds = math.inf
         for iterations in itertools.chain((2,), itertools.repeat(6)):
             start = time.perf_counter()
             state = solve_contact(
-                halfspace, gap, load=load or 1.0, tolerance=1e-15, max_iterations=iterations, present=ground.present
+                halfspace, gap, load=load or 1.0, tolerance=1e-15, max_iterations=iterations, present=profile.present
             )
             now = time.perf_counter()
             seconds = min(seconds, (now - start) / max(state.convolutions, 1))

@@ -15,17 +15,26 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.operator import Boundary
+from roughvisc.experiment.available import Available, memory_available
+from roughvisc.experiment.coarser import coarser
+from roughvisc.experiment.footprint import PROCESS
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.notes import body_note, left_out
+from roughvisc.experiment.profile import Profile, uses_window
+from roughvisc.experiment.refusal import PART, too_large
+from roughvisc.experiment.scene import memory_options
+from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.problem import Problem
+from roughvisc.settings import Settings
 from roughvisc.study.audit.audit import evaluate
 from roughvisc.study.audit.evidence import of_case
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.texture import Texture, texture_of
+from roughvisc.study.cost.coarse_grids import on_coarse_grids
 from roughvisc.study.cost.columns import COLUMNS, attributes
-from roughvisc.study.cost.curve import curve_march, memory_of_curve
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,
     Copies,
@@ -49,14 +58,7 @@ from roughvisc.study.cost.planned import Plan
 from roughvisc.study.cost.stages import Stage, stages_of
 from roughvisc.study.cost.totals import totals
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.simulation.available import Available, memory_available
-from roughvisc.study.simulation.coarser import coarser
-from roughvisc.study.simulation.notes import body_note, left_out
-from roughvisc.study.simulation.refusal import PART, too_large
-from roughvisc.study.simulation.scene import Ground, check_cells, memory_options, uses_window
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.statement.curve import SteadySliding
-from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.study.storage.versions import upgrade_note
 from roughvisc.topography.grid import nominal_area, spacing
@@ -119,8 +121,8 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     that is timed for at most two seconds in all. Where the grid or its window follows the contact, the coarse grids
     cover the one that it comes to, and each convolution counts by the cells that it will be on. Expect a quarter either
     way, and half where a soft material makes the pressure jump with each cell that enters, or where a grid grows.
-    Curves of friction are computed at some of their speeds on grids of 24 and 48 cells; expect a factor of two. The
-    contact fraction is that of an elastic press on 256 cells a side at most, or of the curve on 48.
+    Other experiments are done on grids of 24 and 48 cells, a curve of friction at some of its speeds; expect a factor
+    of two. The contact fraction is that of an elastic press on 256 cells a side at most, or of the experiment on 48.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -135,7 +137,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     for number, case in enumerate(cases):
         like = _nearest_case(number, list(marches), parameters)
         surface = surfaces.get(_surface_name(cases[number], stated[number]))
-        kind = _KINDS[type(case.experiment())]
+        kind = _kind(case)
         rows.append(
             kind.row(
                 case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch, there
@@ -155,7 +157,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
     """Surfaces that differ by their seed alone cost the same; under a kernel that bulges they have no windows."""
     surface = {key: value for key, value in stated["surface"].items() if key != "seed"}
-    return f"{json.dumps(surface, sort_keys=True)} {case.kernel()!r} {case.settings.solve.boundary}"
+    return f"{json.dumps(surface, sort_keys=True)} {case.body().kernel!r} {case.settings.solve.boundary}"
 
 
 def _marches(
@@ -175,9 +177,7 @@ def _marches(
             problems[number] = surfaces[name].problem
         elif time.perf_counter() < until or not marches:
             try:
-                marches[number] = _KINDS[type(cases[number].experiment())].march(
-                    cases[number], height, surfaces[name].copies
-                )
+                marches[number] = _kind(cases[number]).march(cases[number], height, surfaces[name].copies)
             except InputError as error:
                 problems[number] = str(error)
     return marches, surfaces, problems
@@ -197,16 +197,16 @@ def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
         boundary = case.settings.solve.boundary
-        ground = Ground(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.kernel())
+        profile = Profile(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.body().kernel)
     except InputError as error:
         return _Surface(None, False, str(error))
     return _Surface(
         height,
-        ground.can_grow(),
+        profile.can_grow(),
         "",
         Copies(height, boundary),
-        stages_of(ground, ground.can_grow()),
-        ground.mirrored,
+        stages_of(profile, profile.can_grow()),
+        profile.mirrored,
         rms_slope(height),
         _half_slope(height, boundary),
     )
@@ -264,7 +264,7 @@ def _row(
     mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
     row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     try:
-        check_cells(height, settings)
+        Problem(height, case.body(), settings).check_cells()
         choice = choices.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
@@ -283,7 +283,7 @@ def _row(
     )  # tried again
     shape, cells = solved.stages[-1].shape, solved.cells
     timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
-    convolution = stopwatch.seconds(timed, settings.boundary, settings.kernel) * work(cells) / work(timed.size)
+    convolution = stopwatch.seconds(timed, settings.boundary, case.body().kernel) * work(cells) / work(timed.size)
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
     quarter = work(cells / 4) / work(cells)
@@ -297,7 +297,7 @@ def _row(
         "final_cells_x": shape[0],
         "final_cells_y": shape[1],
         "audit": _audit(case, surface, found) if marched else "",
-        "body_note": body_note(settings.kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
+        "body_note": body_note(case.body().kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,
@@ -333,7 +333,7 @@ def _blank(settings: Settings, marched: bool, problem: str) -> dict[str, Any]:
     return row | {"exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
 
 
-def _curve_row(
+def _general_row(
     case: Case,
     surface: _Surface | None,
     found: CostEstimate | None,
@@ -343,27 +343,30 @@ def _curve_row(
     stopwatch: ConvolutionTimer,
     there: Available,
 ) -> dict[str, Any]:
-    """What a curve of friction will cost."""
-    settings, material = case.solving(), complete(case.material())
-    row = _blank(settings, marched, problem) | {"memory_model": "steady sliding: complex compliance of each wave"}
-    row |= {"scheme": "a fixed point of contact problems at each speed, begun with that of the last"}
+    """What an experiment of any kind will cost."""
+    settings, experiment, body = case.solving(), case.experiment(), case.body()
+    row = _blank(settings, marched, problem) | {"memory_model": experiment.called}
     if surface is None or surface.height is None:
         return row
     height = surface.height
     row |= {"cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
     if found is None or problem:
         return row
-    cells, convolution = height.size, stopwatch.seconds(height, "periodic", settings.kernel)
-    nominal = found.force / nominal_area(height)
-    curve = case.experiment()
-    assert isinstance(curve, SteadySliding), "a program has a row of its own"
-    passing = max(np.ptp(height[axis].values) for axis in ("x", "y")) / min(curve.asked)  # of the longest wave
-    relaxed = full_contact_pressure(surface.slope, material, passing)
-    needed = partial(memory_of_curve, settings=settings)
+    area, cells = nominal_area(height), height.size
+    convolution = stopwatch.seconds(height, settings.boundary, body.kernel)
+    nominal = found.force / area
+    size = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
+    relaxed = full_contact_pressure(surface.slope, complete(body.material), experiment.creep_time(size))
+
+    def needed(cells: float) -> float:
+        return PROCESS + experiment.bytes_needed(settings, body, cells, area)
+
     if needed(cells) > PART * there.size:
         row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there, [])
     return row | {
-        "speeds": found.rows,
+        "audit": _audit(case, surface, found) if marched else "",
+        "rows": found.rows,
+        **({"speeds": found.rows} if experiment.axis == "speed" else {}),
         "nominal_pressure": nominal,
         "full_contact_pressure": relaxed,
         "warning": full_contact_warning(nominal, relaxed),
@@ -412,10 +415,15 @@ def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
 
 @dataclass(frozen=True)
 class _Kind:
-    """How the cost of one kind of experiment is foretold: from coarse grids, and as a row."""
+    """How the cost of an experiment is foretold: from coarse grids, and as a row."""
 
     march: Callable[[Case, xr.DataArray, Copies | None], CostEstimate]
     row: Callable[..., dict[str, Any]]
 
 
-_KINDS: dict[type, _Kind] = {Program: _Kind(march_of, _row), SteadySliding: _Kind(curve_march, _curve_row)}
+#: What marches is foretold step by step, with its windows and its memory; anything else by some of its rows.
+_MARCH, _ANY = _Kind(march_of, _row), _Kind(on_coarse_grids, _general_row)
+
+
+def _kind(case: Case) -> _Kind:
+    return _MARCH if isinstance(case.experiment(), Loading) else _ANY

@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.experiment.coarser import coarser
+from roughvisc.experiment.profile import Profile
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import staircase
-from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.operator import Boundary
-from roughvisc.study.simulation.coarser import coarser
-from roughvisc.study.simulation.scene import Ground
 
 #: Cells of the longer side of the copy that is pressed, at most: a press takes 30 to 60 ms then.
 MOST_PRESSED = 256
@@ -84,15 +84,15 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     kernel : Kernel
         Of the body.
     """
-    ground = Ground(height, "absent", mirror=True, kernel=kernel)
-    halfspace, shape = ground.halfspace(boundary), (height.sizes["x"], height.sizes["y"])
-    present = None if ground.present.all() else ground.present
-    nothing = push.load == 0 if push.approach is None else push.approach <= ground.least_gap
+    profile = Profile(height, "absent", mirror=True, kernel=kernel)
+    halfspace, shape = profile.halfspace(boundary), (height.sizes["x"], height.sizes["y"])
+    present = None if profile.present.all() else profile.present
+    nothing = push.load == 0 if push.approach is None else push.approach <= profile.least_gap
     if nothing:
-        return Pressed(shape, 0.0, push.approach or ground.least_gap, (0.0, 0.0), at_border=False)
+        return Pressed(shape, 0.0, push.approach or profile.least_gap, (0.0, 0.0), at_border=False)
     found = solve_contact(
         halfspace,
-        ground.gap,
+        profile.gap,
         load=None if push.load is None else push.load / halfspace.cell_area,
         approach=push.approach,
         tolerance=_TOLERANCE,
@@ -104,18 +104,18 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     periodic = boundary == "periodic" and not halfspace.mirrored
     counted = np.count_nonzero(touching) * halfspace.cell_area
     area = max(counted - staircase(touching, free, halfspace.cell_area, periodic), 0.0)
-    fraction = ground.contact_fraction(touching, area)
-    return Pressed(shape, fraction, found.approach, width_of(touching, ground), _at_border(touching, ground.mirrored))
+    fraction = profile.contact_fraction(touching, area)
+    return Pressed(shape, fraction, found.approach, width_of(touching, profile), _at_border(touching, profile.mirrored))
 
 
-def width_of(touching: NDArray[np.bool_], ground: Ground) -> tuple[float, float]:
+def width_of(touching: NDArray[np.bool_], profile: Profile) -> tuple[float, float]:
     """Extent of a contact along x and along y, from the first cell to the last one. [m]"""
     widths = []
-    for other, side in zip((1, 0), ground.spacing, strict=True):
+    for other, side in zip((1, 0), profile.spacing, strict=True):
         cells = np.flatnonzero(touching.any(axis=other))
-        first = 0 if ground.mirrored else (cells[0] if cells.size else 0)
+        first = 0 if profile.mirrored else (cells[0] if cells.size else 0)
         count = cells[-1] + 1 - first if cells.size else 0
-        widths.append(float(count * side * (2 if ground.mirrored else 1)))
+        widths.append(float(count * side * (2 if profile.mirrored else 1)))
     return widths[0], widths[1]
 
 

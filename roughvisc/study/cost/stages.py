@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from roughvisc.study.simulation.scene import GROWTH, MOST_CELLS, Ground
+from roughvisc.experiment.profile import GROWTH, MOST_CELLS, Profile
 from roughvisc.topography.indenters import grown_shape
 
 Widths = tuple[float, float]
@@ -40,24 +40,24 @@ class Stage:
         return all(own < limit for own, limit in zip(width, self.width, strict=True))
 
 
-def stages_of(ground: Ground, grows: bool) -> tuple[Stage, ...]:
-    """The windows of a ground from the present one on, and the grids that it grows to; it has the whole window then.
+def stages_of(profile: Profile, grows: bool) -> tuple[Stage, ...]:
+    """The windows of a profile from the present one on, and the grids that it grows to; it has the whole window then.
 
     Parameters
     ----------
-    ground : Ground
+    profile : Profile
         The surface.
     grows : bool
         Whether its grid may grow.
     """
-    shape = (ground.height.sizes["x"], ground.height.sizes["y"])
+    shape = (profile.height.sizes["x"], profile.height.sizes["y"])
     found = []
-    while not ground.window.whole:
-        found.append(Stage(shape, math.prod(ground.window.shape), ground.window.outside))
-        ground.widen()
-    part = math.prod(ground.window.shape) / math.prod(shape)
+    while not profile.window.whole:
+        found.append(Stage(shape, math.prod(profile.window.shape), profile.window.outside))
+        profile.widen_window()
+    part = math.prod(profile.window.shape) / math.prod(shape)
     while True:
-        sides = [(n - 1) * side for n, side in zip(shape, ground.spacing, strict=True)]
+        sides = [(n - 1) * side for n, side in zip(shape, profile.spacing, strict=True)]
         found.append(Stage(shape, part * math.prod(shape), width=(sides[0], sides[1])))
         larger = grown_shape(shape, GROWTH)
         if not grows or math.prod(larger) > MOST_CELLS:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.experiment.available import Available, cores
+from roughvisc.experiment.refusal import PART, amount
 from roughvisc.study.execution.side_by_side import processes_that_fit, threads_each
-from roughvisc.study.simulation.available import Available, cores
-from roughvisc.study.simulation.refusal import PART, amount
 
 
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 
 from roughvisc import errors
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
-from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
 from roughvisc.study.execution.book import SweepLog
 from roughvisc.study.execution.cluster import SOURCE, VERSION

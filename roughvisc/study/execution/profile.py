@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 from functools import wraps
 from typing import Any
 
-from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.halfspace.window import FarFieldDisplacement
+from roughvisc.experiment import loading
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.window import FarFieldDisplacement
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding
 from roughvisc.mechanics.stepping import attempt
 from roughvisc.study.execution import run
-from roughvisc.study.simulation import rows, simulate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.records import RowFile
@@ -35,17 +35,17 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
     "surface and kernels": (
         (Case, "height"),
-        (simulate, "build_scene"),
+        (loading, "build_scene"),
         *((kind, "__init__") for kind in (HalfSpace, FarFieldDisplacement, Sliding)),
     ),
-    "kept rows": ((rows.Rows, "add"), (RowFile, "append")),
+    "kept rows": ((loading.LoadingRows, "row"), (RowFile, "append")),
     "files": ((run, "keep"), (CheckpointWriter, "save"), (CheckpointWriter, "resume")),
 }
 REST = "stepping, figures and the rest"
 
 
 @dataclass
-class Profile:
+class TimeProfile:
     """Seconds and calls of each part of a run, and of the whole.
 
     Attributes
@@ -86,9 +86,9 @@ class Profile:
 
 
 @contextmanager
-def profiled() -> Iterator[Profile]:
+def profiled() -> Iterator[TimeProfile]:
     """Time what runs inside, in this process; what it costs is below a microsecond a call."""
-    profile = Profile()
+    profile = TimeProfile()
     before = [(owner, name, getattr(owner, name)) for places in _PARTS.values() for owner, name in places]
     for part, places in _PARTS.items():
         for owner, name in places:

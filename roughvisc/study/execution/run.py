@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
+from roughvisc.experiment.malloc import keep_memory
+from roughvisc.experiment.refusal import require_surface
 from roughvisc.labels import annotate
-from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.study.simulation.experiment import carry_out
-from roughvisc.study.simulation.malloc import keep_memory
-from roughvisc.study.simulation.refusal import require_surface
+from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.problem import Problem
+from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -40,7 +41,7 @@ from roughvisc.study.storage.store import (
 )
 from roughvisc.study.storage.trust import warn_once
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,13 +54,6 @@ REFERENCES = (
 )
 
 Progress = Callable[[float, float], None]
-
-#: What was computed, and what tells its accuracy, by what the rows of the result lie over.
-_MODELS: dict[Rows, str] = {
-    "time": "A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space.",
-    "speed": "A rigid rough profile that slides steadily on a linear viscoelastic body, without shear or adhesion.",
-}
-_ACCURACY: dict[Rows, str] = {"time": "'stated_error'", "speed": "'pressure_residual' and 'friction_residual'"}
 
 #: Attributes of a surface that stay with the result: whence it came, and what was made up where it was missing.
 SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
@@ -118,21 +112,14 @@ def compute(
             require_surface(case.made_shape)
     height = case.height()
     with _named(case):
-        dataset = carry_out(
-            case.experiment(),
-            height,
-            case.material(),
-            case.solving(),
-            progress=progress,
-            keeper=keeper,
-            threads=threads,
-        )
+        problem = Problem(height, case.body(), case.solving())
+        dataset = solve(problem, case.experiment(), keeper, progress=progress, threads=threads)
     if "speed" in dataset:
         reduced = case.settings.material.shift * dataset["speed"].values
         dataset = annotate(dataset.assign(reduced_speed=("speed", reduced)))
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
     transforms = transform_library() if keeper is None else keeper.latest.transforms
-    provenance = _provenance(case, rows_of(dataset), dataset.attrs.pop("history", ""), transforms)
+    provenance = _provenance(case, axis_of(dataset), dataset.attrs.pop("history", ""), transforms)
     dataset.attrs = provenance | dataset.attrs | scan
     return dataset.assign_coords(labels_of_case(json.loads(case.to_json())))
 
@@ -148,7 +135,7 @@ def _named(case: Case) -> Iterator[None]:
         raise type(error)(f"{case.origin}: {error}") from error
 
 
-def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[str, str | int]:
+def _provenance(case: Case, rows: str, before: str, transforms: str) -> dict[str, str | int]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -162,8 +149,8 @@ def _provenance(case: Case, rows: Rows, before: str, transforms: str) -> dict[st
         "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
         "references": REFERENCES,
-        "comment": f"{_MODELS[rows]} Attribute 'case' states the whole computation (JSON, SI units); "
-        f"{_ACCURACY[rows]} how accurate it is; "
+        "comment": f"{AXES[rows].model} Attribute 'case' states the whole computation (JSON, SI units); "
+        "'stated_error' how accurate it is; "
         "'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
         "case": case.to_json(),
         "case_key": case.key,
@@ -236,6 +223,7 @@ def run_case(
                 folder / f".{case.key}.unfinished",
                 case.key,
                 lock.check,
+                case.experiment().states,
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
                 stop=stop,
@@ -341,22 +329,19 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
 
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
     """What to tell about times or speeds that did not converge; empty if all did."""
-    rows = rows_of(histories)
+    rows = axis_of(histories)
     status = np.asarray(histories["status"])
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
     # the seed paper's algorithm estimates nothing, and another program may have left the estimates out
-    left = np.asarray(histories[RESIDUALS[rows]], dtype=float)[bad] if RESIDUALS[rows] in histories else np.zeros(0)
+    left = (
+        np.asarray(histories[AXES[rows].residual], dtype=float)[bad]
+        if AXES[rows].residual in histories
+        else np.zeros(0)
+    )
     known = left[np.isfinite(left)]
     by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
-    what, place, advice = _UNCONVERGED[rows]
-    first = place.format(float(histories[rows][bad[0]]))
-    return f"{bad.size} of {status.size} {what} did not converge, first at {first}{by}: try {advice}"
-
-
-#: What did not converge, where first, and what to try.
-_UNCONVERGED: dict[Rows, tuple[str, str, str]] = {
-    "time": ("kept times", "t = {:.6g} s", "a looser tolerance or shorter steps"),
-    "speed": ("speeds", "{:.6g} m/s", "a looser tolerance"),
-}
+    axis = AXES[rows]
+    first = axis.place(float(histories[rows][bad[0]]))
+    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try {axis.advice}"

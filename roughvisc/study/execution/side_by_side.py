@@ -7,13 +7,10 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.study.simulation.available import cores, memory_available
-from roughvisc.study.simulation.footprint import PROCESS, curve_bytes, march_bytes
-from roughvisc.study.simulation.refusal import PART, WORTH_ASKING, least_rows
-from roughvisc.study.simulation.scene import memory_options
+from roughvisc.experiment.available import cores, memory_available
+from roughvisc.experiment.footprint import PROCESS
+from roughvisc.experiment.refusal import PART, WORTH_ASKING
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.topography.grid import nominal_area
 
 #: A file that is smaller holds no surface of :data:`WORTH_ASKING` cells. [byte]
@@ -71,11 +68,7 @@ def _sizes(cases: Sequence[Case]) -> Iterable[float]:
             yield 0.0
             continue
         settings, experiment = case.solving(), case.experiment()
-        if isinstance(experiment, SteadySliding):
-            yield PROCESS + curve_bytes(settings, cells)
-            continue
-        memory = choose_memory(case.material(), **memory_options(experiment.on_area(area), settings)).memory
-        yield PROCESS + march_bytes(settings, cells, memory, rows=least_rows(settings, experiment))
+        yield PROCESS + experiment.bytes_needed(settings, case.body(), cells, area)
 
 
 def _cells_and_area(case: Case) -> tuple[int, float]:

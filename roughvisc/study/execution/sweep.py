@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
-from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.experiment.available import cores
+from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
 from roughvisc.study.execution.book import Monitor, SweepLog
 from roughvisc.study.execution.cluster import default_client, local_client
@@ -18,7 +19,6 @@ from roughvisc.study.execution.run import other_transforms, result_folder, set_a
 from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.side_by_side import side_by_side, threads_each
 from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
-from roughvisc.study.simulation.available import cores
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, recorded_failure
 from roughvisc.study.storage.index import Index, index_of, warn_of

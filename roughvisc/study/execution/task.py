@@ -15,7 +15,7 @@ from typing import Literal, TypedDict, get_args
 import numpy as np
 
 from roughvisc.errors import DiskFullError, InUseError, RoughviscError, TransientError
-from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry

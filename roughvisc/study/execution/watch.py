@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from rich.console import Console
 
 from roughvisc.errors import ON_SCREEN, printable, shortened
+from roughvisc.progress import Display, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
-from roughvisc.study.progress import Display, Row, clock
 from roughvisc.study.statement.case import Case
 
 #: Running cases that are shown, and messages of cases that ended badly.

@@ -22,11 +22,11 @@ from roughvisc.topography.cards import read_toml
 if TYPE_CHECKING:
     import xarray as xr
 
-    from roughvisc.mechanics.halfspace.kernel import Kernel
+    from roughvisc.experiment.protocol import Experiment
+    from roughvisc.mechanics.bodies.body import Body
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
-    from roughvisc.study.statement.curve import SteadySliding
-    from roughvisc.study.statement.settings import Settings
+    from roughvisc.settings import Settings
 
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
@@ -114,11 +114,16 @@ class Case:
 
     def material(self) -> Material:
         """The material."""
-        return self.settings.material.build()
+        return self.body().material
 
-    def kernel(self) -> Kernel:
-        """What the surface of the body does under pressure: a half-space's, or a sheet's."""
-        return self.settings.material.kernel()
+    def body(self) -> Body:
+        """What the surface is pressed on: a half-space of the material, or a sheet."""
+        return self._body
+
+    @cached_property
+    def _body(self) -> Body:
+        """Built once: a table of a material takes a fit."""
+        return self.settings.material.body()
 
     def program(self) -> Program:
         """The loading program.
@@ -133,17 +138,17 @@ class Case:
         except InputError as error:
             raise InputError(f"{self.origin}: {error}" if self.origin else str(error)) from error
 
-    def experiment(self) -> Program | SteadySliding:
-        """What is done with the surface: the program that presses it, or the curve of speeds at which it slides."""
+    def experiment(self) -> Experiment:
+        """What is done with the surface."""
         return self.settings.experiment()
 
-    def at(self, now: float, end: float) -> str:
-        """How far a run is of how much, as one reads it: a time [s] of a program, a speed of a curve by its number."""
-        return self.settings.at(now, end)
+    def at(self, done: float, end: float) -> str:
+        """How far a run is of how much, as one reads it."""
+        return self.experiment().progress(done, end)
 
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
-        return replace(self.settings.solving(), kernel=self.kernel())
+        return self.settings.solving()
 
     def _repr_html_(self) -> str:
         stated = _dump(self.settings)
@@ -318,8 +323,10 @@ def _text_or_error(what: Callable[[], str]) -> str:
 
 
 def _experiment(settings: Study) -> tuple[str, str]:
-    kind, _, words = _text_or_error(lambda: repr(settings.experiment())).partition(": ")
-    return {"Steady sliding": "friction"}.get(kind, "program"), words or kind
+    """The table that states what is done, and that in words."""
+    experiment = settings.experiment()
+    words = _text_or_error(lambda: repr(experiment))
+    return experiment.table, words.partition(": ")[2] or words
 
 
 def _dump(settings: Study) -> dict[str, Any]:

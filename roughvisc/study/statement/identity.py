@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema import Study
+from roughvisc.settings import ENTRIES
+from roughvisc.study.statement.schema import EXPERIMENTS, Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
-from roughvisc.study.statement.settings import ENTRIES
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
@@ -43,21 +43,15 @@ def identity(settings: Study) -> tuple[str, str]:
     """
     stated = settings.model_dump(
         mode="json",
-        exclude={"title", "audit", "observe", "program", "friction", "surface", "material"},
+        exclude={"title", "audit", "observe", "program", "surface", "material", *EXPERIMENTS},
         serialize_as_any=True,
     )
     usual = type(settings.solve)().model_dump(mode="json")
     stated["solve"] = {
         key: value for key, value in stated["solve"].items() if ENTRIES[key].always_in_key or value != usual[key]
     }
-    if settings.friction is None:
-        stated["program"] = [
-            [one.control, one.duration, one.end, one.amplitude, one.period]
-            + ([one.slide.distance, one.slide.direction] if one.slide else [])
-            for one in settings.loading().segments
-        ]
-    else:
-        stated["friction"] = settings.friction.model_dump(mode="json", exclude_defaults=True)
+    experiment = settings.experiment()
+    stated[experiment.table] = experiment.content()
     stated["material"] = settings.material.content()
     surface = surface_content(settings.surface)
     stated["surface"] = surface

@@ -9,22 +9,15 @@ from __future__ import annotations
 import logging
 import shutil
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from roughvisc.mechanics.fields.sparse import Sparse
-from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.mechanics.hereditary.direct import Block, HistoryState
-from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.stepping.energy import Energy
-from roughvisc.mechanics.stepping.pace import ControllerState
-from roughvisc.mechanics.stepping.scene import Instant, State, Step, Trajectory
-from roughvisc.mechanics.stepping.slide import Slid
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.recorder import Checkpoint
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
@@ -35,100 +28,38 @@ log = logging.getLogger("roughvisc")
 
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
-#: Between two libraries in the account of what a run was computed with.
-_THEN = "; then "
-_KINDS = (
-    State,
-    Trajectory,
-    ControllerState,
-    Slid,
-    Instant,
-    Sparse,
-    Uncertainty,
-    Energy,
-    ModesState,
-    HistoryState,
-    Block,
-)
-_TYPES = {kind.__name__: kind for kind in _KINDS}
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """How far a run has come.
-
-    Attributes
-    ----------
-    state : State, tuple or None
-        Of the march; of a curve of friction the pressures that the next speed begins with; None at the start.
-    converged : bool
-        Whether all steps since the last kept row are.
-    rows, growths : int
-        Rows written, those of steps that are not kept too, and how many times the grid has grown.
-    wall_time : float
-        Spent so far. [s]
-    transforms : str
-        Libraries that it was computed with, one after the other.
-    """
-
-    state: State | tuple[()] | None = None
-    converged: bool = True
-    rows: int = 0
-    growths: int = 0
-    wall_time: float = 0.0
-    transforms: str = field(default_factory=transform_library)
-
-    @property
-    def time(self) -> float:
-        """Of the program; zero of a curve of friction. [s]"""
-        return self.state.now.time if isinstance(self.state, State) else 0.0
-
-    @property
-    def place(self) -> str:
-        """Where it goes on, as the log says it."""
-        return f"t = {self.time:.6g} s" if isinstance(self.state, State) else f"speed {self.rows + 1}"
-
-    def after(self, step: Step, growths: int, wall_time: float) -> Checkpoint:
-        """How far it has come with another step, what is bad of it folded in."""
-        converged = self.converged and step.converged
-        return replace(self, state=step.state, converged=converged, growths=growths, wall_time=wall_time)
-
-    def at_speed(self, wall_time: float) -> Checkpoint:
-        """How far it has come with another speed of a curve of friction, which depends on no other speed."""
-        return replace(self, state=(), rows=self.rows + 1, wall_time=wall_time)
-
-    def with_current_transforms(self) -> Checkpoint:
-        """The same, to be gone on from with the transforms that are here."""
-        before = self.transforms.split(_THEN)
-        return replace(self, transforms=_THEN.join(dict.fromkeys([*before, transform_library()])))
-
-    def kept(self) -> Checkpoint:
-        """How far it has come when the step is kept as a row."""
-        return replace(self, converged=True, rows=self.rows + 1)
-
-    def noted(self) -> Checkpoint:
-        """How far it has come when the step leaves a row without fields."""
-        return replace(self, rows=self.rows + 1)
 
 
 def save_checkpoint(path: Path, reached: Checkpoint, key: str) -> None:
     """Write how far the case of that key has come, whole or not at all."""
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
-    stated = {field.name: _apart(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
+    stated = {field.name: _flatten(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
     plain = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT, "reached": stated}
     with atomic_write(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
 
-def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
-    """How far the case of that key has come; None if the file is absent, damaged, or of something else."""
+def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkpoint | None:
+    """How far the case of that key has come; None if the file is absent, damaged, or of something else.
+
+    Parameters
+    ----------
+    path : path
+        Of the file.
+    key : str
+        Of the case.
+    states : sequence of type
+        Dataclasses that the state of its experiment is made of: no others are made.
+    """
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
         found = plain["key"], plain["revision"], plain.get("result_format", 1)
         if found == (key, NUMERICS_REVISION, RESULT_FORMAT):
-            reached = Checkpoint(**{name: _together(value, arrays) for name, value in plain["reached"].items()})
+            kinds = {kind.__name__: kind for kind in states}
+            parts = plain["reached"].items()
+            reached = Checkpoint(**{name: _unflatten(value, arrays, kinds) for name, value in parts})
     except FileNotFoundError:
         return None
     except (Damaged, OSError, KeyError, TypeError, ValueError) as error:
@@ -153,17 +84,17 @@ def checkpoint_version(folder: Path) -> tuple[int, int] | None:
     return max(found, default=None)
 
 
-def _apart(value: Any, arrays: dict[str, Any], seen: dict[int, str]) -> Any:
+def _flatten(value: Any, arrays: dict[str, Any], seen: dict[int, str]) -> Any:
     """A value as JSON knows it, its arrays put aside under names, the same array once."""
     if isinstance(value, np.ndarray):
         name = seen.setdefault(id(value), f"a{len(seen)}")
         arrays[name] = value
         return {"array": name}
     if is_dataclass(value):
-        parts = {field.name: _apart(getattr(value, field.name), arrays, seen) for field in fields(value)}
+        parts = {field.name: _flatten(getattr(value, field.name), arrays, seen) for field in fields(value)}
         return {"type": type(value).__name__, "parts": parts}
     if isinstance(value, tuple):
-        return {"tuple": [_apart(part, arrays, seen) for part in value]}
+        return {"tuple": [_flatten(part, arrays, seen) for part in value]}
     if isinstance(value, np.generic):
         return value.item()
     if value is None or isinstance(value, bool | int | float | str):
@@ -171,14 +102,15 @@ def _apart(value: Any, arrays: dict[str, Any], seen: dict[int, str]) -> Any:
     raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
 
 
-def _together(value: Any, arrays: dict[str, Any]) -> Any:
+def _unflatten(value: Any, arrays: dict[str, Any], kinds: Mapping[str, type]) -> Any:
     if not isinstance(value, dict):
         return value
     if "array" in value:
         return arrays[value["array"]]
     if "tuple" in value:
-        return tuple(_together(part, arrays) for part in value["tuple"])
-    return _TYPES[value["type"]](**{name: _together(part, arrays) for name, part in value["parts"].items()})
+        return tuple(_unflatten(part, arrays, kinds) for part in value["tuple"])
+    parts = value["parts"].items()
+    return kinds[value["type"]](**{name: _unflatten(part, arrays, kinds) for name, part in parts})
 
 
 class CheckpointWriter:
@@ -192,6 +124,8 @@ class CheckpointWriter:
         Of the case.
     check : callable
         Called before anything is written: may raise that this run has lost its right to.
+    states : sequence of type
+        Dataclasses that the state of the experiment is made of.
     seconds, steps : float, int or None
         A checkpoint is written after so long, but not so often that it would take a twentieth of the time; and after
         so many accepted steps.
@@ -211,6 +145,7 @@ class CheckpointWriter:
         folder: Path,
         key: str,
         check: Callable[[], None],
+        states: Sequence[type] = (),
         *,
         seconds: float = 30.0,
         steps: int | None = None,
@@ -223,19 +158,21 @@ class CheckpointWriter:
             refuse_link(path, "a checkpoint of a run")
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows", check)
+        self.in_memory = False
         #: How far the run has come: no state of an earlier step is held.
         self.latest = Checkpoint()
         self._folder = folder
         self._key = key
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
-        self._same_bits = same_bits
+        self._states, self._same_bits = states, same_bits
         self._pending, self._last_save = 0, time.monotonic()
 
     def resume(self) -> None:
         """Find out where to go on from: the last whole checkpoint whose rows are there; the start if there is none."""
         for leftover in self._folder.glob(".*"):
             leftover.unlink()
-        found = [(reached, path) for path in self._paths if (reached := load_checkpoint(path, self._key)) is not None]
+        read = [(load_checkpoint(path, self._key, self._states), path) for path in self._paths]
+        found = [(reached, path) for reached, path in read if reached is not None]
         for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
             here = reached.with_current_transforms()
             if here != reached and self._same_bits:
@@ -244,7 +181,7 @@ class CheckpointWriter:
                 )
                 continue
             if self.rows.keep_first(reached.rows):
-                log.info("%s: goes on from %s", path, reached.place)
+                log.info("%s: goes on from here", path)
                 self.latest = here
                 if path == self._paths[0]:
                     self._paths.reverse()

@@ -1,4 +1,4 @@
-"""How variables are laid out in a result's file: chunks, filters, rounding, fill values."""
+"""How variables are laid out in a result's file: filters, rounding, fill values."""
 
 from __future__ import annotations
 
@@ -8,25 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from roughvisc.variables.rows import VOCABULARIES
+from roughvisc.variables.axes import AXES
+from roughvisc.variables.chunks import chunks
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Variables where a value may be missing and NaN says so; any other has none, and no fill value. The seed paper's
-#: algorithm states no accuracy, the direct history no energies; of steps between kept times the mean gap is not known
-#: over a grid that has grown since.
-MAY_BE_MISSING = {name for known in VOCABULARIES.values() for name, one in known.items() if one.may_be_missing}
-#: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
-#: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
-#: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.
-_CHUNK = (8, 64, 64)
-#: The same of a grid of more cells than this: a frame is read without its neighbours in time, which no memory has room
-#: for. At 4096 x 4096 x 20, in ms, compressed: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51; (1, 256, 256) 331
-#: and 41; (1, 1024, 1024) 309 and 302. ``workflows/benchmarks/big_results.py`` measures it.
-_MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
-#: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
-_LONGEST_CHUNK = 1024
 #: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
 #: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
 #: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
@@ -38,7 +25,16 @@ _TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the 
 
 def is_field(variable: xr.Variable) -> bool:
     """Whether a variable is one of fields over the rows of a result."""
-    return variable.dims[-2:] == ("x", "y") and variable.dims[:-2] in (("time",), ("speed",))
+    return variable.ndim == 3 and variable.dims[0] in AXES and variable.dims[1:] == ("x", "y")
+
+
+def may_be_missing(name: str) -> bool:
+    """Whether a value of a variable may be missing, and NaN says so; any other has no fill value.
+
+    The seed paper's algorithm states no accuracy, the direct history no energies; of steps between kept times the mean
+    gap is not known over a grid that has grown since.
+    """
+    return any(name in axis.variables and axis.variables[name].may_be_missing for axis in AXES.values())
 
 
 def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
@@ -51,7 +47,7 @@ def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
 def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
     """What netCDF4 is told of a variable."""
     encoding: dict[str, Any] = {"fill_value": False}
-    if variable.dtype.kind == "f" and name in MAY_BE_MISSING:
+    if variable.dtype.kind == "f" and may_be_missing(name):
         encoding["fill_value"] = variable.dtype.type(np.nan)
     bits = bits_kept(variable, precision)
     if bits is not None:
@@ -75,11 +71,3 @@ def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
     if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
         return {}
     return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
-
-
-def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Sides of the chunks: as equal as they can be, since a chunk that sticks out takes its whole space."""
-    many = len(shape) > 1 and shape[-2] * shape[-1] > _MANY_CELLS
-    fields = _CHUNK_OF_MANY if many else _CHUNK
-    longest = fields[-len(shape) :] if len(shape) == 3 or many else (_LONGEST_CHUNK,) * len(shape)
-    return tuple(math.ceil(n / math.ceil(n / most)) for n, most in zip(shape, longest, strict=True))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate, format_of
 from roughvisc.variables import NAMES_OF_TODAY, RESULT_FORMAT, of_step
-from roughvisc.variables.rows import VOCABULARIES, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,7 +114,7 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
         return dataset.assign_attrs(result_format=RESULT_FORMAT)
     former = [name for name in FORMER_NAMES if name in dataset.variables]
     read = {name: dataset[name].values for name in (*former, "grid_error_area") if name in dataset.variables}
-    known = VOCABULARIES[rows_of(dataset.variables)]
+    known = AXES[axis_of(dataset.variables)].variables
     dims = {name.startswith(of_step("")): dataset[name].dims for name in former}
     columns = {
         name: (dims[name.startswith(of_step(""))], values)

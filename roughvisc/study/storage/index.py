@@ -28,7 +28,7 @@ from roughvisc.study.storage.seal import append_checksum, unsealed
 from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
 from roughvisc.study.storage.trust import UNSEALED, verify_checksum, warn_once
 from roughvisc.variables import RESULT_FORMAT, of_step
-from roughvisc.variables.rows import VOCABULARIES, Rows, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")
 
@@ -40,17 +40,17 @@ _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, Val
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
-#: Histories over the rows, and over the accepted steps, with the times or speeds themselves.
-_HISTORIES = tuple(
-    dict.fromkeys(
+
+
+def _names_of_histories() -> tuple[str, ...]:
+    """Histories over the rows, and over the accepted steps, with the coordinate of the rows itself."""
+    found = (
         name
-        for rows, known in VOCABULARIES.items()
-        for name, variable in known.items()
-        if variable.dims in ((rows,), ("step",)) and name != "step"
+        for axis in AXES.values()
+        for name, variable in axis.variables.items()
+        if variable.dims in ((axis.name,), ("step",)) and name != "step"
     )
-)
-#: The same, and what they are called in results of former versions.
-_STORED = tuple(dict.fromkeys((*_HISTORIES, *FORMER_NAMES)))
+    return tuple(dict.fromkeys(found))
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ class Entry:
         return str(self.attributes.get("case_key", Path(self.file).stem))
 
     @property
-    def along(self) -> Rows:
+    def along(self) -> str:
         """What its rows lie over."""
-        return rows_of(self.histories)
+        return axis_of(self.histories)
 
     @property
     def rows(self) -> int:
@@ -148,10 +148,12 @@ def read_entry(path: Path) -> Entry:
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
     try:
-        histories = {name: v for name, v in current_histories(stored, attributes).items() if name in _HISTORIES}
+        histories = {
+            name: v for name, v in current_histories(stored, attributes).items() if name in _names_of_histories()
+        }
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    along = rows_of(histories)
+    along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]
     if absent or not _is_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
@@ -162,11 +164,13 @@ def read_entry(path: Path) -> Entry:
 
 def _histories(file: Any) -> dict[str, NDArray[Any]]:
     """Histories of a result by their names in the package; in files of former versions they are all at the root."""
-    found = {name: file[name][:] for name in _STORED if name in file.variables}
+    found = {
+        name: file[name][:] for name in dict.fromkeys((*_names_of_histories(), *FORMER_NAMES)) if name in file.variables
+    }
     for group, members in file.groups.items():
         prefix = of_step("") if group == "steps" else ""
         names = {f"{prefix}{name}": variable for name, variable in members.variables.items()}
-        found |= {name: names[name][:] for name in _HISTORIES if name in names and name not in found}
+        found |= {name: names[name][:] for name in _names_of_histories() if name in names and name not in found}
     return found
 
 
@@ -254,7 +258,7 @@ def save_index(folder: Path, index: Index) -> None:
         for entry in entries
     ]
     arrays: dict[str, NDArray[Any]] = dict(grids.arrays)
-    for name in _HISTORIES:
+    for name in _names_of_histories():
         columns = [entry.histories[name] for entry in entries if name in entry.histories]
         if columns:
             arrays[name] = np.concatenate(columns)

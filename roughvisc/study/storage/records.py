@@ -13,16 +13,15 @@ import struct
 import zlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.recorder import Frame
 from roughvisc.study.storage.links import open_unlinked
 
 Array = NDArray[Any]
-#: Writes the field of a row to an array of zeros, and gives that.
-Frame = Callable[[int, Array], Array]
 
 # Not NumPy's .npz, though it has checksums too: measured, a row took 1.3 to 3 times as long to write and 1.5 to 6 times
 # to read, in no less code; and np.load trusts the shape that a damaged member states without looking at its checksum.
@@ -119,48 +118,6 @@ def _unpacked(packed: NDArray[np.uint8], shape: Sequence[int], dtype: np.dtype[A
     flat = np.zeros(size, dtype)
     flat[np.unpackbits(packed[:bits], count=size).view(bool)] = np.frombuffer(packed[bits:].tobytes(), dtype)
     return flat.reshape(shape)
-
-
-class RowStore(Protocol):
-    """Where the rows of a run are kept."""
-
-    plain: list[dict[str, Any]]
-
-    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Take up a row: plain values and arrays."""
-        ...
-
-    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
-        """Arrays of a row, those of these names at least."""
-        ...
-
-    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Any:
-        """Array (time, x, y) of what ``frame`` gives for each of some rows."""
-        ...
-
-
-class RowsInMemory:
-    """Rows of a run that leaves no file."""
-
-    def __init__(self) -> None:
-        self.plain: list[dict[str, Any]] = []
-        self._arrays: list[Mapping[str, Array]] = []
-
-    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Take up a row."""
-        self.plain.append(plain)
-        self._arrays.append(arrays)
-
-    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
-        """Arrays of a row, those of these names at least."""
-        return self._arrays[row]
-
-    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Array:
-        """The frames of some rows."""
-        frames = np.zeros((len(rows), *shape))  # memory that is never written to is never touched
-        for row, out in zip(rows, frames, strict=True):
-            frame(row, out)
-        return frames
 
 
 class RowFile:

@@ -21,7 +21,7 @@ from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.trust import warn_once
 from roughvisc.study.storage.versions import counted_versions, version_of
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.rows import VOCABULARIES
+from roughvisc.variables.axes import AXES
 
 #: Coordinate that says which version computed each case.
 VERSION = "roughvisc_version"
@@ -139,7 +139,7 @@ def _check_common(folder: Path, entries: Sequence[Entry]) -> None:
 
 def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
     first = entries[0]
-    known = VOCABULARIES[first.along]
+    known = AXES[first.along].variables
     variables: dict[str, Any] = {
         name: (("case", *known[name].dims), _side_by_side([entry.histories[name] for entry in entries]))
         for name in first.histories
@@ -191,7 +191,7 @@ def _lazy(folder: Path, entries: Sequence[Entry], name: str, dtype: str) -> Any:
 
     first = entries[0]
     grid = (len(first.x), len(first.y))
-    in_rows = VOCABULARIES[first.along][name].dims[0] == first.along
+    in_rows = AXES[first.along].variables[name].dims[0] == first.along
     frames = max(1, _BLOCK // (grid[0] * grid[1] * np.dtype(dtype).itemsize))
     starts = range(0, first.rows, frames) if in_rows else range(1)
     counts = (tuple(min(frames, first.rows - start) for start in starts),) if in_rows else ()

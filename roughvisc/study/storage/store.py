@@ -23,14 +23,15 @@ import numpy as np
 from roughvisc.errors import FolderError, InputError
 from roughvisc.groups import group_of, groups_of, root_of, split, whole_of
 from roughvisc.labels import annotate, format_of
-from roughvisc.study.storage.encoding import bits_kept, chunks, encoding_of, is_field
+from roughvisc.study.storage.encoding import bits_kept, encoding_of, is_field
 from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.study.storage.seal import append_checksum
 from roughvisc.study.storage.trust import is_news, verify_checksum
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
-from roughvisc.variables.rows import NEEDED, VOCABULARIES, rows_of
+from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.chunks import chunks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -362,15 +363,15 @@ def _stored(path: str | Path) -> xr.Dataset:
 
 def _foreign(dataset: xr.Dataset) -> str:
     """What shows that a file is no result, whoever wrote it; empty if nothing."""
-    rows = rows_of(dataset)
-    if absent := [name for name in NEEDED[rows] if name not in dataset.variables]:
+    rows = axis_of(dataset)
+    if absent := [name for name in AXES[rows].needed if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
-    known = VOCABULARIES[rows]
+    known = AXES[rows].variables
     for part in (dataset, *groups_of(dataset).values()):
         for name, variable in part.variables.items():
             if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
                 return f"holds {name} as {variable.dtype}"
-    if odd := [name for name in NEEDED[rows] if dataset[name].dims != (rows,)]:
+    if odd := [name for name in AXES[rows].needed if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
         return f"has the tolerance {shown(dataset.attrs['tolerance'])}"

@@ -18,7 +18,7 @@ from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import atomic_write, no_results
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.rows import VOCABULARIES, Rows
+from roughvisc.variables.axes import AXES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 CASES = "cases.csv"
-#: What the table has of one row of each case: of the last time, or of the speed at which friction is largest.
-_TOLD = {rows: [n for n, one in known.items() if one.in_table == "last"] for rows, known in VOCABULARIES.items()}
-#: What it has the largest value of.
-_LARGEST = {rows: [n for n, one in known.items() if one.in_table == "largest"] for rows, known in VOCABULARIES.items()}
-_ROWS_IN_WORDS: dict[Rows, str] = {"time": "times", "speed": "speeds"}
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
@@ -105,11 +100,11 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
     columns: dict[str, Any] = {"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)}
     for rows in dict.fromkeys(entry.along for entry in entries if entry):
         mine = [entry if entry and entry.along == rows else None for entry in entries]
-        headings = {name: heading(name, one.units) for name, one in VOCABULARIES[rows].items()}
-        for name in _TOLD[rows]:
+        headings = {name: heading(name, one.units) for name, one in AXES[rows].variables.items()}
+        for name in AXES[rows].in_table("last"):
             column = columns.setdefault(headings[name], [np.nan] * len(keys))
             column[:] = _filled(column, mine, name, _summary_row)
-        for name in _LARGEST[rows]:
+        for name in AXES[rows].in_table("largest"):
             column = columns.setdefault(f"largest {headings[name]}", [np.nan] * len(keys))
             column[:] = _filled(column, mine, name, _largest)
     table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
@@ -161,8 +156,7 @@ def _filled(
 
 def _summary_row(entry: Entry, name: str) -> float:
     """The value at the end; of a curve of friction where that is largest."""
-    row = -1 if entry.along == "time" else int(np.argmax(entry.histories["friction_coefficient"]))
-    return float(entry.histories[name][row])
+    return float(entry.histories[name][AXES[entry.along].telling_row(entry.histories)])
 
 
 def _largest(entry: Entry, name: str) -> float:
@@ -175,4 +169,4 @@ def _status(entry: Entry | None, failed: bool) -> str:
     if entry is None:
         return "failed" if failed else "not computed"
     bad = int((entry.histories["status"] == NOT_CONVERGED).sum())
-    return f"{bad} of {entry.rows} {_ROWS_IN_WORDS[entry.along]} not converged" if bad else "converged"
+    return f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"

@@ -13,8 +13,8 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Float, Table, Trivia
 
 from roughvisc.errors import InputError
+from roughvisc.settings import Settings
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.statement.settings import Settings
 from roughvisc.study.storage.store import atomic_write
 from roughvisc.study.trade.ladder import format_tolerance
 

@@ -11,11 +11,12 @@ from pathlib import Path
 import xarray as xr
 
 from roughvisc.errors import RoughviscError
+from roughvisc.experiment.profile import Profile, uses_window
+from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost.estimate import ConvolutionTimer, CostEstimate, bytes_needed, march_of, solved_on, work
 from roughvisc.study.cost.stages import stages_of
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.simulation.scene import Ground, memory_options, uses_window
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.trade.ladder import Setting, changed, shape_of
@@ -90,9 +91,11 @@ class TimedRuns:
         self._until = time.perf_counter() + budget
         self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
         settings = replace(case.solving(), method="fast", missing="absent")
-        self._convolution = ConvolutionTimer().seconds(height, settings.boundary, settings.kernel)
-        ground = Ground(height, settings.missing, follow=uses_window(settings), mirror=True, kernel=settings.kernel)
-        self._part = solved_on(stages_of(ground, grows=False), self._found).part  # of the cells
+        self._convolution = ConvolutionTimer().seconds(height, settings.boundary, case.body().kernel)
+        profile = Profile(
+            height, settings.missing, follow=uses_window(settings), mirror=True, kernel=case.body().kernel
+        )
+        self._part = solved_on(stages_of(profile, grows=False), self._found).part  # of the cells
         self._calibration = 1.0
 
     @property

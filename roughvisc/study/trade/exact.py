@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.bodies.love import HALF_SPACE
 from roughvisc.mechanics.closed_forms import (
     Cone,
     Indenter,
@@ -21,7 +22,6 @@ from roughvisc.mechanics.closed_forms import (
     reduced_contact,
     ting,
 )
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.statement.case import Case
@@ -131,7 +131,7 @@ def closed_form(case: Case, times: Array) -> ClosedForm | None:
     surface = case.settings.surface
     recipe = getattr(surface, "generate", "")
     if (
-        case.kernel() != HALF_SPACE
+        case.body().kernel != HALF_SPACE
         or case.settings.solve.boundary != "free"
         or is_data(case)
         or getattr(surface, "exact", False)

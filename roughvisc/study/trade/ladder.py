@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.study.simulation.coarser import coarser_shape
+from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.settings import Memory, Method, Settings
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.surface import FileSurface
-from roughvisc.study.statement.settings import Memory, Method, Settings
 
 #: Relative precision of a float with 23 bits of fraction.
 FLOAT32 = 2.0**-24

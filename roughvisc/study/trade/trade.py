@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.labels import annotate
-from roughvisc.mechanics.halfspace.transforms import transform_library
-from roughvisc.study.progress import reporting
-from roughvisc.study.simulation.kept_times import kept_times
+from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.progress import reporting
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form

@@ -27,8 +27,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.halfspace.sheet import Base, Sheet
+from roughvisc.mechanics.bodies.body import Body, body_of
+from roughvisc.mechanics.bodies.body import sheet as sheet_of
+from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.materials.models import (
     Material,
     PowerLaw,
@@ -40,7 +43,9 @@ from roughvisc.mechanics.materials.models import (
     zener,
 )
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.simulation.simulate import simulate
+from roughvisc.problem import Problem
+from roughvisc.settings import Settings
+from roughvisc.solve import solve
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.synthesis import cone, flat_punch, sphere, wavy
 
@@ -55,8 +60,9 @@ _SIZE = 2.6  # of the grid, in contact radii
 _ROUND, _SLOPE = 10.0, 0.1  # radius of the spheres, in contact radii; slope of the cone
 
 
-def _press(height: xr.DataArray, material: Material, program: Program, **settings: Any) -> xr.Dataset:
-    return simulate(height, material, program, **{"tolerance": _TOLERANCE, "progress": False, **settings})
+def _press(height: xr.DataArray, material: Material | Body, program: Program, **settings: Any) -> xr.Dataset:
+    problem = Problem(height, body_of(material), Settings(**{"tolerance": _TOLERANCE, **settings}))
+    return solve(problem, Loading(program))
 
 
 def _distance(dataset: xr.Dataset) -> Array:
@@ -259,7 +265,7 @@ def sheet(cells: int) -> Rows:
         )
         program = Program().load(load, over=0).hold(4.0)
         ball = sphere(_ROUND, _SIZE, cells)
-        ds = _press(ball, _ZENER, program, times=times, thickness=1.0, base=base)
+        ds = _press(ball, sheet_of(_ZENER, 1.0, base), program, times=times)
         smallest = float(exact.radius(0.0))
         yield f"approach, {base}", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
         radius = _radius_error(_SIZE / cells, smallest) + _TOLERANCE

@@ -1,4 +1,4 @@
-"""``validate``: runs of :func:`roughvisc.simulate` against closed forms, with the errors to expect."""
+"""``validate``: runs of the solver against closed forms, with the errors to expect."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def validate(
 ) -> list[Comparison]:
     """Hold the solver on this machine against analytic solutions.
 
-    Elastic, viscoelastic, free, periodic, growing, shrinking and fixed contacts, all through
-    :func:`roughvisc.simulate`. The expected errors follow from the orders of the method (a cell's side over the
+    Elastic, viscoelastic, free, periodic, growing, shrinking and fixed contacts, all computed as
+    :func:`roughvisc.simulate` does. The expected errors follow from the orders of the method (a cell's side over the
     contact's radius), the tolerance, and where a closed form is a limit the next term that it leaves out.
 
     Parameters

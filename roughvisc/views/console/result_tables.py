@@ -1,4 +1,4 @@
-"""Tables on the command line of one result: a history, or a curve of friction."""
+"""Tables on the command line of one result: a history, a curve of friction, or rows over any other axis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import xarray as xr
 from rich.console import Group
 
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.console.tables import NOTES, accuracy_rows, number, readable, two_columns
 from roughvisc.views.figures.leakage import closing_times
@@ -21,9 +21,30 @@ _ACROSS = 0.05
 
 def result_table(dataset: xr.Dataset) -> Group:
     """Summary of a result: what came out, how accurate it is, what it cost."""
-    rows = {"time": _history_rows, "speed": _curve_rows}[rows_of(dataset)](dataset)
+    rows = {"time": _history_rows, "speed": _curve_rows}.get(axis_of(dataset), _general_rows)(dataset)
     grid = f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"
     return two_columns([("Grid", grid), *rows], dataset.attrs.get("title"))
+
+
+def _general_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:
+    """Of rows over any axis: where they lie, what the telling one holds, errors and costs."""
+    name = axis_of(dataset)
+    axis = AXES[name]
+    ordered = dataset.sortby(name)
+    ends = list(dict.fromkeys(axis.place(float(ordered[name][end]), 3) for end in (0, -1)))
+    row = dataset.isel({name: axis.telling_row(dataset)})
+    there = axis.place(float(row[name]), 3)
+    told = [one for one in axis.in_table("last") if one in row and one != name]
+    return [
+        (axis.rows.capitalize(), f"{dataset.sizes[name]}, from {' to '.join(ends)}"),
+        *(
+            (f"{axis.variables[one].label} at {there}", readable(float(row[one]), axis.variables[one].units))
+            for one in told
+        ),
+        *accuracy_rows([dataset], dataset.attrs.get("tolerance")),
+        *((label, dataset.attrs[note]) for note, label in NOTES.items() if note in dataset.attrs),
+        *_cost(dataset, {"convolutions": "convolutions", "iterations": "solver iterations"}),
+    ]
 
 
 def _curve_rows(dataset: xr.Dataset) -> list[tuple[str, Any]]:

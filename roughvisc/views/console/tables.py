@@ -16,7 +16,7 @@ from roughvisc.topography.grid import spacing
 from roughvisc.views.figures.axes import unit_for
 
 if TYPE_CHECKING:
-    from roughvisc.study.execution.profile import Profile
+    from roughvisc.study.execution.profile import TimeProfile
     from roughvisc.study.execution.task import Outcome
     from roughvisc.study.validation.validate import Comparison
 
@@ -155,7 +155,7 @@ _FALLS = 1.02
 _LISTED = 20
 
 
-def profile_table(profile: Profile) -> Group:
+def profile_table(profile: TimeProfile) -> Group:
     """Where the time of a run went."""
     table = Table(box=None, padding=(0, 2), title="Where the time went", title_justify="left", title_style="bold")
     table.add_column("part")
@@ -253,8 +253,8 @@ def _span(values: xr.DataArray, unit: str) -> str:
 
 
 def _counts(costs: xr.Dataset) -> list[str]:
-    """What is counted: steps of programs, speeds of curves of friction."""
-    return [name for name in ("steps", "speeds") if np.isfinite(costs[name].values).any()] or ["steps"]
+    """What is counted: steps of programs, speeds of curves of friction, rows of anything else."""
+    return [name for name in ("steps", "speeds") if np.isfinite(costs[name].values).any()] or ["rows"]
 
 
 def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:

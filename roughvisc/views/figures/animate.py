@@ -20,16 +20,17 @@ from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
-    TimeAxis,
+    RowAxis,
     Unit,
     fullest_frame,
     letter_panels,
     new_figure,
     require,
+    row_text,
+    rows_of,
     spread_axis,
     spread_frames,
     styled,
-    time_text,
     unit_for,
 )
 from roughvisc.views.figures.coarsened import note, present, touching
@@ -191,7 +192,7 @@ def _moving(
 
 def _heading(dataset: xr.Dataset, frame: int) -> str:
     """Time of a frame, and the distance that is behind."""
-    text = time_text(float(dataset["time"][frame]))
+    text = row_text(rows_of(dataset)[frame])
     if "sliding_distance" not in dataset:
         return text
     distance = dataset["sliding_distance"].values
@@ -309,7 +310,7 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     steps = history(dataset)
     clock = steps["time"]
     steps = steps if name in steps else dataset[[name]]
-    axis, (unit, spans) = TimeAxis.of(clock), rate_unit(steps[name])
+    axis, (unit, spans) = RowAxis.of(clock), rate_unit(steps[name])
     times, shown = axis.unit(steps["time"]), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
     (run,) = ax.plot([], [], color=BLUE, lw=1.4)

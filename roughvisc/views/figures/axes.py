@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -17,11 +18,12 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import ArrayLike
 
 from roughvisc.errors import InputError, printable
 from roughvisc.labels import expect_declared_units, expect_history
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import AXES, axis_of
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
@@ -84,25 +86,41 @@ def spans_decades(values) -> bool:
     return bool(unevenness(np.log(values)) < 0.7 * unevenness(values))
 
 
+def rows_of(dataset: xr.Dataset) -> xr.DataArray:
+    """The coordinate that the rows of a result lie over."""
+    return dataset[axis_of(dataset.variables)]
+
+
+def at_rows(dataset: xr.Dataset | xr.DataArray, numbers) -> Any:
+    """Some rows of a result, or of a field, or one of them."""
+    known = dataset.variables if isinstance(dataset, xr.Dataset) else dataset.dims
+    return dataset.isel({axis_of(known): numbers})
+
+
 @dataclass(frozen=True)
-class TimeAxis:
-    """How times are shown: their unit, and a linear or a logarithmic scale chosen by the data."""
+class RowAxis:
+    """How the places of rows are shown: their unit, and a linear or a logarithmic scale chosen by the data."""
 
     unit: Unit
     logarithmic: bool
     first: float
+    label: str = "Time"
 
     @classmethod
-    def of(cls, times) -> TimeAxis:
-        """Axis for some increasing times [s]."""
-        times = np.asarray(times, dtype=float)
-        positive = times[times > 0]
-        if spans_decades(times):
-            return cls(Unit(1.0, "s"), True, float(positive[0]))
-        return cls(unit_for(times, "s"), False, float(positive[0]) if len(positive) else 1.0)
+    def of(cls, rows: xr.DataArray | ArrayLike) -> RowAxis:
+        """Axis for increasing times [s], or the places on another axis."""
+        name = getattr(rows, "name", "time")
+        name = name if name in AXES else "time"
+        known = AXES[name].variables[name]
+        places = np.asarray(rows, dtype=float)
+        positive = places[places > 0]
+        label = "Time" if name == "time" else known.label
+        if spans_decades(places):
+            return cls(Unit(1.0, known.units), True, float(positive[0]), label)
+        return cls(unit_for(places, known.units), False, float(positive[0]) if len(positive) else 1.0, label)
 
     def apply(self, ax: Axes, times, most: int = 7) -> None:
-        """Set scale, limits, label and at most so many decades of a time axis; zero keeps its place on a log one."""
+        """Set scale, limits, label and at most so many decades of the axis; zero keeps its place on a log one."""
         times = self.unit(times)
         if self.logarithmic:
             zero = times[0] <= 0
@@ -125,7 +143,7 @@ class TimeAxis:
         else:
             ax.set_xticks(times, [f"{times[0]:.4g}"])
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_xlabel(self.unit.label("Time"))
+        ax.set_xlabel(self.unit.label(self.label))
 
 
 def spread_axis(axis: Axis, shown, always: bool = False) -> None:
@@ -141,9 +159,9 @@ def spread_axis(axis: Axis, shown, always: bool = False) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def time_text(time: float) -> str:
-    """A time [s] as read in running text, such as ``"t = 50 ms"``."""
-    return f"t = {unit_for([time], 's').text(time)}"
+def row_text(place: xr.DataArray | float) -> str:
+    """Place of a row, or a time [s], as read in running text, such as ``"t = 50 ms"``."""
+    return AXES[str(getattr(place, "name", "time"))].place(float(place), 3)
 
 
 def spread_frames(times, count: int) -> np.ndarray:
@@ -167,12 +185,13 @@ def telling_frames(dataset: xr.Dataset, count: int) -> list[int]:
 
     Frames whose contact is below a thousandth of the largest show nothing; they are drawn only if there are no others.
     """
-    frames = np.arange(dataset.sizes["time"])
+    rows = rows_of(dataset)
+    frames = np.arange(rows.size)
     if "contact_area" in dataset:
         area = np.nan_to_num(dataset["contact_area"].values)
         if area.max() > 0:
             frames = frames[area > 1e-3 * area.max()]
-    chosen = frames[spread_frames(dataset["time"].values[frames], count)]
+    chosen = frames[spread_frames(rows.values[frames], count)]
     if "contact_area" in dataset and len(chosen) > 2 and len(chosen) < len(frames):
         largest = frames[area[frames].argmax()]
         if area[chosen].max() < 0.999 * area[largest]:
@@ -184,7 +203,7 @@ def telling_frames(dataset: xr.Dataset, count: int) -> list[int]:
 def fullest_frame(dataset: xr.Dataset) -> int:
     """Index of the last frame whose contact area is the largest, or of the last frame where areas are unknown."""
     if "contact_area" not in dataset:
-        return dataset.sizes["time"] - 1
+        return rows_of(dataset).size - 1
     area = np.nan_to_num(dataset["contact_area"].values)
     return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
 
@@ -215,13 +234,16 @@ def require(dataset: xr.Dataset, *names: str) -> None:
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
     if "time" in names and "case" not in dataset.dims:
         expect_history(dataset)
-    extra = [dim for dim in dataset.dims if dim not in (rows_of(names), "step", "x", "y")]
+    axis = axis_of(names) if axis_of(names) in names else axis_of(dataset.variables)
+    if axis not in dataset.variables:
+        names = (axis, *names)
+    extra = [dim for dim in dataset.dims if dim not in (axis, "step", "x", "y")]
     if extra:
         raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
     for name in names:
         if name not in dataset.variables:
             stored = ", ".join(str(known) for known in dataset.data_vars)
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
-    if dataset.sizes.get("time", 1) == 0:
-        raise InputError("the result holds no time at all: nothing to draw")
+    if dataset.sizes.get(axis, 1) == 0:
+        raise InputError(f"the result holds no {axis} at all: nothing to draw")
     expect_declared_units(dataset)

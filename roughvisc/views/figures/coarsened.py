@@ -15,7 +15,7 @@ import xarray as xr
 
 from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import axis_step
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import axis_of
 
 #: Cells along the longer side up to which a map is drawn as it is.
 MOST_DRAWN = 1024
@@ -39,13 +39,13 @@ def note(dataset: xr.Dataset, *names: str) -> str:
 
 def present(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
     """One frame of a field as it is drawn, missing where the profile is absent."""
-    return drawn(dataset[name].isel({rows_of(dataset): frame}), dataset.get("height"))
+    return drawn(dataset[name].isel({axis_of(dataset): frame}), dataset.get("height"))
 
 
 def touching(dataset: xr.Dataset, frame: int) -> xr.DataArray:
     """Cells in contact of one frame as they are drawn: with pressure or, where none is stored, without a gap."""
     name = "pressure" if "pressure" in dataset else "gap"
-    found = drawn(dataset[name].isel({rows_of(dataset): frame}))
+    found = drawn(dataset[name].isel({axis_of(dataset): frame}))
     return (found > 0 if name == "pressure" else found <= 0).rename("contact")
 
 

@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import BLUE, TimeAxis, new_figure, require, styled
+from roughvisc.views.figures.axes import BLUE, RowAxis, new_figure, require, rows_of, styled
 from roughvisc.views.figures.histories import leave_room, marker_of
 from roughvisc.views.observables import asked
 
@@ -38,27 +38,27 @@ def conductance(dataset: xr.Dataset) -> Figure:
     InputError
         If the Dataset is not one case's result, or neither holds a conductance nor asks for one.
     """
-    require(dataset, "time")
+    require(dataset)
     held = dataset if any(kind in dataset for kind in CONDUCTANCES) else asked(dataset).compute()
     found = [kind for kind in CONDUCTANCES if kind in held]
     if not found:
         raise InputError("the result holds no conductance: merge it with rv.observables.conductance(ds, resistivity)")
     figure = new_figure(4.2, 0.4 + 2.5 * len(found))
-    axis = TimeAxis.of(dataset["time"])
+    axis = RowAxis.of(rows_of(dataset))
     axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
     for ax, kind in zip(axes, found, strict=True):
         _draw(ax, axis, held, kind)
-        axis.apply(ax, dataset["time"])
+        axis.apply(ax, rows_of(dataset))
     for ax in axes[:-1]:
         ax.set_xlabel("")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
-def _draw(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, kind: str) -> None:
+def _draw(ax: Axes, axis: RowAxis, dataset: xr.Dataset, kind: str) -> None:
     """Values in full contact are infinite, and left out."""
     finite = {name: dataset[name].where(np.isfinite(dataset[name])).values for name in _names(dataset, kind)}
-    unit, times = unit_for(finite[kind], VARIABLES[kind].units), axis.unit(dataset["time"])
+    unit, times = unit_for(finite[kind], VARIABLES[kind].units), axis.unit(rows_of(dataset))
     values, error = unit(finite[kind]), unit(finite[f"{kind}_error"])
     ax.fill_between(times, np.maximum(values - error, 0), values + error, color=BLUE, alpha=0.25, lw=0)
     ax.plot(times, values, color=BLUE, marker=marker_of(len(times)), ms=2.5, label="computed, with its error")

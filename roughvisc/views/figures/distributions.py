@@ -14,16 +14,18 @@ from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
-    TimeAxis,
+    RowAxis,
+    at_rows,
     frame_at,
     letter_panels,
     new_figure,
     require,
+    row_text,
+    rows_of,
     spread_axis,
     spread_frames,
     styled,
     telling_frames,
-    time_text,
     unit_for,
 )
 from roughvisc.views.figures.coarsened import row_parts
@@ -40,7 +42,7 @@ def _frames(dataset: xr.Dataset, times, count: int) -> list[int]:
     chosen = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
     if not 0 < chosen.size <= _MOST_LINES:
         raise InputError(f"{chosen.size} times to draw: choose 1 to {_MOST_LINES}")
-    return [frame_at(dataset["time"], float(time)) for time in chosen]
+    return [frame_at(rows_of(dataset), float(time)) for time in chosen]
 
 
 def _colours(count: int) -> np.ndarray:
@@ -71,7 +73,7 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     The density of pressure is over the cells in contact, that of the gap over the present cells out of contact: each
     has the integral 1.
     """
-    require(dataset, "time")
+    require(dataset)
     panels = [
         (name, find)
         for name, find in (("pressure", pressure_distribution), ("gap", gap_distribution))
@@ -80,14 +82,14 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     if not panels:
         require(dataset, "pressure", "gap")
     frames = _frames(dataset, times, 5)
-    chosen = dataset.isel(time=frames)
+    chosen = at_rows(dataset, frames)
     figure = new_figure(2.9 * len(panels) + 0.2, 2.9)
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, (name, find) in zip(axes, panels, strict=True):
         count = bins or _bin_count(chosen[name])
         _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name)
     by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    ordered = [label for label in map(time_text, chosen["time"].values) if label in by_label]
+    ordered = [label for label in map(row_text, rows_of(chosen)) if label in by_label]
     figure.legend(
         [by_label[label] for label in ordered], ordered, loc="outside upper center", ncols=5, handlelength=1.2
     )
@@ -111,11 +113,11 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
     width = 2 * centres[0]
     limits = width * np.arange(len(centres) + 1)
     unit = unit_for(limits, VARIABLES[name].units)
-    for number, colour in enumerate(_colours(dataset.sizes["time"])):
-        values = density.isel(time=number).values * unit.factor
+    for number, colour in enumerate(_colours(rows_of(dataset).size)):
+        values = at_rows(density, number).values * unit.factor
         if not np.isfinite(values).all():
             continue
-        text = time_text(float(dataset["time"][number]))
+        text = row_text(rows_of(dataset)[number])
         ax.stairs(values, unit(limits), color=colour, lw=1.2, label=text, baseline=None)
     ax.set_xlim(0, float(unit(limits[-1])))
     ax.set_ylim(bottom=0)
@@ -128,7 +130,7 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
 
 def has_clusters(dataset: xr.Dataset) -> bool:
     """Whether the contact has several spots at one of a few times: of a single one there is nothing to count."""
-    shown = dataset.isel(time=telling_frames(dataset, 4))
+    shown = at_rows(dataset, telling_frames(dataset, 4))
     return bool((clusters(shown)["cluster_count"] >= _FEWEST_CLUSTERS).any())
 
 
@@ -150,13 +152,13 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    require(dataset, "time", "x", "y")
-    followed = dataset.isel(time=spread_frames(dataset["time"], 100))
+    require(dataset, "x", "y")
+    followed = at_rows(dataset, spread_frames(rows_of(dataset), 100))
     found = clusters(followed).compute()
     figure = new_figure(7.2, 2.7)
     count, area, sizes = figure.subplots(1, 3)
-    axis = TimeAxis.of(dataset["time"])
-    times_shown = axis.unit(followed["time"])
+    axis = RowAxis.of(rows_of(dataset))
+    times_shown = axis.unit(rows_of(followed))
     marker = "o" if len(times_shown) <= 40 else ""
     count.plot(times_shown, found["cluster_count"], color=BLUE, marker=marker)
     count.set_ylabel("Contact clusters")
@@ -173,7 +175,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     else:
         _no_contact(area)
     for ax in (count, area):
-        axis.apply(ax, dataset["time"], most=4)
+        axis.apply(ax, rows_of(dataset), most=4)
     _draw_sizes(sizes, dataset, _frames(dataset, times, 4))
     for ax in (count, area, sizes):
         ax.grid(color="0.9", lw=0.5)
@@ -183,17 +185,17 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
 
 def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
     """How many clusters are at least that large: no bins to choose."""
-    chosen = dataset.isel(time=frames)
+    chosen = at_rows(dataset, frames)
     areas = cluster_areas(chosen)["cluster_area"].values
     most, unit = int(np.isfinite(areas).sum(axis=1).max()), unit_for(areas, "m^2")
     if most < _FEWEST_CLUSTERS:
         _no_contact(ax, ("no contact", "one cluster at most", "two clusters at most")[most])
         ax.set_xticks([])
     else:
-        for row, time, colour in zip(areas, chosen["time"].values, _colours(len(frames)), strict=True):
+        for row, time, colour in zip(areas, rows_of(chosen), _colours(len(frames)), strict=True):
             row = unit(row[np.isfinite(row)])
             if len(row):
-                look = {"drawstyle": "steps-post", "label": time_text(float(time))}
+                look = {"drawstyle": "steps-post", "label": row_text(time)}
                 ax.plot(row, np.arange(1, len(row) + 1), color=colour, **look)
                 ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
         ax.locator_params(axis="x", nbins=4)

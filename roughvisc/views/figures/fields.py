@@ -23,9 +23,10 @@ from roughvisc.views.figures.axes import (
     frame_at,
     new_figure,
     require,
+    row_text,
+    rows_of,
     styled,
     telling_frames,
-    time_text,
     unit_for,
 )
 from roughvisc.views.figures.coarsened import note, present, stride, touching
@@ -160,7 +161,7 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
     chosen = np.atleast_1d(np.asarray(times, dtype=float))
     if not 0 < chosen.size <= _MOST_MAPS:
         raise InputError(f"{chosen.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
-    return [frame_at(dataset["time"], float(time)) for time in chosen.ravel()]
+    return [frame_at(rows_of(dataset), float(time)) for time in chosen.ravel()]
 
 
 @styled
@@ -192,7 +193,7 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
     InputError
         If the result holds none of the fields, or more than 24 times are asked for.
     """
-    require(dataset, "time", "x", "y")
+    require(dataset, "x", "y")
     fields = [fields] if isinstance(fields, str) else list(fields)
     for name in fields:
         if name not in FIELDS:
@@ -287,7 +288,7 @@ def label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> 
 
 def _frame_text(dataset: xr.Dataset, frame: int) -> str:
     """Time of a frame; below it the nominal pressure of a scan that stands for a larger surface."""
-    text = time_text(float(dataset["time"][frame]))
+    text = row_text(rows_of(dataset)[frame])
     if "nominal_pressure" not in dataset or dataset.attrs.get("boundary") != "periodic":
         return text
     nominal = float(dataset["nominal_pressure"][frame])

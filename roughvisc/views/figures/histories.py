@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
     GREEN,
@@ -21,10 +22,11 @@ from roughvisc.views.figures.axes import (
     PURPLE,
     SKY,
     VERMILION,
-    TimeAxis,
+    RowAxis,
     letter_panels,
     new_figure,
     require,
+    rows_of,
     styled,
     unit_for,
 )
@@ -73,7 +75,7 @@ def marker_of(count: int) -> str:
 def failed_frames(dataset: xr.Dataset) -> np.ndarray:
     """Frames whose step did not converge."""
     if "status" not in dataset:
-        return np.zeros(dataset.sizes["time"], dtype=bool)
+        return np.zeros(rows_of(dataset).size, dtype=bool)
     return dataset["status"].values == NOT_CONVERGED
 
 
@@ -86,14 +88,14 @@ def leave_room(ax: Axes, *values: np.ndarray) -> None:
     ax.set_ylim(lowest - 0.05 * span, highest + 0.15 * span)
 
 
-def _draw_history(ax: Axes, axis: TimeAxis, dataset: xr.Dataset, steps: xr.Dataset, name: str, colour: str) -> None:
+def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Dataset, name: str, colour: str) -> None:
     """A line through every accepted step, and a dot at each kept time."""
-    times, values = axis.unit(steps["time"]), steps[name].values
+    times, values = axis.unit(rows_of(steps)), steps[name].values
     unit = unit_for(values, VARIABLES[name].units)
     beside = [one for one in _BESIDE.get(name, ()) if one[0] in steps and steps[one[0]].notnull().any()]
     ax.plot(times, unit(values), color=colour, label=_ITSELF[name] if beside else "_")
-    if marker := marker_of(dataset.sizes["time"]):
-        ax.plot(axis.unit(dataset["time"]), unit(dataset[name]), ls="", marker=marker, color=colour)
+    if marker := marker_of(rows_of(dataset).size):
+        ax.plot(axis.unit(rows_of(dataset)), unit(dataset[name]), ls="", marker=marker, color=colour)
     failed = failed_frames(steps)
     if failed.any():
         note = "not converged" if name == "force" else "_"
@@ -119,13 +121,13 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
         right.set_ylabel("of nominal [%]")
 
 
-def _draw_accuracy(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
+def _draw_accuracy(ax: Axes, axis: RowAxis, dataset: xr.Dataset) -> None:
     """What the kept times state of themselves."""
     floor, ceiling = math.inf, 0.0
     for name, label, colour, width in _ERRORS:
         if name not in dataset:
             continue
-        times, values = axis.unit(dataset["time"]), dataset[name].values.astype(float)
+        times, values = axis.unit(rows_of(dataset)), dataset[name].values.astype(float)
         known = np.isfinite(values) & (values > 0)
         if known.any():
             style = {"marker": marker_of(len(times)), "ms": 2.5, "lw": width}
@@ -149,9 +151,9 @@ def _draw_accuracy(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
     ax.set_ylabel("Rel. error")
 
 
-def _draw_cost(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
-    """What every kept time has cost since the one before it."""
-    times = axis.unit(dataset["time"])
+def _draw_cost(ax: Axes, axis: RowAxis, dataset: xr.Dataset) -> None:
+    """What every row has cost."""
+    times = axis.unit(rows_of(dataset))
     found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
     for values, label, colour in found:
         ax.plot(times, values, color=colour, marker=marker_of(len(times)), ms=2.5, lw=1, label=label)
@@ -161,14 +163,17 @@ def _draw_cost(ax: Axes, axis: TimeAxis, dataset: xr.Dataset) -> None:
     else:
         leave_room(ax, shown)
         ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-    ax.set_ylabel("Per kept time")
+    over = str(rows_of(dataset).name)
+    ax.set_ylabel("Per kept time" if over == "time" else f"Per {over}")
 
 
 @styled
 def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
-    """Force, approach, contact area, mean gap and work at every accepted step; cost and accuracy at kept times.
+    """Force, approach, contact area, mean gap and work over the axis of a result, with its cost and accuracy.
 
-    Kept times are dots, where these are few. What the result does not hold is left out. The time axis is linear or
+    Over time these are drawn at every accepted step, cost and accuracy at kept times.
+
+    Rows are dots, where these are few. What the result does not hold is left out. The time axis is linear or
     logarithmic as the steps suit. Steps that did not converge are crossed out. Work is that of the force so far, in
     all and by where it went: stored in the springs of the material, or dissipated. Accuracy is the stated error, its
     parts, and the tolerance as a line.
@@ -190,19 +195,20 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     InputError
         If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
     """
-    require(dataset, "time")
-    dataset = whole_of(dataset)
-    steps = over_steps(dataset)
+    require(dataset)
+    dataset, over = whole_of(dataset), axis_of(dataset.variables)
+    dataset = dataset if over == "time" else dataset.sortby(over)
+    steps = over_steps(dataset) if over == "time" else dataset
     if persson:
         theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
         steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
     panels = [panel for panel in _PANELS if panel[0] in steps]
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)
-        raise InputError(f"the result holds none of {names}: nothing to draw over time")
+        raise InputError(f"the result holds none of {names}: nothing to draw over {over}")
     costs = any(name in dataset for name, _, _ in _COSTS)
     figure, axes = _history_panels(len(panels) + costs)
-    axis = TimeAxis.of(steps["time"])
+    axis = RowAxis.of(rows_of(steps))
     for ax, (name, colour) in zip(axes, panels, strict=False):
         _draw_history(ax, axis, dataset, steps, name, colour)
         if name == "contact_area":
@@ -211,7 +217,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         _draw_cost(axes[-2], axis, dataset)
     _draw_accuracy(axes[-1], axis, dataset)
     for ax in axes:
-        axis.apply(ax, steps["time"])
+        axis.apply(ax, rows_of(steps))
         lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(ax.get_xlabel() if lowest else "")

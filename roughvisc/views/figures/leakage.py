@@ -13,19 +13,22 @@ from matplotlib.image import AxesImage
 
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.axes import axis_of
 from roughvisc.variables.transport import LEAK_MEANINGS
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
-    TimeAxis,
+    RowAxis,
     Unit,
+    at_rows,
     frame_at,
     letter_panels,
     new_figure,
     require,
+    row_text,
+    rows_of,
     spread_axis,
     styled,
-    time_text,
 )
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
 from roughvisc.views.figures.histories import leave_room, marker_of
@@ -64,11 +67,11 @@ def leakage(dataset: xr.Dataset, time: float | None = None) -> Figure:
     InputError
         If the Dataset is not one case's result, or holds no gap.
     """
-    require(dataset, "time", "x", "y", "gap")
+    require(dataset, "x", "y", "gap")
     dataset = with_leak_rate(dataset)
     flowing = np.flatnonzero(dataset["leak_rate"].values > 0)
-    frame = frame_at(dataset["time"], time) if time is not None else int(flowing[-1]) if flowing.size else -1
-    frame %= dataset.sizes["time"]
+    frame = frame_at(rows_of(dataset), time) if time is not None else int(flowing[-1]) if flowing.size else -1
+    frame %= rows_of(dataset).size
     ratio = float(np.clip(plane_ratio(dataset), 0.4, 1.4))
     figure = new_figure(7.4, 0.9 + 2.4 * max(ratio, 0.8))
     on_time, on_map = figure.subplots(1, 2, width_ratios=[1.25, 1])
@@ -101,7 +104,7 @@ def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
     if not closed[-1] or closed.all():
         return None
     last = int(np.flatnonzero(~closed)[-1])
-    times = dataset["time"].values
+    times = rows_of(dataset).values
     return float(times[last]), float(times[last + 1])
 
 
@@ -110,7 +113,7 @@ def flux_of(dataset: xr.Dataset) -> xr.DataArray:
     asked_with: dict[str, Any] = {
         name: dataset["leak_rate"].attrs[name] for name in ("along", "sides", "viscosity", "pressure_drop")
     }
-    lazily = dataset[["gap"]].chunk({"time": 1, "x": -1, "y": -1})
+    lazily = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1})
     lazily.attrs = dataset.attrs
     found = derived(lazily, flow=True, **asked_with)
     size = np.hypot(found["flux_x"], found["flux_y"]).where(lazily["gap"] > 0)
@@ -132,9 +135,9 @@ def visible(flux: xr.DataArray, highest: float) -> xr.DataArray:
 
 def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
     """Leak rate over time, the frame that is mapped, and when the contact closes."""
-    axis, rate = TimeAxis.of(dataset["time"]), dataset["leak_rate"].values
+    axis, rate = RowAxis.of(rows_of(dataset)), dataset["leak_rate"].values
     unit, spans = rate_unit(dataset["leak_rate"])
-    times = axis.unit(dataset["time"])
+    times = axis.unit(rows_of(dataset))
     shown = np.where(rate > 0, unit(rate), np.nan) if spans else unit(rate)
     ax.plot(times, shown, color=BLUE, marker=marker_of(len(times)))
     ax.plot(times[[frame]], shown[[frame]], "o", color=VERMILION, ms=6, mfc="none", mew=1.2)
@@ -149,14 +152,14 @@ def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
         ax.set_title(f"closes between {whole(closes[0]):.3g} and {whole.text(closes[1])}", loc="right")
     elif not rate.any():
         ax.set_title("closed at every kept time", loc="right")
-    axis.apply(ax, dataset["time"], most=5)
+    axis.apply(ax, rows_of(dataset), most=5)
     ax.set_ylabel(unit.label(VARIABLES["leak_rate"].label))
     ax.grid(color="0.9", lw=0.5)
 
 
 def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> None:
     """Map of the flux at one time."""
-    flux = flux_of(dataset.isel(time=[frame])).isel(time=0).load()
+    flux = at_rows(flux_of(at_rows(dataset, [frame])), 0).load()
     highest = float(np.nan_to_num(flux.values).max())
     unit, plane = unit_for([highest], VARIABLES["flux"].units), plane_unit(dataset)
     if highest > 0:
@@ -168,4 +171,4 @@ def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> Non
     label_plane(ax, dataset, plane)
     note = "" if highest > 0 else ", closed: contact grey"
     # in one text with its letter, which a narrow map has no room for beside it
-    ax.set_title(rf"$\mathbf{{(b)}}$  {time_text(float(dataset['time'][frame]))}{note}", loc="left")
+    ax.set_title(rf"$\mathbf{{(b)}}$  {row_text(rows_of(dataset)[frame])}{note}", loc="left")

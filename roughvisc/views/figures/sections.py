@@ -12,16 +12,19 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     Unit,
+    at_rows,
     frame_at,
     letter_panels,
     new_figure,
     require,
+    row_text,
+    rows_of,
     styled,
-    time_text,
     unit_for,
 )
 from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
@@ -37,7 +40,7 @@ def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
     """
     along = "x" if across == "y" else "y"
     if "pressure" in dataset:
-        carried = summed(dataset["pressure"].isel(time=frame), along)
+        carried = summed(at_rows(dataset["pressure"], frame), along)
         carried = carried * _inner(dataset, len(carried))
         if carried.max() > 0:
             return int(carried.argmax())
@@ -61,7 +64,7 @@ def deformed_line(dataset: xr.Dataset, frame: int, across: str, index: int) -> n
 
     From the displacement where it is stored, which is known above absent cells too; else the height plus the gap.
     """
-    frame_of = dataset.isel(time=frame)
+    frame_of = at_rows(dataset, frame)
     height = dataset["height"].isel({across: index}).values
     if "displacement" not in dataset:
         require(dataset, "gap")
@@ -71,7 +74,7 @@ def deformed_line(dataset: xr.Dataset, frame: int, across: str, index: int) -> n
 
 def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
     """The whole of what :func:`deformed_line` gives a line of. [m]"""
-    frame_of = dataset.isel(time=frame)
+    frame_of = at_rows(dataset, frame)
     if "displacement" in dataset:
         return frame_of["displacement"].load() + _offset(frame_of)
     require(dataset, "gap")
@@ -111,19 +114,19 @@ def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | 
     -------
     matplotlib.figure.Figure
     """
-    require(dataset, "time", "x", "y", "height")
+    require(dataset, "x", "y", "height")
     if axis not in ("x", "y"):
         raise InputError(f"axis is {axis!r}: expected 'x' or 'y'")
     dataset = measured_part(dataset)
     across = "y" if axis == "x" else "x"
-    frame = frame_at(dataset["time"], time)
+    frame = frame_at(rows_of(dataset), time)
     index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
     figure = new_figure(4.8, 3.6)
     top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
     unit = draw_section(top, bottom, dataset, frame, axis, index)
     place = float(dataset[across][index])
     where = f"{across} = {plane_unit(dataset).text(place)}"
-    top.set_title(f"{time_text(float(dataset['time'][frame]))},  {where}", loc="right")
+    top.set_title(f"{row_text(rows_of(dataset)[frame])},  {where}", loc="right")
     letter_panels((top, bottom))
     figure.align_ylabels((top, bottom))
     figure.legend(*bottom.get_legend_handles_labels(), loc="outside upper center", ncols=4, handlelength=1.4)
@@ -148,7 +151,7 @@ def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
         ax.set_yticks([])
         ax.text(0.5, 0.5, "pressure was not kept", transform=ax.transAxes, ha="center", va="center", color="0.4")
         return
-    pressure = dataset["pressure"].isel({"time": frame, across: index}).values
+    pressure = dataset["pressure"].isel({axis_of(dataset.variables): frame, across: index}).values
     unit = unit_for(pressure, "Pa")
     ax.stairs(unit(pressure), x, fill=True, color=VERMILION, alpha=0.3)
     ax.stairs(unit(pressure), x, color=VERMILION, lw=1)
@@ -178,7 +181,7 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.fill_between(wide, np.pad(s, 1, "edge"), high + 2 * margin, color=BLUE, alpha=0.16, lw=0, label="half-space")
     ax.plot(x, h, color="0.25", lw=1)
     ax.plot(x, s, color=BLUE, lw=1)
-    touching = contact(dataset.isel({"time": frame, across: index})).values
+    touching = contact(dataset.isel({axis_of(dataset.variables): frame, across: index})).values
     marked = np.where(touching, h, np.nan)
     ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
     if low - margin < unit(level) < high + 2 * margin:

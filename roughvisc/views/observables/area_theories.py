@@ -13,7 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.views.observables.derived import material_of, need
+from roughvisc.views.observables.derived import material_of, need_history
 from roughvisc.views.observables.response import history
 
 
@@ -69,7 +69,7 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
     .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
     """
-    need(dataset, "force", "height")
+    need_history(dataset, "force", "height")
     if dataset["force"].dims != ("time",):
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
     if dataset.attrs.get("boundary") != "periodic":

@@ -11,7 +11,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
-from roughvisc.views.observables.derived import need
+from roughvisc.views.observables.derived import need_history
 from roughvisc.views.observables.response import history
 
 #: Steps in a cycle below which its loop is not known.
@@ -52,7 +52,7 @@ def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.
     :math:`R` over the cycle, the closure is
     :math:`(|\Delta F| R_\delta + \max|F| \, |\Delta\delta|) / (R_F R_\delta)`.
     """
-    need(dataset, "force", "approach")
+    need_history(dataset, "force", "approach")
     if dataset["force"].dims != ("time",):
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
     steps = history(dataset)

@@ -12,8 +12,14 @@ from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units, expect_history
 
 
-def need(dataset: xr.Dataset, *names: str) -> None:
+def need_history(dataset: xr.Dataset, *names: str) -> None:
+    """Refuse what is no history over time, or lacks variables."""
     expect_history(dataset)
+    need(dataset, *names)
+
+
+def need(dataset: xr.Dataset, *names: str) -> None:
+    """Refuse a result that lacks variables, or was converted to other units; say how to get them."""
     for name in names:
         if name not in dataset:
             stored = ", ".join(str(known) for known in dataset.data_vars)

@@ -93,10 +93,10 @@ def _kernel_of(dataset: xr.Dataset, kernel: Any) -> Any:
         raise InputError(f"the result is of the kernel {dataset.attrs['kernel']}: give kernel=")
     if "thickness" not in dataset.attrs:
         return None
-    from roughvisc.study.statement.body import make_body
+    from roughvisc.mechanics.bodies.body import sheet
 
     material = material_of(dataset, "the result is of a sheet and does not record its material: give kernel=")
-    return make_body(material, float(dataset.attrs["thickness"]), dataset.attrs["base"])
+    return sheet(material, float(dataset.attrs["thickness"]), dataset.attrs["base"]).kernel
 
 
 def _modulus_at_once(dataset: xr.Dataset) -> float:

@@ -131,11 +131,11 @@ def leakage(
 
 
 def _gap_of(dataset: xr.Dataset) -> xr.DataArray:
-    """The gap over time, one frame a block."""
+    """The gap, one frame a block."""
     need(dataset, "gap")
     gap = dataset["gap"]
-    if gap.dims[-3:] != ("time", "x", "y"):
-        raise InputError(f"leakage: the gap has dimensions {', '.join(map(str, gap.dims))}: expected time, x, y")
+    if gap.dims[-2:] != ("x", "y") or len(gap.dims) < 3:
+        raise InputError(f"leakage: the gap has dimensions {', '.join(map(str, gap.dims))}: expected rows, x, y")
     return gap.chunk({dim: -1 if dim in ("x", "y") else 1 for dim in gap.dims}) if gap.chunks else gap
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.groups import group_of
 from roughvisc.labels import describe
-from roughvisc.views.observables.derived import along_time, need
+from roughvisc.views.observables.derived import along_time, need_history
 
 
 def history(dataset: xr.Dataset) -> xr.Dataset:
@@ -32,7 +32,7 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the Dataset holds many cases.
     """
-    need(dataset, "time")
+    need_history(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
     steps = group_of(dataset, "steps")
@@ -76,7 +76,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     InputError
         If the result holds no contact area.
     """
-    need(dataset, "contact_area")
+    need_history(dataset, "contact_area")
 
     def measure(area, time):
         grown = (time > since) & (area > 0)
@@ -108,7 +108,7 @@ def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the result holds no force or no approach.
     """
-    need(dataset, "force", "approach")
+    need_history(dataset, "force", "approach")
     return describe(xr.Dataset({"secant_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
 
 
@@ -165,7 +165,7 @@ def work(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the result holds no force or no approach.
     """
-    need(dataset, "force", "approach")
+    need_history(dataset, "force", "approach")
 
     def measure(force, approach):
         done = np.diff(approach) * (force[1:] + force[:-1]) / 2

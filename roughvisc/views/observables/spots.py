@@ -11,6 +11,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.topography.grid import spacing
+from roughvisc.variables.axes import axis_of
 from roughvisc.views.observables.connectivity import cluster_sizes, percolates
 from roughvisc.views.observables.derived import frame_by_frame, need
 
@@ -107,7 +108,8 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``cluster_area`` with dimensions ``(time, cluster)``, largest first, missing beyond the number of clusters. [m2]
+        ``cluster_area`` with dimensions ``(time, cluster)``, or those of another axis, largest first, missing beyond
+        the number of clusters. [m2]
 
     Raises
     ------
@@ -115,16 +117,14 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
         If the result holds neither ``pressure`` nor ``gap``, or is not of one case.
     """
     field, touches = _telling(dataset)
-    if field.dims != ("time", "x", "y"):
+    rows = axis_of(field.dims)
+    if field.dims != (rows, "x", "y"):
         raise InputError(f"the result has dimensions {field.dims}: choose one case first")
-    sizes = [
-        cluster_sizes(touches(field.isel(time=frame).values), _is_periodic(dataset), connectivity)
-        for frame in range(field.sizes["time"])
-    ]
+    sizes = [cluster_sizes(touches(frame.values), _is_periodic(dataset), connectivity) for frame in field]
     areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
     for row, found in zip(areas, sizes, strict=True):
         row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
-    return describe(xr.Dataset({"cluster_area": (("time", "cluster"), areas)}, coords={"time": dataset["time"]}))
+    return describe(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))
 
 
 def percolation(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.rows import RESIDUALS, Rows, rows_of
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import unit_for
 from roughvisc.views.sweep_figures.case_names import case_words, varied_texts
 
@@ -20,8 +20,8 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     case = json.loads(dataset.attrs.get("case", "{}"))
     title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
     words = case_words(case)
-    over = rows_of(dataset)
-    last = dataset.isel({over: _telling(dataset, over)})
+    over = axis_of(dataset)
+    last = dataset.isel({over: AXES[over].telling_row(dataset)})
     status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
     bad = int((status == NOT_CONVERGED).sum())
     return {
@@ -33,15 +33,16 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "varied": varied_texts(case),
         "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
         "times": dataset.sizes[over],
+        "rows": "Times" if over == "time" else AXES[over].rows.capitalize(),
         "friction": _friction(last) if over == "speed" else "",
         "force": _largest(dataset, "force", "N"),
         "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
         "approach": _last(last, "approach", "m"),
         "area": _last(last, "contact_area", "m^2"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
-        "stated_error": _worst(dataset, *_STATED[over]),
+        "stated_error": _worst(dataset, *_stated(dataset)),
         "time_error": _worst(dataset, "time_error"),
-        "residual": _worst(dataset, RESIDUALS[over]),
+        "residual": _worst(dataset, AXES[over].residual),
         "missed": _missed(dataset),
         "status": f"{bad} of {len(status)} {over}s not converged" if bad else "converged" if len(status) else "",
         "bad": bool(bad),
@@ -52,16 +53,9 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     }
 
 
-#: What is held against the tolerance.
-_STATED: dict[Rows, tuple[str, ...]] = {
-    "time": ("stated_error",),
-    "speed": ("pressure_residual", "friction_residual"),
-}
-
-
-def _telling(dataset: xr.Dataset, over: Rows) -> int:
-    """The last row; of a curve of friction the one where that is largest."""
-    return -1 if over == "time" else int(dataset["friction_coefficient"].argmax("speed"))
+def _stated(dataset: xr.Dataset) -> tuple[str, ...]:
+    """What is held against the tolerance; of sliding, earlier versions stated its parts alone."""
+    return ("stated_error",) if "stated_error" in dataset else ("pressure_residual", "friction_residual")
 
 
 def _friction(row: xr.Dataset) -> str:
@@ -88,5 +82,5 @@ def _worst(dataset: xr.Dataset, *names: str) -> str:
 def _missed(dataset: xr.Dataset) -> bool:
     """Whether the stated error is above the tolerance asked for."""
     tolerance = dataset.attrs.get("tolerance")
-    stated = [name for name in _STATED[rows_of(dataset)] if name in dataset]
+    stated = [name for name in _stated(dataset) if name in dataset]
     return tolerance is not None and any(bool((dataset[name] > float(tolerance)).any()) for name in stated)

@@ -17,7 +17,7 @@ from PIL import Image
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import TimeAxis, Unit, fullest_frame, spread_frames, unit_for
+from roughvisc.views.figures.axes import RowAxis, Unit, fullest_frame, spread_frames, unit_for
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
 from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, value_scale
 from roughvisc.views.figures.sections import cut_position, deformed_line
@@ -248,7 +248,7 @@ def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
     them may be less accurate.
     """
     charts, steps = [], history(dataset)
-    axis = TimeAxis.of(steps["time"])
+    axis = RowAxis.of(steps["time"])
     across, ticks = _across(axis, steps["time"].values)
     time = {"time": axis.unit.label("Time"), "xticks": ticks}
     places = np.searchsorted(steps["time"].values, dataset["time"].values[chosen], side="right") - 1
@@ -303,7 +303,7 @@ def _pixel(value: float) -> float | None:
     return round(float(value), 1) if np.isfinite(value) else None
 
 
-def _across(axis: TimeAxis, times: np.ndarray) -> tuple[Callable[[np.ndarray], np.ndarray], list[list[Any]]]:
+def _across(axis: RowAxis, times: np.ndarray) -> tuple[Callable[[np.ndarray], np.ndarray], list[list[Any]]]:
     """Function from times to places along the chart, which these times fill, and its ticks."""
     shown = axis.unit(times)
     floor = axis.first / 3 if times[0] <= 0 else axis.first  # zero has its place at the left end

@@ -17,12 +17,13 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
+from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.store import atomic_write, no_results, result_files, whole_result
 from roughvisc.study.storage.trust import verify_checksum
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.coarsened import drawn
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
@@ -30,7 +31,13 @@ from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures.case_names import case_words, names_of
-from roughvisc.views.sweep_figures.case_text import friction_words, material_words, program_words, study_text
+from roughvisc.views.sweep_figures.case_text import (
+    friction_words,
+    material_words,
+    program_words,
+    study_text,
+    table_words,
+)
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 #: Size that all maps may have together. [bytes]
@@ -136,7 +143,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 @contextmanager
 def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
     if isinstance(source, xr.Dataset):
-        require(source, rows_of(source), "x", "y")
+        require(source, axis_of(source), "x", "y")
         yield source
     else:
         with whole_result(source) as dataset:
@@ -153,7 +160,7 @@ def _swept(folder: Path) -> list[dict[str, str]]:
 def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
-    curves: list[dict[str, Any]] = []  # studies of friction, which have no time to pick
+    curves: list[dict[str, Any]] = []  # studies over another axis, which have no time to pick
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
     rows, views, figures, surfaces, studies, everything = [], [], [], {}, [], {}
     names: set[str] = set()
@@ -194,8 +201,9 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         failures=failures,
         views=views,
         studies=[*studies, *curves],
-        curves=len(curves),
-        audited=any(study["audit"] for study in studies),
+        headings=list(dict.fromkeys(row["rows"] for row in rows)) or ["Times"],
+        rubbed=any(row["friction"] for row in rows),
+        audited=any(study["audit"] for study in (*studies, *curves)),
         bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
         figures=figures,
         surfaces=list(surfaces.values()),
@@ -257,6 +265,9 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
         "material": material_words(case["material"]) if "material" in case else "",
         "program": program_words(case["program"]) if "program" in case else [],
         "friction": friction_words(case["friction"]) if "friction" in case else "",
+        "others": [
+            [name, table_words(name, case[name])] for name in EXPERIMENTS if name in case and name != "friction"
+        ],
         "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
         "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
         "notes": [str(dataset.attrs[key]) for key in _NOTES if key in dataset.attrs],

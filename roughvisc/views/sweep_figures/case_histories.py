@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from roughvisc.views.figures.axes import TimeAxis, Unit, new_figure, styled
+from roughvisc.views.figures.axes import RowAxis, Unit, new_figure, styled
 from roughvisc.views.observables import history
 from roughvisc.views.sweep_figures.cases import (
     Parameter,
@@ -59,7 +59,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     colouring = Colouring(first)
     lines = [_line(member, quantity) for member in cases.members]
     times = np.unique(np.concatenate([line["time"].values for line in lines]))
-    axis = TimeAxis.of(times)
+    axis = RowAxis.of(times)
     unit = quantity_unit(cases, quantity, np.concatenate([line.values for line in lines]))
     count = len(facets.levels)
     columns = min(count, 2 if count in (2, 4) else 3)
@@ -94,7 +94,7 @@ def _facets(others: list[Parameter], cases: int) -> Parameter:
     return Parameter("", np.zeros(cases), "", "")
 
 
-def _draw_panel(ax: Axes, axis: TimeAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> None:
+def _draw_panel(ax: Axes, axis: RowAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> None:
     """Lines of some cases, the later ones thinner, so that none hides another that it lies on."""
     few = len({level for _, _, level in drawn}) <= 8
     for number, (line, member, level) in enumerate(sorted(drawn, key=lambda one: one[2])):

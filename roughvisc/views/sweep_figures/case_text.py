@@ -110,12 +110,13 @@ def friction_words(friction: Mapping[str, Any]) -> str:
 
 def program_words(segments: list[Mapping[str, Any]]) -> list[str]:
     """Loading program of a case, a line a segment."""
-    return [
-        ", ".join(
-            f"{key} {_value(value)}"
-            if isinstance(value, dict | list)
-            else f"{key} {readable_setting(f'program.{number}.{key}', value)}"
-            for key, value in segment.items()
-        )
-        for number, segment in enumerate(segments)
-    ]
+    return [table_words(f"program.{number}", segment) for number, segment in enumerate(segments)]
+
+
+def table_words(name: str, table: Mapping[str, Any]) -> str:
+    """A table of a study in one line; its dotted name tells the units."""
+    told = {
+        key: _value(value) if isinstance(value, dict | list) else readable_setting(f"{name}.{key}", value)
+        for key, value in table.items()
+    }
+    return ", ".join(f"{key} {words}" for key, words in told.items())

@@ -17,7 +17,7 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import atomic_write, whole_result
-from roughvisc.variables.rows import rows_of
+from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import verbatim
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
@@ -69,7 +69,7 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
     for name in (*held[:1], *(one for one in held if one in observed)):
         kind = "histories" if name == held[0] else f"{name}-histories"
         yield kind, f"{_word(name)} over time, a line a case", histories_of_cases(results, name)
-    if all(rows_of(member) == "speed" for member in cases.members):
+    if all(axis_of(member) == "speed" for member in cases.members):
         yield "friction", "Friction and contact area against the speed, a line a case", friction_of_cases(results)
         if _is_shifted(cases):
             title = "The same against the speed times the shift factor: a master curve"

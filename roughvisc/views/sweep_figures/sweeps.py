@@ -17,9 +17,9 @@ from roughvisc.views.figures.axes import (
     frame_at,
     letter_panels,
     new_figure,
+    row_text,
     spread_frames,
     styled,
-    time_text,
 )
 from roughvisc.views.sweep_figures.cases import (
     Cases,
@@ -144,8 +144,8 @@ def _title(cases: Cases, frames: list[int]) -> str:
     """The time, or about which time it is if it is not the same in all cases."""
     found = {float(member["time"][frame]) for member, frame in zip(cases.members, frames, strict=True)}
     if len(found) == 1:
-        return time_text(found.pop())
-    return "at the end" if _all_last(cases, frames) else f"t ≈ {time_text(float(np.median(list(found))))[4:]}"
+        return row_text(found.pop())
+    return "at the end" if _all_last(cases, frames) else f"t ≈ {row_text(float(np.median(list(found))))[4:]}"
 
 
 def _all_last(cases: Cases, frames: list[int]) -> bool:

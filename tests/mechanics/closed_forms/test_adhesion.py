@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
-from roughvisc.mechanics.halfspace.sheet import complement
+from roughvisc.mechanics.bodies.sheet import complement
 
 
 def jkr_force(a, radius, modulus, w):

@@ -82,8 +82,8 @@ def test_half_space_shortfall__is_that_of_runs_at_the_same_approach(poisson, bas
     heights, material = rv.sphere(radius, 5.2e-4, (27, 26)), rv.elastic(1e6, poisson)
     program, settings = rv.Program().approach(a**2 / radius, over=1.0), {"tolerance": 1e-2, "times": 1}
     half_space, sheet = (
-        rv.simulate(heights, material, program, progress=False, **settings, **more)
-        for more in ({}, {"thickness": a / width, "base": base})
+        rv.simulate(heights, body, program, progress=False, **settings)
+        for body in (material, rv.sheet(material, a / width, base))
     )
     force, approach = float(half_space.force[-1]), float(half_space.approach[-1])
     found = cf.half_space_shortfall(cf.Sheet(a / width, poisson, base), (1 - poisson) / 2e6, force, approach)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import full_contact, problem
 from roughvisc.mechanics.contact.certificate import Certificate, certify
 from roughvisc.mechanics.contact.error_estimate import Asked, estimated_error
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CORNER = np.ones(SHAPE, bool)

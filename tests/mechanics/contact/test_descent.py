@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import descent, iteration
 from roughvisc.mechanics.contact.descent import Step, Trial, admissible_fraction, minimum_along
 from roughvisc.mechanics.contact.iteration import Iterate, Search
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CONTROLS = pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 0.9}], ids=["load", "approach"])

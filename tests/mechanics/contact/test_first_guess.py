@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solver
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 
 @pytest.mark.parametrize(("shape", "spacing"), [((258, 291), (1.0, 1.0)), ((293, 259), (0.02, 0.05))])

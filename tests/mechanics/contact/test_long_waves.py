@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import long_waves, solve_contact
 from roughvisc.mechanics.contact.influence import Influence
 from roughvisc.mechanics.contact.long_waves import LongWaves
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.topography.synthesis import self_affine
 
 SHAPE, SPACING = (52, 37), (0.5, 0.7)

@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from roughvisc.mechanics.bodies import operator
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import long_waves, solve_contact
 from roughvisc.mechanics.fields import passes
 from roughvisc.mechanics.fields import threads as threads_module
-from roughvisc.mechanics.halfspace import operator
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 
 THREADS = pytest.mark.parametrize("threads", [1, 2, 3])
 

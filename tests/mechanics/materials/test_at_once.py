@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.experiment.scene import shortest_age
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.closed_forms.growing_contact import lee_radok_step
-from roughvisc.study.simulation.scene import shortest_age
 
 ROWS = np.geomspace(1e-6, 10.0, 60)
 LAWS = [rv.PowerLaw(glassy, 1.0, exponent) for glassy in (0.3, 0.01) for exponent in (0.1, 0.5)]

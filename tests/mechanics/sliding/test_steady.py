@@ -9,10 +9,10 @@ from dense_sliding import PERIOD, TIME, dense, line_profiles, rubber, slid, stro
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.mechanics.halfspace.sheet import Sheet
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import roughvisc as rv
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import apart
 from roughvisc.mechanics.stepping import march as marching

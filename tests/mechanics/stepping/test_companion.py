@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.experiment.stated import error_columns, meets_tolerance
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.fields.sparse import Sparse, Sum
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import attempt, companion
@@ -15,8 +16,6 @@ from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.uncertainty import Uncertainty
-from roughvisc.study.simulation.rows import meets_tolerance
-from roughvisc.study.simulation.stated import error_columns
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {

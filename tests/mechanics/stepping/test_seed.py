@@ -6,7 +6,7 @@ from support import MATERIALS, STEP_LOAD, scene
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.stepping import seed
 from roughvisc.mechanics.stepping.march import march
 

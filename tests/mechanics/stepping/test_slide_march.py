@@ -9,8 +9,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance

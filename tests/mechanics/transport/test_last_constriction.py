@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.transport.flow import flow
 
 CELLS, AMPLITUDE = 128, 0.01

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.closed_forms import Sheet
 from roughvisc.mechanics.closed_forms.sheet import PunchOnSheet
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.mechanics.transport.spots import frozen_contact
 
 #: Stiffness of a square of unit side over the contact modulus: pi times the capacity of a square plate, 0.36678742 of

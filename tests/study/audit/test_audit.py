@@ -141,18 +141,10 @@ def test_thickness__predicts_what_the_sheet_makes_of_a_sphere(poisson, base, wid
         rv.elastic(1e6, poisson),
         rv.Program().load(load, over=1.0),
     )
-    half_space, sheet = (
-        rv.simulate(heights, material, program, **QUICK, **more)
-        for more in ({}, {"thickness": a / width, "base": base})
-    )
-    there = rv.simulate(
-        heights,
-        material,
-        rv.Program().approach(float(half_space.approach[-1]), over=1.0),
-        **QUICK,
-        thickness=a / width,
-        base=base,
-    )
+    on_base = rv.sheet(material, a / width, base)
+    half_space, sheet = (rv.simulate(heights, body, program, **QUICK) for body in (material, on_base))
+    as_deep = rv.Program().approach(float(half_space.approach[-1]), over=1.0)
+    there = rv.simulate(heights, on_base, as_deep, **QUICK)
     deeper = 1 - float(sheet.approach[-1] / half_space.approach[-1])
     weaker = 1 - float(half_space.force[-1] / there.force[-1])
     assert weaker > deeper
@@ -169,8 +161,8 @@ def test_thickness__predicts_what_the_sheet_makes_of_a_rough_surface(thickness):
     heights = rv.self_affine((1e-3, 1e-3), 48, hurst=0.8, rms_slope=0.1, rolloff=5e-4, shortcut=1e-4, seed=2)
     program = rv.Program().pressure(2e4, over=1.0)
     half_space, sheet = (
-        rv.simulate(heights, RUBBER, program, boundary="periodic", **QUICK, **more)
-        for more in ({}, {"thickness": thickness})
+        rv.simulate(heights, body, program, boundary="periodic", **QUICK)
+        for body in (RUBBER, rv.sheet(RUBBER, thickness))
     )
     true = 1 - float(sheet.approach[-1] / half_space.approach[-1])  # incompressible: no compression of its own
     assert 0.5 * true < rv.audit(half_space, thickness=thickness)["thickness"].number < 2 * true
@@ -212,7 +204,7 @@ def test_thickness__that_would_be_enough_is_where_the_verdict_flips(ball, rough)
 
 def test_thickness__that_is_not_that_of_the_sheet_is_told():
     heights, program = rv.sphere(RADIUS, 4e-4, 16), rv.Program().load(1e-4, over=1.0)
-    ds = rv.simulate(heights, RUBBER, program, thickness=1e-3, **QUICK)
+    ds = rv.simulate(heights, rv.sheet(RUBBER, 1e-3), program, **QUICK)
     assert rv.audit(ds, thickness="1 mm")["thickness"].verdict == "holds"
     other = rv.audit(ds, thickness="2 mm")["thickness"]
     assert (other.verdict, "1 mm, and 2 mm is stated" in other.sentence) == ("not known", True)
@@ -507,10 +499,27 @@ def test_audit__refuses_what_is_no_result_of_one_case(ball):
         rv.audit(ball.expand_dims("case"))
     with pytest.raises(InputError, match="the result holds no 'force'"):
         rv.audit(ball.drop_vars("force"))
-    wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1)
-    curve = rv.friction(wave, rv.zener(3e6, 1e6, 1e3), pressure=5e4, speeds=0.1)
-    with pytest.raises(InputError, match="found a result over speed: expected one over time"):
-        rv.audit(curve)
+
+
+def test_curve_of_friction__is_judged_by_its_speeds():
+    """Waves by the largest speed, heat where most is dissipated, moduli by the longest wave at the lowest speed."""
+    wave, rubber = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1), rv.zener(3e6, 1e6, 1e3)
+    wave = wave.roll(x=12)  # the crest in the middle
+    given = {"density": 1000.0, "heat_conductivity": 0.2, "volumetric_heat_capacity": 2e6}
+    slow, fast = (
+        rv.friction(wave, rubber, pressure=5e4, speeds=speeds, fields=["pressure"], progress=False)
+        for speeds in ([1e-3, 0.1], [1e-3, 0.1, 100.0])
+    )
+    for ds, verdict in ((slow, "holds"), (fast, "broken")):
+        assert rv.audit(ds, **given)["inertia"].verdict == verdict
+    assert "slides at 100 m/s" in rv.audit(fast, **given)["inertia"].sentence
+    hot = int(slow.dissipated_power.values.argmax())
+    row, power = slow.isel(speed=hot), float(slow.dissipated_power.max())
+    radius = math.sqrt(float(row.contact_area) / math.pi)  # of one crest, one spot
+    rise = cf.flash_temperature(power / float(row.contact_area), radius, 0.1, 0.2, 2e6)
+    assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise)
+    passing = float(np.ptp(wave.x.values)) / 1e-3
+    assert slow.attrs["compliance_at_end"] == rubber.contact_compliance(passing)
 
 
 def test_audit__takes_units_and_shows_itself(ball):

@@ -10,16 +10,17 @@ from support import BALL, run_whole
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.experiment import profile as profile_module
+from roughvisc.experiment.footprint import march_bytes
+from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.scene import build_scene
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import choose_memory
+from roughvisc.settings import Settings
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost.estimate import CostEstimate, Passed, solved_on
 from roughvisc.study.cost.stages import Stage, stage_at, stages_of
-from roughvisc.study.simulation import scene as scene_module
-from roughvisc.study.simulation.footprint import march_bytes
-from roughvisc.study.simulation.scene import Ground
 from roughvisc.study.statement.case import read_cases, vary
-from roughvisc.study.statement.settings import Settings
 from roughvisc.views.console.tables import plan_tables
 
 HEAD = """
@@ -103,11 +104,11 @@ def test_plan__foresees_the_grid_in_the_end_and_the_work_till_then(study, convol
     case = study(HEAD + GROWING[name])
     planned = rv.plan([case]).isel(case=0)
     height = case.height()
-    ground = Ground(height, follow=True, mirror=True, kernel=case.kernel())
+    profile = Profile(height, follow=True, mirror=True, kernel=case.body().kernel)
     found = estimate.march_of(case, height)
     assert max(step.level for step in found.course) == pytest.approx(found.pressed.approach)
     assert np.max([step.width for step in found.course], axis=0) == pytest.approx(found.pressed.width)
-    foreseen = solved_on(stages_of(ground, grows=True), found)
+    foreseen = solved_on(stages_of(profile, grows=True), found)
     convolved.clear()
     ds = run_whole(case, progress=False)
     final = (ds.sizes["x"], ds.sizes["y"])
@@ -125,18 +126,18 @@ def test_plan__foresees_the_grid_in_the_end_and_the_work_till_then(study, convol
 
 
 @pytest.mark.parametrize(("shape", "follow"), [((130, 121), True), ((20, 21), False), ((20, 22), False)])
-def test_stages__are_the_windows_and_grids_that_a_ground_comes_through(monkeypatch, shape, follow):
-    monkeypatch.setattr(scene_module, "MOST_CELLS", 300**2)
+def test_stages__are_the_windows_and_grids_that_a_profile_comes_through(monkeypatch, shape, follow):
+    monkeypatch.setattr(profile_module, "MOST_CELLS", 300**2)
     monkeypatch.setattr("roughvisc.study.cost.stages.MOST_CELLS", 300**2)
     height = rv.sphere(1e-2, (1e-3 * shape[0], 1e-3 * shape[1]), shape)
-    ground = Ground(height, follow=follow, mirror=True)
+    profile = Profile(height, follow=follow, mirror=True)
     program = rv.Program().load(1e-3, over=1.0)
-    scene, _ = scene_module.build_scene(ground, rv.elastic(1e6), program, Settings(boundary="free"))
-    found = [(ground.height.shape, np.prod(ground.window.shape), ground.window.outside)]
-    while (larger := ground.enlarge(scene)) is not None:
+    scene, _ = build_scene(profile, rv.elastic(1e6), program, Settings(boundary="free"))
+    found = [(profile.height.shape, np.prod(profile.window.shape), profile.window.outside)]
+    while (larger := profile.enlarge(scene)) is not None:
         scene = larger[0]
-        found.append((ground.height.shape, np.prod(ground.window.shape), ground.window.outside))
-    stages = stages_of(Ground(height, follow=follow, mirror=True), grows=True)
+        found.append((profile.height.shape, np.prod(profile.window.shape), profile.window.outside))
+    stages = stages_of(Profile(height, follow=follow, mirror=True), grows=True)
     assert [stage.shape for stage in stages] == [shape for shape, _, _ in found]
     assert [stage.outside for stage in stages] == [outside for _, _, outside in found]
     assert [stage.solved for stage in stages] == pytest.approx([solved for _, solved, _ in found], rel=0.05)
@@ -189,7 +190,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
 
 
 def test_grid_that_would_grow_too_large__is_foreseen(study, monkeypatch):
-    for module in (scene_module, estimate):
+    for module in (profile_module, estimate):
         monkeypatch.setattr(module, "MOST_CELLS", 40**2)
     monkeypatch.setattr("roughvisc.study.cost.stages.MOST_CELLS", 40**2)
     case = study(HEAD + GROWING["mirrored"])

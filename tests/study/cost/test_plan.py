@@ -12,16 +12,16 @@ from rich.console import Console
 from support import BALL, run_whole
 
 import roughvisc as rv
+from roughvisc.api import simulate
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
+from roughvisc.experiment.available import Available
+from roughvisc.mechanics.bodies.love import HALF_SPACE
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost import plan as plan_module
 from roughvisc.study.cost import totals as totals_module
 from roughvisc.study.cost.estimate import CostEstimate, Solved, coarse, wall_time
 from roughvisc.study.cost.stages import Stage
-from roughvisc.study.simulation.available import Available
-from roughvisc.study.simulation.simulate import simulate
 from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.variables import STEPPED
 from roughvisc.views.console import tables

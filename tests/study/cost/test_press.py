@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
-from roughvisc.mechanics.halfspace.operator import HalfSpace
 from roughvisc.study.cost import first_pressure as first_module
 from roughvisc.study.cost.first_pressure import first_pressure
 from roughvisc.study.cost.press import Push, copy_to_press, press

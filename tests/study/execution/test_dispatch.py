@@ -18,7 +18,7 @@ from support import LOADS, LONG, assert_same, numbers
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError, InputError, InUseError, RoughviscError
 from roughvisc.groups import whole_of
-from roughvisc.mechanics.halfspace.transforms import transform_library
+from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, has_other_versions
 from roughvisc.study.execution.sweep import run_cases, sweep

@@ -46,7 +46,7 @@ def study(tmp_path, scan):
 
 def after_the_first(monkeypatch, change):
     """Changes something when the first case has been computed."""
-    press, pressed = run_module.carry_out, []
+    press, pressed = run_module.solve, []
 
     def pressing(*args, **settings):
         ds = press(*args, **settings)
@@ -55,7 +55,7 @@ def after_the_first(monkeypatch, change):
         pressed.append(1)
         return ds
 
-    monkeypatch.setattr(run_module, "carry_out", pressing)
+    monkeypatch.setattr(run_module, "solve", pressing)
     return pressed
 
 

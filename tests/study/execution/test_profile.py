@@ -7,8 +7,8 @@ from click.testing import CliRunner
 from support import run_whole
 
 from roughvisc.cli import main
-from roughvisc.mechanics.halfspace.operator import HalfSpace
-from roughvisc.study.execution.profile import REST, Profile, profiled
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.study.execution.profile import REST, TimeProfile, profiled
 
 STUDY = """
 [surface]
@@ -53,7 +53,7 @@ def test_profile__sums_up_to_the_whole_and_counts_the_transforms(study, tmp_path
 
 
 def test_profile__counts_the_inner_of_two_parts():
-    profile = Profile()
+    profile = TimeProfile()
     inner = profile.timed("inner", lambda: time.sleep(0.02))
     outer = profile.timed("outer", lambda: [inner() for _ in range(3)])
     outer()

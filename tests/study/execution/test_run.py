@@ -93,7 +93,7 @@ def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):
     with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
         run_whole(study, progress=False)
     (path,) = (study.parent / "results" / "ball").iterdir()
-    assert "1 of 3 kept times did not converge, first at t = 0.1 s" in str(caught.value)
+    assert "1 of 3 kept times did not converge, first at t = 100 ms" in str(caught.value)
     assert str(path) in str(caught.value)
     assert "did not converge" in caplog.text
     with whole_result(path) as ds:

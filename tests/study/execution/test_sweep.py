@@ -275,7 +275,7 @@ def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubb
         outcomes = run_cases(study()[:1], tmp_path / "out", watch=NullMonitor(), workers=0)
         (outcome,) = outcomes.values()
         assert outcome.kind == "unconverged"
-        assert "1 of 3 kept times did not converge, first at t = 0.1 s" in outcome.message
+        assert "1 of 3 kept times did not converge, first at t = 100 ms" in outcome.message
 
 
 def alive(group):
@@ -351,8 +351,8 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
     cases = study()
     stream = io.StringIO()
     watch = LiveMonitor(Console(file=stream, force_terminal=terminal, width=160))
-    monkeypatch.setattr("roughvisc.study.progress.LINE_EVERY", 0.0)
-    monkeypatch.setattr("roughvisc.study.progress.PICTURE_EVERY", 0.0)
+    monkeypatch.setattr("roughvisc.progress.LINE_EVERY", 0.0)
+    monkeypatch.setattr("roughvisc.progress.PICTURE_EVERY", 0.0)
     watch.begin(cases, "http://127.0.0.1:8787/status")
     watch.ended(outcome(cases[0].key))
     watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))

@@ -4,9 +4,9 @@ import pytest
 from support import BALL
 
 import roughvisc as rv
+from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.study.statement import identity as identity_module
 from roughvisc.study.statement.case import Case, read_cases, read_study
-from roughvisc.study.statement.curve import SteadySliding
 from roughvisc.study.statement.schema.units import unit_of
 
 SURFACE = BALL[BALL.index("[surface]") : BALL.index("[[program]]")]
@@ -70,7 +70,7 @@ def test_case__states_a_curve_and_survives_its_text(read):
         ("load = 1\nspeeds = 1", "", r"solve\.boundary: found 'free': steady sliding repeats: expected 'periodic'"),
         ("load = 1\nspeeds = 1", PERIODIC + "time_step = 1", r"solve\.time_step: found 1\.0: steady sliding has none"),
         ("load = 1\nspeeds = 1", PERIODIC + 'edge = "accept"', r"solve\.edge: found 'accept'"),
-        ("load = 1\nspeeds = 1", PERIODIC + "[keep]\ntimes = 3", r"keep\.times: found 3: steady sliding has no times"),
+        ("load = 1\nspeeds = 1", PERIODIC + "[keep]\ntimes = 3", r"keep\.times: found 3: steady sliding has none"),
         ("load = 1\nspeeds = 1", PERIODIC + '[keep]\nfields = ["displacement"]', r"keep\.fields: found 'displacement'"),
         ("load = 1\nspeeds = 1", PERIODIC + "[[program]]\nload = 1\nover = 0", r"program: found beside \[friction\]"),
     ],

@@ -21,22 +21,30 @@ import xarray as xr
 from support import run_whole
 
 from roughvisc.errors import InUseError
+from roughvisc.experiment.loading import Loading, LoadingState
+from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.fields.sparse import Sparse
-from roughvisc.mechanics.halfspace.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.stepping.pace import ControllerState
 from roughvisc.mechanics.stepping.scene import Instant, State
+from roughvisc.recorder import Checkpoint
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage import records
-from roughvisc.study.storage.checkpoint import Checkpoint, CheckpointWriter, load_checkpoint, save_checkpoint
+from roughvisc.study.storage.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import held
 from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import whole_result
+
+
+def loaded(path, key):
+    """How far a run through a program has come."""
+    return load_checkpoint(path, key, Loading.states)
+
 
 # Recovers after a jump down, holds the approach, and keeps times that no step would land on by itself.
 MODES = """
@@ -202,7 +210,7 @@ def test_growing__grows_before_and_after_the_cut(whole, tmp_path, text):
     growths = []
     for cut in (1, steps // 2, steps):
         folder = stopped(case, tmp_path / str(cut), cut)
-        growths.append(load_checkpoint(folder / "checkpoint.0", case.key).growths)
+        growths.append(loaded(folder / "checkpoint.0", case.key).state.growths)
     assert growths == sorted(growths)
     assert 0 <= growths[0] < growths[-1]
 
@@ -212,7 +220,7 @@ def test_direct__keeps_every_pressure(whole, tmp_path):
     case, _, steps = whole(DIRECT)
     folder = stopped(case, tmp_path, steps - 5)
     instants = steps - 5 + 1
-    memory = load_checkpoint(folder / "checkpoint.0", case.key).state.memory
+    memory = loaded(folder / "checkpoint.0", case.key).state.march.memory
     assert isinstance(memory, HistoryState)
     assert instants > 32
     assert [len(block.pressures) for block in memory.blocks] == [32] * (instants // 32) + [1] * (instants % 32)
@@ -227,25 +235,26 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
         state = State(now, strange, memory, before=None, pace=ControllerState(0.1, 0.5, True), convolutions=2**40)
-        reached = Checkpoint(state, False, 3, 2, 1e-17)
+        reached = Checkpoint(LoadingState(state, False, 3, 0.1), 0.1 + 0.2, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
-        back = load_checkpoint(tmp_path / "c", "key")
+        back = loaded(tmp_path / "c", "key")
         assert repr(replace(back, state=None)) == repr(replace(reached, state=None))
         for field in fields(State):
             if field.name not in ("now", "displacement", "memory"):
-                assert getattr(back.state, field.name) == getattr(state, field.name), field.name
-        assert back.state.before is None
-        assert (back.state.now.force, math.copysign(1, back.state.now.approach)) == (1e-310, -1)
-        assert back.state.now.pressure.flags.c_contiguous
-        assert back.state.now.pressure.tobytes() == strange.T.tobytes()
-        assert back.state.displacement.tobytes() == strange.tobytes()
-        assert type(back.state.memory) is type(memory)
+                assert getattr(back.state.march, field.name) == getattr(state, field.name), field.name
+        assert repr(replace(back.state, march=None)) == repr(replace(reached.state, march=None))
+        assert back.state.march.before is None
+        assert (back.state.march.now.force, math.copysign(1, back.state.march.now.approach)) == (1e-310, -1)
+        assert back.state.march.now.pressure.flags.c_contiguous
+        assert back.state.march.now.pressure.tobytes() == strange.T.tobytes()
+        assert back.state.march.displacement.tobytes() == strange.tobytes()
+        assert type(back.state.march.memory) is type(memory)
         for field in fields(memory):
-            one, other = getattr(back.state.memory, field.name), getattr(memory, field.name)
+            one, other = getattr(back.state.march.memory, field.name), getattr(memory, field.name)
             if isinstance(other, np.ndarray):
                 assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
-    assert back.state.memory.shape == (2, 3)
-    assert back.state.memory.blocks[0].cells.dtype == np.intp
+    assert back.state.march.memory.shape == (2, 3)
+    assert back.state.march.memory.blocks[0].cells.dtype == np.intp
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -256,19 +265,21 @@ def after_steps(count):
     """How far a run has come after so many steps of a second."""
     nothing = np.zeros((3, 2))
     at_rest = Sparse.of(nothing)
-    return [Checkpoint(State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None)) for n in range(1, count + 1)]
+    states = [State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None) for n in range(1, count + 1)]
+    return [Checkpoint(LoadingState(state), done=state.now.time) for state in states]
 
 
 def last_saved(folder):
     """Time of the latest checkpoint, zero if there is none. [s]"""
-    found = [load_checkpoint(folder / f"checkpoint.{n}", "key") for n in (0, 1)]
-    return max((reached.time for reached in found if reached is not None), default=0.0)
+    found = [loaded(folder / f"checkpoint.{n}", "key") for n in (0, 1)]
+    return max((reached.done for reached in found if reached is not None), default=0.0)
 
 
-def test_rows__count_with_and_without_fields():
-    reached = Checkpoint(rows=4, converged=False)
-    assert (reached.noted().rows, reached.noted().converged) == (5, False)
-    assert (reached.kept().rows, reached.kept().converged) == (5, True)
+def test_rows__are_counted_with_and_without_values():
+    reached = Checkpoint(rows=4, wall_time=1.0)
+    noted, passed = reached.after("a", 0.5, True, 2.0), reached.after("b", 0.25, False, 3.0)
+    assert (noted.rows, noted.state, noted.done, noted.wall_time) == (5, "a", 0.5, 2.0)
+    assert (passed.rows, passed.state, passed.done, passed.wall_time) == (4, "b", 0.25, 3.0)
 
 
 def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
@@ -305,17 +316,17 @@ def test_damaged_checkpoint__is_found_out_wherever_it_is_damaged(whole, tmp_path
     case, _, steps = whole(GROWING)
     path = stopped(case, tmp_path, steps // 2) / "checkpoint.0"
     sound = path.read_bytes()
-    state = load_checkpoint(path, case.key).state
+    state = loaded(path, case.key).state
     draw = random.Random(1)
     for where in [*range(0, 200, 7), *(draw.randrange(len(sound)) for _ in range(200))]:
         path.write_bytes(sound[:where])
-        assert load_checkpoint(path, case.key) is None
+        assert loaded(path, case.key) is None
         path.write_bytes(sound[:where] + bytes([sound[where] ^ (1 << draw.randrange(8))]) + sound[where + 1 :])
-        assert load_checkpoint(path, case.key) is None
+        assert loaded(path, case.key) is None
         path.write_bytes(sound[:where] + bytes(len(sound) - where - 1) + b"x")  # length as it was, blocks not written
-        assert load_checkpoint(path, case.key) is None
+        assert loaded(path, case.key) is None
     path.write_bytes(sound)
-    assert load_checkpoint(path, case.key).state.now.time == state.now.time
+    assert loaded(path, case.key).state.march.now.time == state.march.now.time
 
 
 @pytest.mark.parametrize("damaged", [("checkpoint.0",), ("checkpoint.1",), ("checkpoint.0", "checkpoint.1"), ("rows",)])
@@ -461,7 +472,7 @@ def test_finished_case__is_not_run_again(whole, tmp_path, monkeypatch):
     def computed(*_, **__):
         raise AssertionError("it was computed again")
 
-    monkeypatch.setattr(run_module, "carry_out", computed)
+    monkeypatch.setattr(run_module, "solve", computed)
     assert run_case(case, tmp_path) == path
     xr.testing.assert_identical(run_whole(case, tmp_path).load(), whole_result(path).load())
     # killed after the result was in place, before all else was gone
@@ -578,7 +589,7 @@ def test_lock__is_touched_while_it_is_held(tmp_path, monkeypatch):
 def test_lock_taken_over__the_one_that_was_asleep_writes_no_more(whole, tmp_path):
     case, expected, steps = whole(MODES)
     unfinished = stopped(case, tmp_path, steps // 2)
-    rows = load_checkpoint(unfinished / "checkpoint.0", case.key).rows
+    rows = loaded(unfinished / "checkpoint.0", case.key).rows
     assert 0 < rows <= steps // 2
     lock = tmp_path / f".{case.key}.lock"
 
@@ -588,7 +599,7 @@ def test_lock_taken_over__the_one_that_was_asleep_writes_no_more(whole, tmp_path
     with pytest.raises(InUseError, match="was taken over by another run"):
         run_case(case, tmp_path, progress=taken_over)
     assert lock.exists()
-    assert load_checkpoint(unfinished / "checkpoint.0", case.key).rows == rows
+    assert loaded(unfinished / "checkpoint.0", case.key).rows == rows
     os.utime(lock, (0, 0))
     assert values(run_case(case, tmp_path)) == expected
 

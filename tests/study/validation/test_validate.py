@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.halfspace.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.validation.closed_cases import CASES

@@ -9,9 +9,10 @@ import xarray as xr
 from PIL import Image
 
 import roughvisc as rv
-from roughvisc.study.storage import encoding, reading, store
+from roughvisc.study.storage import reading, store
 from roughvisc.topography import blocks
 from roughvisc.topography.grid import cell_edges
+from roughvisc.variables import chunks
 from roughvisc.views.figures import animate, coarsened, fields, sections
 from roughvisc.views.report import frames
 
@@ -49,8 +50,8 @@ def coarse(monkeypatch):
 @pytest.fixture
 def stored(tmp_path, monkeypatch):
     """The result in a file of small chunks, and the shapes that are read of it."""
-    monkeypatch.setattr(encoding, "_MANY_CELLS", 100)
-    monkeypatch.setattr(encoding, "_CHUNK_OF_MANY", (1, 8, 8))
+    monkeypatch.setattr(chunks, "_MANY_CELLS", 100)
+    monkeypatch.setattr(chunks, "_CHUNK_OF_MANY", (1, 8, 8))
     path, shapes = store.write_result(result(displacement=True), tmp_path / "result.nc"), []
     read = reading._Field._read
 

@@ -198,6 +198,22 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
 
 
 def test_figures_over_time__refuse_a_curve_in_plain_words():
-    for draw in (rv.plot.history, rv.plot.maps, rv.plot.section):
-        with pytest.raises(rv.InputError, match="lies over the speed of steady sliding: expected a history over time"):
-            draw(sliding())
+    for draw in (rv.plot.hysteresis, rv.plot.friction_against_distance, rv.plot.animate):
+        arguments = ["film.gif"] if draw is rv.plot.animate else []
+        with pytest.raises(rv.InputError, match="lies over speed: expected a history over time"):
+            draw(sliding(), *arguments)
+
+
+def test_figures_of_rows__name_the_speeds():
+    """In the order of the speeds, whatever that of the rows."""
+    wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1)
+    rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e3)
+    ds = rv.friction(wave, rubber, pressure=5e4, speeds=[0.1, 1e-3], fields=["pressure", "gap"], progress=False)
+    over_speed = rv.plot.history(ds)
+    assert [ax.get_xlabel() for ax in over_speed.axes if ax.get_xlabel()][-1] == "Speed [mm/s]"
+    (fraction,) = (ax for ax in over_speed.axes if ax.get_ylabel().startswith("Contact area"))
+    line = fraction.get_lines()[0]
+    assert line.get_xdata().tolist() == [1.0, 100.0]
+    assert (np.diff(line.get_ydata()) < 0).all() == (np.diff(ds.sortby("speed").contact_area) < 0).all()
+    assert rv.plot.section(ds, time=0.1).axes[0].get_title(loc="right").startswith("V = 100 mm/s")
+    assert rv.plot.maps(ds, times=[1e-3]).axes[0].get_title().startswith("V = 1 mm/s")

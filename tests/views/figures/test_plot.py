@@ -115,11 +115,11 @@ def test_figures__refuse_many_cases_and_other_things(draw):
 
 
 def test_time_axis__chosen_by_the_data():
-    assert not axes.TimeAxis.of(np.linspace(0, 5, 500)).logarithmic
-    assert axes.TimeAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
-    assert axes.TimeAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
-    assert not axes.TimeAxis.of([0.0]).logarithmic
-    assert axes.TimeAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
+    assert not axes.RowAxis.of(np.linspace(0, 5, 500)).logarithmic
+    assert axes.RowAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
+    assert axes.RowAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
+    assert not axes.RowAxis.of([0.0]).logarithmic
+    assert axes.RowAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
 
 
 def test_spread_frames__first_and_last_and_even():
@@ -593,7 +593,7 @@ def test_animate__map_section_and_history_move_together():
     for frame in frames:
         draw(frame)
         np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
-        assert figure.get_suptitle() == axes.time_text(float(ds["time"][frame]))
+        assert figure.get_suptitle() == axes.row_text(float(ds["time"][frame]))
         assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
         assert len(approach.lines[1].get_xdata()) == frame + 1
         index = int(ds["pressure"][-1].sum("x").argmax("y"))

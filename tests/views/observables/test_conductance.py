@@ -10,7 +10,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.sheet import Sheet
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
 from roughvisc.variables import VARIABLES
 from roughvisc.views.observables import conductance, incremental_stiffness, secant_stiffness
@@ -129,7 +129,7 @@ def test_stiffness__of_what_gives_way_at_once_by_nothing(ball):
 
 
 def test_sheet__is_pressed_as_one_and_conducts_as_a_half_space():
-    ds = pressed(rv.elastic(1e6, 0.3), 0.002, cells=31, thickness=2e-4, base="slipping")
+    ds = pressed(rv.sheet(rv.elastic(1e6, 0.3), 2e-4, "slipping"), 0.002, cells=31)
     contact = ds["pressure"].values[0] > 0
     cells = tuple(float(ds[axis][1] - ds[axis][0]) for axis in "xy")
     with pytest.raises(InputError, match="of a sheet and does not record its material: give kernel="):

@@ -123,8 +123,6 @@ def test_leakage__refuses_results_that_do_not_say():
         leakage(made.rough_creep().drop_vars("gap"))
     with pytest.raises(InputError, match=r"the gap is missing in 68 of 7200 cells, where the surface is absent"):
         leakage(made.rough_creep(frames=1))
-    with pytest.raises(InputError, match="lies over the speed of steady sliding: expected a history over time"):
-        leakage(result(plane()).rename(time="speed"))
 
 
 def test_asked__is_what_the_study_has():

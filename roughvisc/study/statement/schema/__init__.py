@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic.fields import FieldInfo
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.statement.curve import SteadySliding
+from roughvisc.settings import ENTRIES, Settings
 from roughvisc.study.statement.schema.audit import AuditSection
-from roughvisc.study.statement.schema.entries import Text, a_list, nullable
-from roughvisc.study.statement.schema.friction import FrictionSection, refuse_beside_friction
+from roughvisc.study.statement.schema.entries import Text, a_list, nullable, shown
+from roughvisc.study.statement.schema.experiments import ExperimentSection
+from roughvisc.study.statement.schema.friction import FrictionSection
 from roughvisc.study.statement.schema.material import AnyMaterial
 from roughvisc.study.statement.schema.meanings import with_meanings
 from roughvisc.study.statement.schema.observe import ObserveSection
@@ -19,21 +23,23 @@ from roughvisc.study.statement.schema.program import AnySegment
 from roughvisc.study.statement.schema.section import Section, refuse
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
 from roughvisc.study.statement.schema.surface import AnySurface
-from roughvisc.study.statement.settings import Settings
-from roughvisc.units import unit_for
 
+#: Tables that state an experiment other than a program.
+EXPERIMENTS = ["friction"]
 _SEGMENTS = "a list of [[program]] tables, at least one"
 
 
 def _segments(value: Any, info: ValidationInfo) -> Any:
-    """Segments, or none where friction is asked for; a study whose [friction] is wrong hears of that alone."""
-    slides = info.data.get("friction", ...)
+    """Segments, or none where another table states an experiment; a study whose other table is wrong hears of that."""
+    others = [name for name in EXPERIMENTS if info.data.get(name) is not None]
     if value is not None:
-        if slides not in (None, ...):
-            raise InputError("found beside [friction]: expected one of them: a study presses a surface or slides it")
+        if others:
+            raise InputError(f"found beside [{others[0]}]: expected one of them: a study does one thing with a surface")
         return tuple(a_list(value, _SEGMENTS) or a_list(None, _SEGMENTS))
-    if slides is None:
-        raise InputError(f"missing: expected {_SEGMENTS}, or a table [friction]")
+    if not others and all(name in info.data for name in EXPERIMENTS):
+        raise InputError(
+            f"missing: expected {_SEGMENTS}, or a table {' or '.join(f'[{name}]' for name in EXPERIMENTS)}"
+        )
     return value
 
 
@@ -60,25 +66,21 @@ class Study(Section):
         Raises
         ------
         InputError
-            If the study asks for friction.
+            If the study states another experiment.
         """
         if self.program is None:
-            raise InputError("friction: found steady sliding, which has no program: expected [[program]] tables")
+            other = self.experiment()
+            raise InputError(f"{other.table}: found {other.called}, which has no program: expected [[program]] tables")
         program = Program()
         for segment in self.program:
             program = segment.extend(program)
         return program
 
-    def experiment(self) -> Program | SteadySliding:
-        """What is done with the surface: a program that presses it, or a curve of speeds at which it slides."""
-        return self.loading() if self.friction is None else self.friction.curve()
-
-    def at(self, now: float, end: float) -> str:
-        """How far a run is of how much: of a program the time and its length [s], of a curve the speeds done."""
-        if self.friction is not None:
-            return self.friction.curve().at(now, end)
-        unit = unit_for(end, "s")
-        return f"t = {unit(now):.3g} of {unit.text(end)}"
+    def experiment(self) -> Experiment:
+        """What is done with the surface."""
+        others = (getattr(self, name) for name in EXPERIMENTS)
+        other = next((section for section in others if section is not None), None)
+        return Loading(self.loading()) if other is None else other.experiment()
 
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
@@ -87,8 +89,9 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Study:
-        if self.friction is not None:
-            refuse_beside_friction(self.solve, self.keep, self.surface.missing)
+        for name, found, why in self.experiment().unsupported(self.solving()):
+            raise refuse(f"{ENTRIES[name].table}.{name}", f"found {shown(found)}: {why}")
+        if self.program is None:
             return self
         end = self.loading().duration
         if isinstance(self.keep.times, tuple) and self.keep.times[-1] > end * (1 + 1e-12):
@@ -108,6 +111,35 @@ class StudyFile(Study):
     """A study file: one case, and what is varied in it."""
 
     sweep: dict[str, list[Any]] | list[dict[str, Any]] | None = None
+
+
+def add_experiment(section: type[ExperimentSection], table: str) -> None:
+    """Let studies state another experiment.
+
+    Parameters
+    ----------
+    section : type of ExperimentSection
+        Its keys, as fields of a pydantic model, and the experiment that they stand for.
+    table : str
+        Name of its table in a study file.
+
+    Raises
+    ------
+    InputError
+        If studies have a table of that name.
+    """
+    if table in Study.model_fields:
+        raise InputError(f"a study has a table [{table}] already: expected another name")
+    EXPERIMENTS.append(table)
+    for study in (Study, StudyFile):
+        fields = study.model_fields
+        known = dict(fields)
+        fields.clear()
+        for name, one in known.items():
+            if name == "program":  # whose check looks at the tables before it
+                fields[table] = FieldInfo.from_annotated_attribute(nullable(section), None)
+            fields[name] = one
+        study.model_rebuild(force=True)
 
 
 def study_schema() -> dict[str, Any]:

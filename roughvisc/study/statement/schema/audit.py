@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from pydantic import create_model, model_validator
 
-from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.study.statement.schema.entries import choice, measured, nullable
 from roughvisc.study.statement.schema.section import Section, refuse
 

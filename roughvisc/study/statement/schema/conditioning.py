@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from roughvisc.errors import InputError
+from roughvisc.settings import WORDS, Settings
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, measured, nullable, paired, shown, whole
 from roughvisc.study.statement.schema.section import Section
-from roughvisc.study.statement.settings import WORDS, Settings
 from roughvisc.topography.arguments import FILL, KEEP, ORDER, TURNS, WINDOW, Argument
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.steady_sliding import DIRECTIONS, SteadySliding
 from roughvisc.mechanics.stepping.program import INSTEAD
-from roughvisc.study.statement.curve import DIRECTIONS, SteadySliding
 from roughvisc.study.statement.schema.entries import (
     Flag,
     Unit,
@@ -20,9 +20,8 @@ from roughvisc.study.statement.schema.entries import (
     validate,
     whole,
 )
+from roughvisc.study.statement.schema.experiments import ExperimentSection
 from roughvisc.study.statement.schema.section import Section, refuse
-from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
-from roughvisc.study.statement.settings import ENTRIES
 
 _SPEED = measured("m/s", above=0)
 _WANTED = "a speed in m/s, a list of them, or a table with from, to and count"
@@ -56,7 +55,7 @@ def _speeds(value: Any, info: ValidationInfo) -> tuple[float, ...]:
     return tuple(sorted({float(f"{speed:.12g}") for speed in found}))
 
 
-class FrictionSection(Section):
+class FrictionSection(ExperimentSection):
     """Steady sliding at given speeds."""
 
     speeds: Annotated[
@@ -81,27 +80,6 @@ class FrictionSection(Section):
             raise refuse("pressure", "found beside load: expected one of them")
         return self
 
-    def curve(self) -> SteadySliding:
+    def experiment(self) -> SteadySliding:
         """What is asked, as the solver takes it."""
         return SteadySliding(**dict(self))
-
-
-def refuse_beside_friction(solve: SolveSection, keep: KeepSection, missing: str) -> None:
-    """Refuse what has no meaning in steady sliding.
-
-    Raises
-    ------
-    ValidationError
-        Naming the key.
-    """
-    if solve.boundary != "periodic":
-        raise refuse("solve.boundary", f"found {solve.boundary!r}: steady sliding repeats: expected 'periodic'")
-    for key, value in solve:
-        if not ENTRIES[key].of_sliding and value != SolveSection.model_fields[key].default:
-            raise refuse(f"solve.{key}", f"found {value!r}: steady sliding has none: expected no such key")
-    if keep.times != "all":
-        raise refuse("keep.times", f"found {shown(keep.times)}: steady sliding has no times: expected no such key")
-    if "displacement" in keep.fields:
-        raise refuse("keep.fields", "found 'displacement': of steady sliding expected some of pressure, gap")
-    if missing != "refuse":
-        raise refuse("surface.missing", f"found {missing!r}: a surface that slides has no holes: expected fill = true")

@@ -13,11 +13,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, create_model, model_validator
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.halfspace.kernel import Kernel
-from roughvisc.mechanics.halfspace.love import HALF_SPACE
+from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.temperature import shifted
-from roughvisc.study.statement.body import BASE, make_body
 from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
 from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
@@ -165,11 +163,18 @@ class MaterialSection(Section):
         )
         return material if self.shift == 1 else shifted(material, self.shift)
 
-    def kernel(self) -> Kernel:
-        """What its surface does under pressure: a half-space's, or a sheet's."""
-        if self.sheet == dict.fromkeys(THICKNESS):  # a half-space asks nothing of the material, which may take a fit
-            return HALF_SPACE
-        return make_body(self.build(), **self.sheet)
+    def body(self) -> Body:
+        """What is made of it: a half-space, or a sheet."""
+        return self._body_of(self.build())
+
+    def _body_of(self, material: materials.Material) -> Body:
+        """The body of the material, which may have taken a fit."""
+        thickness, base = self.sheet["thickness"], self.sheet["base"]
+        if thickness is not None:
+            return sheet(material, thickness, base or BASE)
+        if base is not None:
+            raise InputError(f"base is {base!r} without a thickness: expected both, or neither for a half-space")
+        return Body(material)
 
     @property
     def sheet(self) -> dict[str, Any]:
@@ -194,9 +199,9 @@ class MaterialSection(Section):
 
     @model_validator(mode="after")
     def _builds(self) -> MaterialSection:
-        self.build()
+        material = self.build()
         try:
-            self.kernel()
+            self._body_of(material)
         except InputError as error:
             raise refuse("base" if self.sheet["thickness"] is None else "thickness", str(error)) from error
         for name in MODELS[self.model][1]:

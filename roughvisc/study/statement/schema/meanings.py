@@ -9,9 +9,9 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.schema.program import KINDS, RECORDINGS
 from roughvisc.study.statement.schema.surface import RECIPES
-from roughvisc.study.statement.settings import ENTRIES
 
 _STEPS = ("surface: steps of a face", "surface: steps of the profile")
 _RECIPES = {name: (f"generate: {name}", "generate: any", *_STEPS) for name in RECIPES}
@@ -64,7 +64,8 @@ def with_meanings(schema: dict[str, Any]) -> dict[str, Any]:
     _describe(schema["properties"], ("study",))
     for name, section in schema["$defs"].items():
         of_material = (f"material: {name}", "material: any", "material: temperature", "material: thickness")
-        _describe(section["properties"], _TABLES.get(name, of_material))
+        if name in _TABLES or of_material[0] in meanings():  # one that was added says itself what it means
+            _describe(section["properties"], _TABLES.get(name, of_material))
     return schema
 
 

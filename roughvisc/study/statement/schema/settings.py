@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
 
 from roughvisc.errors import InputError
+from roughvisc.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
 from roughvisc.study.statement.schema.entries import Flag, a_list, choice, literal_or, measured, shown, validate, whole
 from roughvisc.study.statement.schema.section import Section, nearest
-from roughvisc.study.statement.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
 from roughvisc.units import range_in_words
 from roughvisc.variables import FIELDS
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from roughvisc.mechanics.halfspace.sheet import Base
+from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.study.statement.schema.entries import Unit, choice, measured, validate
 
 _THICKNESS = measured("m", above=0)

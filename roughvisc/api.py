@@ -1,0 +1,228 @@
+"""The front door: a surface, a material or a body, and what is done with it, give one Dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import xarray as xr
+
+from roughvisc.errors import former_arguments
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.steady_sliding import SteadySliding
+from roughvisc.groups import root_of
+from roughvisc.mechanics.bodies.body import Body, body_of
+from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.slide import Direction
+from roughvisc.problem import Problem
+from roughvisc.settings import Edge, Memory, Method, Missing, Settings, TimeStep
+from roughvisc.solve import solve
+from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
+from roughvisc.topography.grid import checked
+
+Progress = Callable[[float, float], None]
+
+_BODY = "give a body in place of the material: rv.sheet(material, thickness, base)"
+_OWN = "give a body in place of the material: rv.Body(material, kernel)"
+_FORMER = {"thickness": _BODY, "base": _BODY, "kernel": _OWN}
+
+
+@former_arguments(**_FORMER)
+def simulate(
+    height: xr.DataArray,
+    material: Material | Body,
+    program: Program,
+    *,
+    boundary: Boundary = Settings.boundary,
+    tolerance: float = Settings.tolerance,
+    time_step: TimeStep = Settings.time_step,
+    times: int | Sequence[float] | None = Settings.times,
+    fields: Sequence[str] = Settings.fields,
+    method: Method = Settings.method,
+    missing: Missing = Settings.missing,
+    edge: Edge = Settings.edge,
+    memory: Memory = Settings.memory,
+    grid_error: bool = Settings.grid_error,
+    threads: int | None = None,
+    progress: bool | Progress = True,
+) -> xr.Dataset:
+    """Press a rigid profile on a linear viscoelastic body: a half-space, a sheet, or one of your own.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        Profile, peaks up, with cell-centre coordinates; or a Dataset that holds it as ``height``. A unit of length
+        that heights or coordinates state is converted; without one they are metres. The undeformed gap is
+        ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
+    material : Material
+        Of a half-space: one of roughvisc's, or any object with the two functions that
+        :class:`roughvisc.mechanics.materials.models.Material` asks for; or a body, as :func:`roughvisc.sheet` gives
+        one. With periodic boundaries and a Poisson ratio below a half, the approach on a sheet holds its compression.
+    program : Program
+        Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
+        grid of heights as it is given, absent cells included; of a tapered surface, over the integral of the taper's
+        weight.
+    boundary : {"free", "periodic"}
+        ``free`` for an indenter, ``periodic`` for a nominally flat scan.
+    tolerance : float
+        Asked of ``stated_error`` at every kept time: the error that time steps, contact solver and series leave of
+        pressure (L1), force and approach, over the largest force and approach so far. Rows that miss it state by how
+        much, and ``accuracy_note`` counts them; the error of the grid comes on top.
+    time_step : "auto" or float
+        Steps chosen by the tolerance, or of a given length. [s]
+    times : int or sequence of float, optional
+        Times whose fields are kept, stepped onto exactly: a count, the corners of the program and the rest where the
+        result changes; a list; or None, all corners and every accepted step that keeps the tolerance. [s]
+    fields : sequence of str
+        Fields to keep, of ``pressure``, ``gap``, ``displacement``.
+    method : {"fast", "seed"}
+        ``seed`` is the seed paper's algorithm, slips corrected and not accelerated.
+    missing : {"refuse", "absent"}
+        Missing heights are an error, or cells without material that never touch.
+    edge : {"error", "accept"}
+        In free space, whether contact may reach the border of the grid. Where it is accepted, the attribute ``edge``
+        of the result says so, and ``edge_note`` when contact came to the border, where the surface acts as a punch.
+    memory : {"auto", "direct"}
+        ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
+    grid_error : bool
+        Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
+        the grid makes: ``grid_error``, ``grid_error_area`` and the bounds ``contact_area_lower`` and
+        ``contact_area_upper`` at the kept times.
+    threads : int, optional
+        Of a large grid; the bits are the same with any number. Default: as ``scipy.fft.set_workers`` has it; where
+        nobody has set that, all cores the process may use, but one beside other threads or in a process that was
+        started by another one.
+    progress : bool or callable
+        A progress bar, or a function called with the time reached and the program's length. [s]
+
+    Returns
+    -------
+    xarray.Dataset
+        As described in :mod:`roughvisc.variables`.
+
+    Raises
+    ------
+    InputError
+        If the input is wrong; the message says what was found and what was expected.
+    TooLargeError
+        If it needs more memory than there is, before any is taken.
+    EdgeContactError
+        If contact reached the border of a free-space domain.
+    ConvergenceError
+        If any step did not converge and nothing was kept; otherwise ``status`` says which did not.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=45)
+    >>> rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
+    >>> press = rv.Program().load(1e-4, over=0).hold(0.5)
+    >>> ds = rv.simulate(ball, rubber, press, times=[0, 0.5], progress=False)
+    >>> ds.pressure.shape
+    (2, 45, 45)
+    >>> bool(ds.contact_area[1] > ds.contact_area[0])
+    True
+    """
+    settings = Settings(
+        boundary=boundary,
+        tolerance=tolerance,
+        time_step=time_step,
+        times=times,
+        fields=fields,
+        method=method,
+        missing=missing,
+        edge=edge,
+        memory=memory,
+        grid_error=grid_error,
+    )
+    problem = Problem(checked(height, "simulate", least=1), body_of(material), settings)
+    return root_of(solve(problem, Loading(program), progress=progress, threads=threads))
+
+
+@former_arguments(**_FORMER)
+def friction(
+    height: xr.DataArray,
+    material: Material | Body,
+    *,
+    speeds: Sequence[float] | float,
+    load: float | None = None,
+    pressure: float | None = None,
+    direction: Direction = "x",
+    tolerance: float = Settings.tolerance,
+    fields: Sequence[str] = (),
+    last_octave: bool = False,
+    grid_error: bool = Settings.grid_error,
+    threads: int | None = None,
+    progress: bool | Progress = True,
+) -> xr.Dataset:
+    """Friction of a rigid profile that slides steadily on a viscoelastic body, with periodic boundaries.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        Profile, peaks up, with cell-centre coordinates and no missing points. [m]
+    material : Material
+        Of a half-space, or a body as :func:`roughvisc.simulate` has it: one with a finite compliance after endless
+        creep, unless the profile is the same all across the motion. Shift factors of a temperature act as factors of
+        the speed.
+    speeds : float or sequence of float
+        [m/s]
+    load, pressure : float
+        Load [N] or nominal pressure [Pa]: one of them.
+    direction : {"x", "-x", "y", "-y"}
+        In which the profile moves.
+    tolerance : float
+        On what the iteration leaves of pressure (L1, over the load) and friction (relative).
+    fields : sequence of str
+        Fields to keep, of ``pressure`` and ``gap``, in the frame of the profile.
+    last_octave : bool
+        Whether to tell what the shortest octave of the surface's waves adds to friction and area, at twice the cost. If
+        that is much, the waves that the scan does not resolve would add as much again.
+    grid_error : bool
+        Whether to compute the curve again on cells twice and four times as long, and to bound by it the errors that the
+        grid makes: ``grid_error_friction`` and ``grid_error_area``. It takes about a third of the time more.
+    threads : int, optional
+        As :func:`roughvisc.simulate` has them.
+    progress : bool or callable
+        A progress bar, or a function called with the speeds done and their number.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``speed``, in the order given: as :data:`roughvisc.variables.sliding.SLIDING` declares it.
+
+    Raises
+    ------
+    InputError
+        If the input is wrong, or the material creeps without end under waves across the motion.
+
+    Notes
+    -----
+    In the steady state the friction force times the speed is the power that the material dissipates. The force is
+    taken from that power: on the grid it converges much faster than the sum of pressure times slope. The force across
+    the motion, ``friction_force_across``, is the same sum with the slope across the motion.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1)
+    >>> rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e3)
+    >>> ds = rv.friction(wave, rubber, pressure=5e4, speeds=[1e-3, 0.1, 10.0], progress=False)
+    >>> int(ds.friction_coefficient.argmax("speed"))
+    1
+    """
+    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, last_octave=last_octave)
+    settings = Settings(
+        boundary="periodic",
+        tolerance=tolerance,
+        fields=fields,
+        grid_error=grid_error,
+    )
+    problem = Problem(checked(height, "friction", least=1), body_of(material), settings)
+    found = solve(problem, curve, progress=progress, threads=threads)
+    return root_of(found.assign_attrs(title="Steady sliding"))

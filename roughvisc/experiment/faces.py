@@ -1,0 +1,149 @@
+"""A surface as it slides: turned into the motion, on one grid, from one speed to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.experiment.profile import Profile
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
+from roughvisc.topography.resampling import resample_periodic
+from roughvisc.topography.spectrum import without_last_octave
+
+Array = NDArray[np.float64]
+
+# A profile that changes across the motion by less than this part of its range does not change there.
+_ROUNDING = 1e-12
+
+
+#: Direction -> quarter turns of the grid, counter-clockwise, by which the profile comes to move along +x.
+_QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
+
+
+@dataclass(frozen=True)
+class AxisTransform:
+    """The rotation of fields by which the profile moves along +x. What lies to the left of the motion is then +y.
+
+    Attributes
+    ----------
+    quarters : int
+        Quarter turns, counter-clockwise with x to the right and y upwards.
+    """
+
+    quarters: int
+
+    @classmethod
+    def of(cls, direction: str) -> AxisTransform:
+        """That of a direction."""
+        return cls(_QUARTERS[direction])
+
+    @property
+    def swapped(self) -> bool:
+        """Whether x and y change places."""
+        return self.quarters % 2 == 1
+
+    def there(self, field: Array) -> Array:
+        """A field over the cells, rotated."""
+        return np.rot90(field, self.quarters)
+
+    def back(self, field: Array) -> Array:
+        """A rotated field in the frame of the surface."""
+        return np.rot90(field, -self.quarters)
+
+
+@dataclass(frozen=True)
+class SlidingGrid:
+    """One grid of a surface that slides along +x.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (nx, ny)
+        Undeformed, turned into the motion. [m]
+    spacing : tuple of float
+        Cell sides, turned likewise. [m]
+    kernel : Kernel
+        Of the body.
+    """
+
+    gap: Array
+    spacing: tuple[float, float]
+    kernel: Kernel
+
+    @classmethod
+    def of(cls, profile: Profile, turn: AxisTransform) -> SlidingGrid:
+        """That of a surface."""
+        sides = profile.spacing[::-1] if turn.swapped else profile.spacing
+        return cls(np.ascontiguousarray(turn.there(profile.gap)), (sides[0], sides[1]), profile.kernel)
+
+    def smooth(self) -> tuple[SlidingGrid, float]:
+        """The same without its shortest octave of waves, and the length below which these are. [m]
+
+        Raises
+        ------
+        InputError
+            If there are no others.
+        """
+        gap, shortest = without_last_octave(self.gap, self.spacing)
+        if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
+            raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
+        return SlidingGrid(gap, self.spacing, self.kernel), shortest
+
+    def coarser(self, factor: float) -> SlidingGrid | None:
+        """The same waves on cells about so many times longer, as far as these can hold them; None if there is none."""
+        shape = coarser_shape((self.gap.shape[0], self.gap.shape[1]), factor, False)
+        if shape == self.gap.shape:
+            return None
+        sides = [side * many / few for side, many, few in zip(self.spacing, self.gap.shape, shape, strict=True)]
+        gap = resample_periodic(self.gap, shape, first_kept=True)
+        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
+
+    @property
+    def period(self) -> float:
+        """Of the surface along the motion. [m]"""
+        return self.gap.shape[0] * self.spacing[0]
+
+    @property
+    def waves(self) -> Array:
+        """Wave numbers along the motion. [1/m]"""
+        return np.asarray(2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]))
+
+    @property
+    def rows(self) -> int:
+        """Rows of cells to solve for: one of a profile that does not change across the motion, which stands for all."""
+        across = float(np.ptp(self.gap, axis=1).max())
+        return 1 if across <= _ROUNDING * float(np.ptp(self.gap)) else self.gap.shape[1]
+
+    def sliding(self, speed: float, material: Material) -> Sliding:
+        """The operator at a speed [m/s]; the material must have a complex compliance in closed form."""
+        (nx, ny), (dx, dy) = self.gap.shape, self.spacing
+        shape, spacing = (nx, self.rows), (dx, dy * ny / self.rows)
+        return Sliding(self.kernel, partial(complex_compliance, material), shape, spacing, speed)
+
+    def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
+        """Steady state under a force [N], on all cells."""
+        found = steady_state(sliding, on_rows(self.gap, sliding), force, tolerance=tolerance)
+        pressure, displacement = (
+            np.array(np.broadcast_to(field, self.gap.shape)) for field in (found.pressure, found.displacement)
+        )
+        return replace(found, pressure=pressure, displacement=displacement)
+
+
+def on_rows(field: Array, sliding: Sliding) -> Array:
+    """A field over the cells of a surface, on the rows of an operator."""
+    return np.ascontiguousarray(field[:, : sliding.shape[1]])
+
+
+def areas(contact: NDArray[np.bool_], spacing: tuple[float, float]) -> tuple[float, float]:
+    """Contact area, counted and corrected for the grid. [m2]"""
+    cell = spacing[0] * spacing[1]
+    counted = np.count_nonzero(contact) * cell
+    return counted, max(counted - staircase(contact, ~contact, cell, True), 0.0)

@@ -1,0 +1,513 @@
+"""Loading: a program of load, pressure or approach against time, and of slides, gives rows over time."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.experiment.footprint import march_bytes
+from roughvisc.experiment.friction_rows import friction_row
+from roughvisc.experiment.mirror import quarter, unfold
+from roughvisc.experiment.notes import accuracy_note, body_note, border_note, edge_note, left_out, slope_note
+from roughvisc.experiment.profile import Profile, uses_window
+from roughvisc.experiment.protocol import Experiment, Row, Rows
+from roughvisc.experiment.refusal import least_rows, require_memory
+from roughvisc.experiment.scene import build_scene, memory_options
+from roughvisc.experiment.slides import slide_note
+from roughvisc.experiment.stated import area_columns, error_columns, is_end_value, meets_tolerance
+from roughvisc.experiment.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
+from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
+from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.fields.sparse import Sparse
+from roughvisc.mechanics.fields.threads import is_wide
+from roughvisc.mechanics.hereditary.choice import choose_memory
+from roughvisc.mechanics.hereditary.direct import Block, HistoryState
+from roughvisc.mechanics.hereditary.exponentials import ModesState
+from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.stepping.domain import at_border
+from roughvisc.mechanics.stepping.energy import Energy
+from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.pace import ControllerState
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trajectory
+from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.mechanics.stepping.slide import Slid
+from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.problem import Problem
+from roughvisc.recorder import RowStore
+from roughvisc.settings import Settings
+from roughvisc.topography.grid import nominal_area
+from roughvisc.units import unit_for
+from roughvisc.variables import STATUS_MEANINGS
+
+log = logging.getLogger("roughvisc")
+
+Array = NDArray[np.float64]
+
+#: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
+_SINGLE = 1e-4
+
+
+@dataclass(frozen=True)
+class LoadingState:
+    """Where a march through a program stands after a step.
+
+    Attributes
+    ----------
+    march : State
+        Of the march itself.
+    converged : bool
+        Whether all steps since the last kept row are.
+    growths : int
+        How many times the grid or the window has grown.
+    border : float or None
+        When contact was found at the border of a free-space domain first, where that is accepted. [s]
+    """
+
+    march: State
+    converged: bool = True
+    growths: int = 0
+    border: float | None = None
+
+
+@dataclass(frozen=True)
+class Loading(Experiment):
+    """A surface is pressed through a program, and slid where that has slides.
+
+    Parameters
+    ----------
+    program : Program
+        Load, nominal pressure or approach against time.
+    """
+
+    program: Program
+
+    axis: ClassVar[str] = "time"
+    table: ClassVar[str] = "program"
+    called: ClassVar[str] = "a loading program"
+    doing: ClassVar[str] = "pressing"
+    states: ClassVar[tuple[type, ...]] = (
+        LoadingState,
+        State,
+        Trajectory,
+        ControllerState,
+        Slid,
+        Instant,
+        Sparse,
+        Uncertainty,
+        Energy,
+        ModesState,
+        HistoryState,
+        Block,
+    )
+
+    def __repr__(self) -> str:
+        return repr(self.program)
+
+    def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
+        """Every accepted step, those to keep as rows of the result.
+
+        The seed paper's algorithm keeps all past pressures, and has no state to go on from.
+        """
+        return LoadingRows(problem, self.program, state, in_memory=in_memory)
+
+    def content(self) -> Any:
+        """The segments."""
+        return [
+            [one.control, one.duration, one.end, one.amplitude, one.period]
+            + ([one.slide.distance, one.slide.direction] if one.slide else [])
+            for one in self.program.segments
+        ]
+
+    def on_area(self, area: float) -> Loading:
+        """The same with loads in place of nominal pressures."""
+        return Loading(self.program.on_area(area))
+
+    def with_rows_at(self, settings: Settings, places: Sequence[float]) -> Settings:
+        """Those with these kept times. [s]"""
+        return replace(settings, times=places)
+
+    def creep_time(self, size: float) -> float:
+        """To the end of the program. [s]"""
+        return self.program.duration
+
+    @property
+    def time_scale(self) -> float:
+        """Of the program. [s]"""
+        return self.program.time_scale
+
+    @property
+    def largest_speed(self) -> float:
+        """Of its slides. [m/s]"""
+        slides = ((one.slide, one.duration) for one in self.program.segments)
+        return max((slide.distance / duration for slide, duration in slides if slide), default=0.0)
+
+    def progress(self, done: float, end: float) -> str:
+        """The time reached. [s]"""
+        unit = unit_for(end, "s")
+        return f"t = {unit(done):.3g} of {unit.text(end)}"
+
+    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float) -> float:
+        """Memory of the march, its contact sparse. [byte]"""
+        options = memory_options(self.program.on_area(area), settings)
+        memory = choose_memory(complete(body.material), **options).memory
+        return march_bytes(settings, cells, memory, rows=least_rows(settings, self.program))
+
+
+class LoadingRows(Rows):
+    """Accepted steps of one march, in order: histories of all of them, fields of those that are kept.
+
+    Where the march goes on in a window, or the grid may grow, a row keeps what was in contact and the effective
+    pressure there, from which its fields over the final domain follow: nothing outside ever carried pressure.
+
+    Parameters
+    ----------
+    problem : Problem
+        Surface, body and settings. Where the tolerance leaves room for single precision, what lies beyond a window is
+        computed so.
+    program : Program
+        The loading program.
+    state : LoadingState or None
+        From which the march goes on.
+    in_memory : bool
+        Whether the kept fields stay in memory.
+    """
+
+    def __init__(
+        self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
+    ) -> None:
+        height, body, settings = problem.height, problem.body, problem.settings
+        self._problem, self._settings, self._start = problem, settings, state
+        require_memory(
+            (height.sizes["x"], height.sizes["y"]),
+            settings,
+            body.material,
+            program,
+            in_memory=in_memory,
+            raises_surface=body.kernel.raises_surface,
+            heights=height.values,
+            area=nominal_area(height),
+        )
+        mirror = settings.method == "fast" and not program.slides
+        (term,) = body.terms()
+        self.profile = Profile(
+            height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=term.kernel
+        )
+        self._scene, self._choice = build_scene(self.profile, term.material, program, settings)
+        self._followed = not self.profile.window.whole
+        log.info("memory: %s", self._choice.note)
+        for _ in range(0 if state is None else state.growths):
+            larger = self.profile.enlarge(self._scene)
+            assert larger is not None, "it grew before"
+            self._scene = larger[0]
+        self.end = program.duration
+        self._border = None if state is None else state.border
+        #: Whether the profile has a mean plane of its own: that of an indenter depends on how large its grid is.
+        self._has_mean_plane = settings.boundary == "free" and not self.profile.can_grow()
+        spacing, kernel, single = self.profile.spacing, term.kernel, settings.tolerance >= _SINGLE
+        self._reach = lru_cache(maxsize=2)(lambda window: FarFieldDisplacement(window, spacing, kernel, single=single))
+        self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, spacing, kernel))
+
+    @property
+    def height(self) -> xr.DataArray:  # type: ignore[override]
+        """Of the surface, as far as it has grown. [m]"""
+        return self.profile.height
+
+    @property
+    def highest(self) -> float:  # type: ignore[override]
+        """Height of the highest point. [m]"""
+        return self.profile.highest
+
+    def __iter__(self) -> Iterator[Row]:
+        """March to the end of the program."""
+        scene, start, fast = self._scene, self._start, self._settings.method == "fast"
+        self._start = None  # its fields are not needed beyond the first step
+        every = scene.times is None
+        to_keep = set(scene.program.corners if scene.times is None else scene.times)
+        converged = start is None or start.converged
+        steps = march(scene, None if start is None else start.march) if fast else march_seed(scene)
+        del start
+        for step in steps:
+            self._watch_border(step)
+            converged = converged and step.converged
+            # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
+            if step.shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error)):
+                row = self.row(step, converged)
+                converged = True
+            elif not every and is_end_value(step):
+                row = self.row(step, step.converged, kept=False)
+            else:
+                row = Row(step.shown.time, done=step.shown.time)
+            if fast:
+                state = LoadingState(step.state, converged, self.profile.growths, self._border)
+                row = replace(row, state=state)
+                del state
+            del step  # its fields are not needed while the next one is computed
+            yield row
+            del row
+
+    def _watch_border(self, step: Step) -> None:
+        """Note when contact comes to the border of a free-space domain, in a step that is kept or not."""
+        if self._border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
+            self._border = float(step.shown.time)
+
+    def row(self, step: Step, converged: bool, kept: bool = True) -> Row:
+        """Row of an accepted step; ``converged``: all of those since the last one that is kept."""
+        if not is_wide(step.scene.gap.size):
+            step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
+        shown, window = step.shown, self.profile.window
+        contact = shown.contact.positive()
+        touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
+        area = max(touching - staircase_area(contact, step.scene), 0.0)
+        arrays: dict[str, Array] = {}
+        if window.whole:
+            mean_gap = self._mean_of_gap(step, contact)
+            arrays = {name: self._field(name, step, contact) for name in self._settings.fields if kept}
+        else:
+            assert step.effective is not None, "a window asks for a memory of pressures"
+            mean_gap = self._mean_gap(window, step.effective, step.level)
+        if kept and step.scene.enlarge is not None and step.effective is not None:
+            arrays |= {"source_pressure": shown.pressure, "source": step.effective}
+        row: dict[str, Any] = {
+            "force": shown.force,
+            "approach": shown.approach,
+            "work": step.work,
+            "stored_energy": step.stored,
+            "dissipated_energy": step.dissipated,
+            "time_error": step.time_error,
+            "iterations": step.state.iterations,
+            "convolutions": step.state.convolutions,
+            "status": self._status(step, converged, contact),
+            "contact_area": area,
+            "contact_area_counted": touching,
+            "contact_fraction": self.profile.contact_fraction(contact, area),
+            "mean_gap": mean_gap,
+            **self._mean_plane(shown.approach),
+            **friction_row(step),
+        }
+        if kept:
+            row |= error_columns(step, self._choice.series_error) | area_columns(step, contact, touching, area)
+        facts = {
+            "level": step.level,
+            "corner": self.profile.corner,
+            "shape": window.shape,
+            "domain": window.domain,
+        }
+        return Row(shown.time, row, _copy_views(arrays), kept, facts=facts, done=shown.time)
+
+    def columns(self, columns: dict[str, Array]) -> dict[str, Array]:
+        """What each row has cost, from the sums till then; and the nominal pressure."""
+        for counter in ("iterations", "convolutions"):
+            columns[counter] = np.diff(columns[counter], prepend=0)
+        columns["nominal_pressure"] = columns["force"] / self.profile.nominal_area
+        return columns
+
+    def _window(self, facts: dict[str, Any]) -> Window:
+        """The window of the final domain that a row was solved on."""
+        return self.profile.window_at(facts["corner"], facts["shape"])
+
+    def settled(self, records: RowStore, number: int) -> dict[str, Any]:
+        """What is counted over the domain, where that has grown since the row was found."""
+        row, facts = records.plain[number]["row"], records.plain[number]["facts"]
+        if tuple(facts["domain"]) == self.profile.window.domain:
+            return {}
+        fraction = row["contact_area"] / self._area()
+        if not records.plain[number]["kept"]:  # its pressure is not known any more
+            return {"contact_fraction": fraction, "mean_gap": math.nan}
+        source = records.arrays(number, "source")["source"]
+        window = self._window(facts)
+        if self.profile.present.all():
+            mean_gap = self._mean_gap(window, source, facts["level"])
+        else:
+            gap = np.empty(window.domain)
+            self._fill(records, "gap", number, window, gap)
+            mean_gap = float(np.nanmean(gap))
+        return {"contact_fraction": fraction, "mean_gap": mean_gap}
+
+    def field(self, records: RowStore, name: str, number: int, out: Array) -> Array:
+        """A field of a row over the final surface, written to ``out``, which holds zeros."""
+        window = self._window(records.plain[number]["facts"])
+        touched = out[window.surface_cells] if name == "pressure" else out  # zeros that stay cost nothing
+        if self.profile.mirrored:
+            self._fill(records, name, number, window, touched[quarter(touched.shape)])
+            unfold(touched)
+        else:
+            self._fill(records, name, number, window, touched)
+        return out
+
+    def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
+        """How it was modelled, what an audit asks for, and notes on what is beyond the model; these are logged too."""
+        scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
+        material = self._problem.body.material
+        largest = (float(dataset[name].max()) for name in ("force", "approach"))
+        (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
+        warnings = {
+            "slope_note": self._slope_note(dataset),
+            "border_note": self._border_note(dataset),
+            "edge_note": "" if self._border is None else edge_note(self._border),
+            "wake_note": self._wake_note(dataset),
+        }
+        for note in filter(None, warnings.values()):
+            log.warning("%s", note)
+        return {
+            "memory": choice.note,
+            "series_error": choice.series_error,
+            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, *largest),
+            "material_note": complete(material).note,
+            "program_note": scene.program.note,
+            "slide_note": slide_note(scene.program, profile.spacing),
+            "accuracy_note": accuracy_note(scene, dataset),
+            "edge": "accept" if settings.edge == "accept" else "",
+            "left_out": left_out(choice, settings, self._followed, profile.mirrored),
+            **warnings,
+            # of what was pressed, a series or not
+            "compliance_at_once": scene.compliance(0.0),
+            "compliance_at_end": scene.final,
+        }
+
+    def _slope_note(self, dataset: xr.Dataset) -> str:
+        """What to say of a surface that is too steep where it was loaded."""
+        profile = self.profile
+        deepest = float(dataset["approach"].max()) - profile.least_gap  # below the highest cell
+        return slope_note(profile.height[profile.window.surface_cells], self._settings.boundary, deepest)
+
+    def _wake_note(self, dataset: xr.Dataset) -> str:
+        """What to say of a contact that stands alone and slides into the wake of the one before."""
+        scene, profile = self._scene, self.profile
+        segments = [(one, one.slide) for one in scene.program.segments if one.slide is not None]
+        if not segments:
+            return ""
+        notes, alone = [], surface_stands_alone(profile.height)
+        for axis, side in enumerate(profile.spacing):
+            period = profile.height.shape[axis] * side
+            strokes = [(slide.distance, slide.distance / one.duration) for one, slide in segments if slide.axis == axis]
+            if sum(distance for distance, _ in strokes) < period / 2:  # it does not come as far as the next wake
+                continue
+            single = alone
+            if single is None and "pressure" in dataset:
+                single = contact_stands_alone(dataset["pressure"][-1].values, axis)
+            if single:
+                left = {speed: creep_left(scene.compliance(period / speed), scene.final) for _, speed in strokes}
+                notes.append(wake_note(left, period))
+        return " ".join(filter(None, notes))
+
+    def _border_note(self, dataset: xr.Dataset) -> str:
+        """What to say of a periodic surface whose opposite borders do not meet."""
+        if self._settings.boundary != "periodic" or self.profile.mirrored:
+            return ""
+        return border_note(self.profile.height, dataset)
+
+    def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
+        """A field of a step on the whole domain, in memory that nobody changes."""
+        if name == "pressure":
+            return step.shown.pressure
+        if name == "displacement":
+            return step.displacement
+        found = np.empty(contact.shape)
+
+        def fill(rows: slice) -> None:
+            found[rows] = self._gap(step, contact, rows)
+
+        passes.of_rows(fill, contact.shape, step.scene.halfspace.threads)
+        return found
+
+    def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
+        """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
+        gap = self.profile.gap[rows] + step.displacement_on(rows)
+        self._clip_gap(gap, step.level, rows)
+        gap[contact[rows]] = 0.0
+        return gap
+
+    def _mean_of_gap(self, step: Step, contact: NDArray[np.bool_]) -> float:
+        """Its mean over the present cells, from some rows at a time. [m]"""
+        present = self.profile.present
+
+        def total(rows: slice) -> float:
+            return float(np.sum(self._gap(step, contact, rows), where=present[rows]))
+
+        gaps = passes.of_rows(total, contact.shape, step.scene.halfspace.threads)
+        return sum(gaps) / np.count_nonzero(present)
+
+    def _mean_gap(self, window: Window, source: Array, level: float) -> float:
+        """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
+        return self.profile.mean_gap + float(np.sum(source * self._mean_influence(window))) - level
+
+    def _fill(self, records: RowStore, name: str, index: int, window: Window, out: Array) -> None:
+        """Write a field over the domain, the pressure over the window alone."""
+        if window.whole:
+            out[...] = records.arrays(index, name)[name]
+            return
+        arrays = records.arrays(index, "source_pressure", "source")
+        if name == "pressure":
+            out[...] = arrays["source_pressure"]
+            return
+        for rows, displacement in self._reach(window).rows(arrays["source"]):
+            if name == "displacement":
+                out[rows] = displacement
+            else:
+                np.add(displacement, self.profile.gap[rows], out=out[rows])
+                self._clip_gap(out[rows], records.plain[index]["facts"]["level"], rows)
+        if name == "gap":
+            out[window.cells][arrays["source_pressure"] > 0] = 0.0
+
+    def _clip_gap(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
+        """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
+        gap -= level
+        np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
+        absent = ~self.profile.present[rows]
+        if absent.any():
+            gap[absent] = np.nan
+
+    def _area(self) -> float:
+        """Of the surface. [m2]"""
+        dx, dy = self.profile.spacing
+        return dx * dy * self.profile.height.size
+
+    def _mean_plane(self, approach: float) -> dict[str, float]:
+        """Separation of the mean plane of the profile and the undeformed plane in free space. [m]"""
+        return {"mean_plane_separation": self.profile.mean_gap - approach} if self._has_mean_plane else {}
+
+    def _status(self, step: Step, converged: bool, contact: NDArray[np.bool_]) -> int:
+        if not converged:
+            meaning = "not_converged"
+        elif step.shown.force == 0:
+            meaning = "open"
+        elif self.profile.window.whole and np.count_nonzero(contact) == np.count_nonzero(self.profile.present):
+            meaning = "full_contact"
+        else:
+            meaning = "converged"
+        return STATUS_MEANINGS.index(meaning)
+
+
+def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:
+    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
+    own: dict[int, Array] = {}
+    for array in arrays.values():
+        if id(array) not in own:
+            whole = array.base is None or array.base.nbytes == array.nbytes
+            own[id(array)] = array if whole else array.copy()
+    return {name: own[id(array)] for name, array in arrays.items()}
+
+
+def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
+    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
+
+    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
+    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
+    """
+    free = ~contact if scene.present is None else scene.present & ~contact
+    periodic, mirrored = scene.halfspace.boundary == "periodic", scene.halfspace.mirrored
+    goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
+    # beyond a mirror a cell's neighbour is its image
+    outside = {"before": goes_on and not mirrored, "beyond": goes_on}
+    return staircase(contact, free, scene.halfspace.cell_area, periodic and not mirrored, **outside)

@@ -1,0 +1,207 @@
+"""Notes of a result on its own limits: effects left out, rows beyond the tolerance, steep slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.sheet import Sheet, complement
+from roughvisc.mechanics.hereditary.choice import Choice, terms
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.settings import Settings
+from roughvisc.topography.borders import JUMP, border_mismatch
+from roughvisc.topography.parameters import rms_slope
+from roughvisc.variables import FIELDS
+
+#: What a result says of a material without instantaneous compliance.
+NO_JUMP = (
+    "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
+    "comes into contact. The approach keeps the tolerance; of pressure, force and work each row states its own error."
+)
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
+#: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
+#: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+LARGEST_SLOPE = 0.3
+#: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
+_AT_ONCE = 0.1
+
+
+def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
+    """What costs nothing, and why: what nothing asks for is not modelled, computed or kept."""
+    out = []
+    if choice.note.startswith("no memory"):
+        out.append("past pressures: not needed, the material is elastic")
+    elif isinstance(choice.memory, Modes) and choice.memory.acts_on != "pressure" and settings.method == "fast":
+        out.append(f"past pressures: remembered by {terms(choice.memory.material)}, at no cost")
+    if settings.boundary == "periodic":
+        out.append("padding of the transforms: not needed, the surface repeats")
+    if window:
+        out.append("cells too deep to be touched: not computed")
+    if mirrored:
+        out.append("three quarters of the surface: not computed, they are mirror images of the fourth")
+    absent = [name for name in FIELDS if name not in settings.fields]
+    if absent:
+        out.append(f"{' and '.join(absent)}: not kept")
+    if settings.times is not None and settings.fields:
+        out.append("fields between the kept times: not kept")
+    return "; ".join(out)
+
+
+def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
+    """Where the tolerance is not promised, or was not reached; empty if it is."""
+    notes = []
+    at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
+    if at_once == 0:
+        notes.append(NO_JUMP)
+    elif at_once < _AT_ONCE * final:
+        notes.append(
+            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: pressure, and force under a given "
+            "approach, nearly jump in each cell that comes into contact. The approach keeps the tolerance; of "
+            "pressure, force and work each row states its own error."
+        )
+    errors = dataset["stated_error"].values
+    missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
+    if missed.size:
+        fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
+        if scene.motions:
+            fixed += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
+        says = "states" if missed.size == 1 else "state"
+        notes.append(
+            f"{missed.size} of {errors.size} rows {says} an error above the tolerance, {errors[missed].max():.2g} at "
+            f"worst (stated_error).{fixed}"
+        )
+    return " ".join(notes)
+
+
+def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
+    """What to say of a periodic surface with a step where it repeats; empty if it has none.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    dataset : Dataset
+        The result; where it holds the pressure, what the outermost cells carry of it is told.
+    """
+    borders = border_mismatch(height)
+    if not borders.jumps:
+        return ""
+    (x, y), (nx, ny) = borders.of_rms, borders.of_neighbours
+    note = (
+        f"The surface repeats with a step: opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, "
+        f"{nx:.2g} and {ny:.2g} times as much as neighbouring rows."
+    )
+    if "pressure" in dataset and float(dataset["force"][-1]) > 0:
+        last = dataset["pressure"].isel(time=-1)
+        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
+        ratio = max(float(side.mean()) for side in sides) / float(last.mean())
+        note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
+    return note + " Use mirror = true under [surface]; a taper would do without the step, but changes the contact."
+
+
+def edge_note(time: float) -> str:
+    """What to say of contact that came to the border of a free-space domain, as ``edge = "accept"`` allows.
+
+    Parameters
+    ----------
+    time : float
+        End of the first step in which it was there. [s]
+    """
+    return (
+        f"Contact reached the border of the surface, first in the step to {time:.3g} s: there the surface acts as "
+        'a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "accept").'
+    )
+
+
+def body_note(
+    kernel: Kernel, settings: Settings, size: tuple[float, float], compliance: float, force: float, approach: float
+) -> str:
+    """What the base of a sheet does to this contact, and whether a half-space would have done; empty without a base.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Of the body.
+    settings : Settings
+        Boundary and tolerance.
+    size : tuple of float
+        Of the surface. [m]
+    compliance : float
+        Contact compliance at the end. [1/Pa]
+    force, approach : float
+        The largest. [N], [m]
+
+    Notes
+    -----
+    In free space the base raises the surface by no more than ``c(0) C F``, with the correction ``c(0)`` of the
+    kernel right under the load, :attr:`~roughvisc.mechanics.bodies.sheet.Sheet.relief`.
+    """
+    if not isinstance(kernel, Sheet) or not (force > 0 and approach > 0):
+        return ""
+    if settings.boundary == "free":
+        more = kernel.relief * compliance * force / approach
+        if more < settings.tolerance:
+            return (
+                f"A half-space would have done: its approach is at most {percent(more)} larger, which is less than "
+                "the tolerance."
+            )
+        larger = "much" if more > 1 else f"up to {percent(more)}"  # the bound says little where it is wide
+        return f"The base matters: on a half-space the approach would be {larger} larger."
+    longest = max(size)
+    lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
+    note = f"The base holds back {percent(lost)} of the longest wave, of {longest:.3g} m" + (
+        ": a half-space would have done." if lost < settings.tolerance else "."
+    )
+    if kernel.uniform_displacement > 0:
+        share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
+        note += (
+            " The approach holds the compression of the sheet itself, mean pressure times compliance times "
+            f"{kernel.uniform_displacement:.3g} m: up to {percent(min(share, 1.0))} of it."
+        )
+    return note
+
+
+def percent(share: float) -> str:
+    """A share to two digits, as 100 and not 1e+02."""
+    return f"{float(f'{100 * share:.2g}'):g} %"
+
+
+def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
+    """What to say of a surface that is too steep for small slopes; empty if it is not.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    boundary : {"free", "periodic"}
+        In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
+    approach : float
+        The largest at kept times, from the highest cell. [m]
+    """
+    periodic = boundary == "periodic"
+    slope = rms_slope(height, periodic, np.inf if periodic else approach)
+    if not slope > LARGEST_SLOPE:
+        return ""
+    return (
+        f"The rms slope of the loaded surface is {slope:.2g}: the method takes slopes as small, and leaves out what is "
+        f"of the order of its square. Beyond {LARGEST_SLOPE:g} the results are a rough guess."
+    )
+
+
+#: Part of the friction that the shortest octave of waves may add without a word.
+_MUCH_OF_FRICTION = 0.2
+
+
+def octave_note(dataset: xr.Dataset) -> str:
+    """What to say of a surface whose shortest waves add much of the friction; empty if they do not."""
+    if "last_octave_friction" not in dataset:
+        return ""
+    most = float(dataset["last_octave_friction"].max())
+    if not most > _MUCH_OF_FRICTION:
+        return ""
+    return (
+        f"The shortest octave of waves adds up to {100 * most:.0f} % of the friction: waves that the scan does not "
+        "resolve may add as much again."
+    )

@@ -1,0 +1,162 @@
+"""What is stated of a row: how far off its pressure, force, approach, area and energies may be."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.contact.neighbours import area_bounds
+from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.stepping.attempt import segment_number
+from roughvisc.mechanics.stepping.scene import Step
+
+#: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
+#: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
+_INHERITED, _INHERITED_APPROACH = 0.02, 0.005
+#: The least that is stated of a pressure without a past, in units of the tolerance: measured there too.
+_LEAST = 0.015
+#: Part of the contact solver's error that is left in an energy, a sum over steps in which it has either sign: measured
+#: there too.
+_SUMMED = 0.5
+#: A row that states more than so many tolerances is none where every step is kept and the row is not asked for.
+_AT_MOST = 3.0
+#: Error of a pressure at the edge of contact, over the mean one.
+_SOLVER_AT_EDGE = 3.0
+
+
+def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
+    """Area in contact and area out of it that the contact solver's error may put on the other side. [m2]
+
+    Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
+    """
+    shown, scene = step.shown, step.scene
+    if not contact.any() or not step.residual > 0:
+        return 0.0, 0.0
+    since = step.state.began if step.state.before is None else step.state.before.time
+    threads, area = scene.halfspace.threads, scene.halfspace.cell_area
+    mean = shown.contact.total() / np.count_nonzero(contact)
+    pressure = _SOLVER_AT_EDGE * step.residual * mean
+    closed = pressure * scene.halfspace.self_influence * scene.compliance(step.state.now.time - since)
+
+    def counted(rows: slice) -> tuple[int, int]:
+        here = contact[rows]
+        inside = here & (step.pressure_on(rows) <= pressure)
+        outside = ~here & (scene.gap[rows] + step.displacement_on(rows) - step.level <= closed)
+        if scene.present is not None:
+            outside &= scene.present[rows]
+        return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
+
+    found = passes.of_rows(counted, contact.shape, threads)
+    return area * sum(inside for inside, _ in found), area * sum(outside for _, outside in found)
+
+
+def area_columns(step: Step, contact: NDArray[np.bool_], counted: float, area: float) -> dict[str, float]:
+    """Bounds on the contact area of a step, by the cells that time steps and contact solver leave in doubt. [m2]
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    contact : ndarray of bool
+        Cells in contact.
+    counted, area : float
+        Contact area, counted and corrected for the grid. [m2]
+    """
+    in_doubt, unknown = uncertain_cells(step, contact), step.uncertainty
+    lower, upper = area_bounds(counted, area, unknown.inside + in_doubt[0], unknown.outside + in_doubt[1])
+    return {"contact_area_solver_lower": float(lower), "contact_area_solver_upper": float(upper)}
+
+
+def error_columns(step: Step, series_error: float) -> dict[str, float]:
+    """What is stated of the accuracy of a step.
+
+    Parameters
+    ----------
+    step : Step
+        An accepted step.
+    series_error : float
+        Relative error of the series that stands for the material.
+
+    Notes
+    -----
+    The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
+    under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
+    the approach. The series' error is one of the largest values so far: what is left after unloading is a
+    difference of such values.
+    """
+    state, unknown, shown = step.state, step.uncertainty, step.shown
+    largest_force, largest_approach = state.largest_force, state.largest_approach
+    is_viscoelastic, unit = step.scene.is_viscoelastic, step.scene.tolerance if largest_force > 0 else 0.0
+    solved = step.residual + _INHERITED * unit if is_viscoelastic else max(step.residual, _LEAST * unit)
+    force = approach = 0.0
+    if step.control == "approach" or not step.given:
+        force = unknown.force + solved * shown.force + series_error * largest_force
+    if step.control == "load" or not step.given:
+        approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
+        approach += _INHERITED_APPROACH * unit * largest_approach if is_viscoelastic else 0.0
+    pressure = solved
+    if largest_force > 0:
+        pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
+    relative = max(
+        pressure,
+        force / largest_force if largest_force > 0 else 0.0,
+        approach / largest_approach if largest_approach > 0 else 0.0,
+    )
+    carried = _SUMMED * solved + series_error
+    return {
+        "stated_error": relative,
+        "residual": step.residual,
+        "residual_bound": step.bound,
+        "pressure_error": pressure,
+        "force_error": force,
+        "approach_error": approach,
+        "work_error": unknown.work + carried * abs(step.work),
+        "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
+    }
+
+
+def meets_tolerance(step: Step, series_error: float) -> bool:
+    """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
+
+    Where hardly any compliance is there at once, pressure jumps in each cell that enters. Only the approach is
+    promised there to the tolerance, and the rest to :data:`_AT_MOST` of it. The short steps that lead over such a jump
+    are no rows; nor, under given approach, are those in which a cell has entered, since the force jumps with it.
+    """
+    scene, state = step.scene, step.state
+    if scene.time_step is not None or in_slide(step):  # the steps are as long as they are
+        return True
+    found = error_columns(step, series_error)
+    most = _AT_MOST * scene.tolerance
+    if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
+        return False
+    if not scene.lacks_instantaneous_compliance(scene.program.duration):
+        return not found["stated_error"] > scene.tolerance
+    since = state.now.time - state.began
+    if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
+        return False
+    if step.control == "approach" and _entered(step):
+        return False
+    return not found["approach_error"] > scene.tolerance * state.largest_approach
+
+
+def in_slide(step: Step) -> bool:
+    """Whether an accepted step is one of a slide."""
+    scene = step.scene
+    return bool(scene.motions) and scene.program.segments[segment_number(step.state)].slide is not None
+
+
+def is_end_value(step: Step) -> bool:
+    """Whether pressure and force of an accepted step are those at its end.
+
+    Where hardly any compliance is there at once they belong to the whole step, unless it is kept: what is given, the
+    load or the approach, is right all the same.
+    """
+    state = step.state
+    since = state.began if state.before is None else state.before.time
+    return step.control == "load" or not step.scene.lacks_instantaneous_compliance(state.now.time - since)
+
+
+def _entered(step: Step) -> bool:
+    """Whether a cell has come into contact within a step."""
+    before = step.state.before
+    return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))

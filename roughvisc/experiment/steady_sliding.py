@@ -1,0 +1,295 @@
+"""Steady sliding: a surface that slides at given speeds gives rows over speed."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.experiment.faces import AxisTransform, SlidingGrid, areas, on_rows
+from roughvisc.experiment.footprint import curve_bytes
+from roughvisc.experiment.friction_grid_error import CoarserFaces
+from roughvisc.experiment.notes import border_note, octave_note, slope_note
+from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.protocol import Experiment, Row, Rows
+from roughvisc.experiment.refusal import require_memory_of_curve
+from roughvisc.experiment.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
+from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.materials.frequency import over_frequencies
+from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.sliding.persson import persson
+from roughvisc.mechanics.sliding.steady import SteadyState
+from roughvisc.mechanics.stepping.slide import Direction
+from roughvisc.problem import Problem
+from roughvisc.recorder import RowStore
+from roughvisc.settings import Settings
+from roughvisc.units import unit_for
+from roughvisc.variables import STATUS_MEANINGS
+
+log = logging.getLogger("roughvisc")
+
+Array = NDArray[np.float64]
+
+#: What every result on sliding says of its model.
+MODEL = (
+    "Normal contact alone: friction is that of pressure on inclined faces, which the material's losses make uneven. "
+    "No shear at the interface, no adhesion, no heating."
+)
+#: Speeds of a plan's coarse curves: of more, evenly spread ones.
+_FEW = 7
+
+#: Fields that a row may have.
+_FIELDS = ("pressure", "gap")
+
+DIRECTIONS: tuple[str, ...] = get_args(Direction)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadySliding(Experiment):
+    """What is asked of steady sliding, beside a surface, a material and settings; see :func:`roughvisc.friction`.
+
+    Parameters
+    ----------
+    speeds, load, pressure, direction, last_octave
+        As :func:`roughvisc.friction` has them; the speeds become a tuple.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected.
+
+    Examples
+    --------
+    >>> SteadySliding(speeds=[1e-3, 1.0], load=2.0)
+    Steady sliding: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
+    """
+
+    speeds: Sequence[float] | float
+    load: float | None = None
+    pressure: float | None = None
+    direction: Direction = "x"
+    last_octave: bool = False
+
+    axis: ClassVar[str] = "speed"
+    table: ClassVar[str] = "friction"
+    called: ClassVar[str] = "steady sliding"
+    doing: ClassVar[str] = "sliding"
+    states_grid_error: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "speeds", _speeds(self.speeds))
+        if self.direction not in DIRECTIONS:
+            raise InputError(f"direction is {self.direction!r}: expected {' or '.join(map(repr, DIRECTIONS))}")
+        if (self.load is None) == (self.pressure is None):
+            raise InputError(f"load is {self.load!r} and pressure is {self.pressure!r}: expected one of them")
+        for name, value, unit in (("load", self.load, "N"), ("pressure", self.pressure, "Pa")):
+            if value is not None and not (isinstance(value, int | float) and 0 < value < math.inf):
+                raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
+
+    def __repr__(self) -> str:
+        ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.asked), max(self.asked))))
+        count = f"{len(self.asked)} speeds from " if len(self.asked) > 1 else ""
+        pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
+        under = unit_for([pressed[0] or 0.0], pressed[1]).text(pressed[0] or 0.0)
+        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
+
+    @property
+    def asked(self) -> tuple[float, ...]:
+        """The speeds, in the order given. [m/s]"""
+        assert isinstance(self.speeds, tuple)
+        return self.speeds
+
+    def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
+        """The steady state at each speed, from the lowest to the highest; the state counts those that are found."""
+        return SlidingRows(problem, self, state or 0)
+
+    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
+        """What has no meaning where a whole surface slides, repeats without end, and never started."""
+        if settings.boundary != "periodic":
+            yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic'"
+        if "displacement" in settings.fields:
+            yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
+        if settings.missing != "refuse":
+            yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
+        yield from super().unsupported(settings)
+
+    def content(self) -> Any:
+        """What differs from the defaults."""
+        found = {one.name: getattr(self, one.name) for one in fields(self) if getattr(self, one.name) != one.default}
+        return found | {"speeds": list(self.asked)}
+
+    def progress(self, done: float, end: float) -> str:
+        """The number of speeds that are found."""
+        return f"speed {done:.0f} of {end:.0f}"
+
+    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float) -> float:
+        """Memory of one speed. [byte]"""
+        return curve_bytes(settings, cells)
+
+    def creep_time(self, size: float) -> float:
+        """Of the longest wave, at the lowest speed. [s]"""
+        return size / min(self.asked)
+
+    @property
+    def largest_speed(self) -> float:
+        """The largest of the speeds. [m/s]"""
+        return max(self.asked)
+
+    def cheaper(self) -> tuple[SteadySliding, int, float]:
+        """Some of the speeds, evenly spread; without its shortest octave a speed costs half."""
+        order = np.argsort(self.asked)
+        few = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW, len(order))).astype(int))]
+        few_speeds = replace(self, speeds=[self.asked[number] for number in few], last_octave=False)
+        return few_speeds, len(order), 1.0 + float(self.last_octave)
+
+    def force(self, area: float) -> float:
+        """Load on a surface of an area [m2]. [N]"""
+        return float(self.load) if self.load is not None else float(self.pressure or 0.0) * area
+
+
+def _speeds(speeds: Any) -> tuple[float, ...]:
+    try:
+        found = np.atleast_1d(np.asarray(speeds, dtype=float))
+    except (TypeError, ValueError):
+        found = np.array([])
+    if found.ndim != 1 or not found.size or not (np.isfinite(found) & (found > 0)).all():
+        raise InputError(f"speeds is {speeds!r}: expected positive numbers [m/s]")
+    return tuple(found.tolist())
+
+
+class SlidingRows(Rows):
+    """Steady states of one curve, from the lowest speed to the highest.
+
+    Parameters
+    ----------
+    problem : Problem
+        Surface, body and settings.
+    curve : SteadySliding
+        What is asked.
+    found : int
+        Speeds that are found already, the lowest ones.
+    """
+
+    def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
+        (term,) = problem.body.terms()
+        self._material, self._curve, self._settings, self._done = term.material, curve, problem.settings, found
+        self._profile = Profile(problem.height, "refuse", kernel=term.kernel)
+        require_memory_of_curve((self._profile.gap.shape[0], self._profile.gap.shape[1]), problem.settings)
+        if not self._profile.present.all():  # of a punch, which says so itself
+            raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
+        super().__init__(self._profile.height, (), float(len(curve.asked)), self._profile.highest)
+        self._turn = AxisTransform.of(curve.direction)
+        self._force = curve.force(self._profile.nominal_area)
+        self._face = SlidingGrid.of(self._profile, self._turn)
+        self._alone = surface_stands_alone(self._profile.height)
+        #: Part of the creep that is left where the next contact comes, by the speed.
+        self._creep_left: dict[float, float] = {}
+        self._smooth: SlidingGrid | None = None
+        self._octave = ""
+        if curve.last_octave:
+            self._smooth, shortest = self._face.smooth()
+            self._octave = f"waves shorter than {shortest:.4g} m"
+        self._coarser = CoarserFaces(self._face) if problem.settings.grid_error else None
+
+    def __iter__(self) -> Iterator[Row]:
+        """Slide at each speed."""
+        for done, number in enumerate(np.argsort(self._curve.asked)[self._done :], self._done + 1):
+            yield self._at(int(number), done)
+
+    def _at(self, number: int, done: int) -> Row:
+        """Slide at the speed of that number; so many are then done."""
+        speed, tolerance = self._curve.asked[number], self._settings.tolerance
+        # once a speed: a table takes a fit
+        law = over_frequencies(self._material, speed * self._face.waves, 0.1 * tolerance)
+        sliding = self._face.sliding(speed, law)
+        found = self._face.slide(sliding, self._force, tolerance)
+        row, fields = self._row(found, speed)
+        row["friction_force_across"] = sliding.force_across(on_rows(found.pressure, sliding))
+        theory = persson(sliding, on_rows(self._face.gap, sliding), row["nominal_pressure"])
+        row["persson_friction_coefficient"] = theory.friction_coefficient
+        row["persson_contact_fraction"] = theory.contact_fraction
+        if self._smooth is not None:
+            row |= self._added(row, found, self._smooth.slide(sliding, self._force, tolerance))
+        if self._coarser is not None:
+            row |= self._coarser.errors(found, speed, law, self._force, tolerance)
+        facts = {"number": number, "creep_left": self._creep(found, speed, law)}
+        return Row(speed, row, fields, state=done, facts=facts, done=float(done))
+
+    def _row(self, found: SteadyState, speed: float) -> tuple[dict[str, Any], dict[str, Array]]:
+        """Numbers and fields of a state, in the frame of the profile."""
+        profile, force = self._profile, self._force
+        pressure, displacement = self._turn.back(found.pressure), self._turn.back(found.displacement)
+        contact = pressure > 0
+        counted, area = areas(contact, profile.spacing)
+        gap = np.maximum(profile.gap + displacement - found.approach, 0.0)
+        gap[contact] = 0.0
+        whole = "full_contact" if contact.all() else "converged"
+        row = {
+            "force": force,
+            "nominal_pressure": force / profile.nominal_area,
+            "approach": found.approach,
+            "contact_area": area,
+            "contact_area_counted": counted,
+            "contact_fraction": profile.contact_fraction(contact, area),
+            "mean_gap": float(gap.mean()),
+            "friction_coefficient": found.power_force / force,
+            "friction_force": found.power_force,
+            "dissipated_power": found.power_force * speed,
+            "loss_tangent": found.loss_tangent,
+            "stated_error": max(found.residual, found.friction_residual),
+            "pressure_residual": found.residual,
+            "friction_residual": found.friction_residual,
+            "iterations": found.vectors,
+            "convolutions": found.convolutions,
+            "outer_iterations": found.iterations,
+            "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
+        }
+        fields = {"pressure": np.ascontiguousarray(pressure), "gap": gap}
+        return row, {name: fields[name] for name in self._settings.fields}
+
+    def _creep(self, found: SteadyState, speed: float, law: Material) -> float:
+        """Part of the creep that has not recovered where the next contact comes; 0 unless the contact stands alone."""
+        if not (contact_stands_alone(found.pressure, 0) if self._alone is None else self._alone):
+            return 0.0
+        return creep_left(*(float(law.contact_compliance(t)) for t in (self._face.period / speed, np.inf)))
+
+    def _added(self, row: dict[str, Any], found: SteadyState, without: SteadyState) -> dict[str, float]:
+        """What the shortest octave of waves adds, relative to what there is with it."""
+        if not (found.converged and without.converged and found.power_force > 0):
+            return {"last_octave_friction": np.nan, "last_octave_area": np.nan}
+        area = areas(without.pressure > 0, self._profile.spacing)[1]
+        return {
+            "last_octave_friction": 1 - without.power_force / found.power_force,
+            "last_octave_area": 1 - area / row["contact_area"],
+        }
+
+    def order(self, records: RowStore) -> list[int]:
+        """In the order in which the speeds were given."""
+        facts = [plain["facts"] for plain in records.plain]
+        self._creep_left = {self._curve.asked[one["number"]]: one["creep_left"] for one in facts}
+        return [int(place) for place in np.argsort([one["number"] for one in facts])]
+
+    def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
+        """What was modelled, and notes on what is beyond the model; these are logged too."""
+        warnings = {
+            "slope_note": slope_note(self.height, "periodic", np.inf),
+            "border_note": border_note(self.height, xr.Dataset()),
+            "wake_note": wake_note(self._creep_left, self._face.period),
+        }
+        for note in filter(None, warnings.values()):
+            log.warning("%s", note)
+        return {
+            "model_note": MODEL,
+            "direction": self._curve.direction,
+            "material_note": self._material.note,
+            "octave_note": octave_note(dataset),
+            "last_octave": self._octave,
+            **warnings,
+        }

@@ -1,0 +1,138 @@
+"""The body that a profile is pressed on: a material, and how the surface of the body answers pressure.
+
+A material alone is a half-space of it. A body is a value that everything takes in place of a material.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.sheet import Base, Sheet
+from roughvisc.mechanics.materials.protocol import Material, complete
+
+#: Unless a base is given with a thickness.
+BASE: Base = "bonded"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of a body's response: a function of time and an operator in space.
+
+    Attributes
+    ----------
+    material : Material
+        Its contact compliance is the function of time, ``C(t)``. [1/Pa]
+    kernel : Kernel
+        Displacement under unit pressure at unit contact compliance. [m]
+    """
+
+    material: Material
+    kernel: Kernel
+
+
+@dataclass(frozen=True)
+class Body:
+    """A viscoelastic body whose surface is the same everywhere.
+
+    Parameters
+    ----------
+    material : Material
+        One of roughvisc's, or any object with the two functions that
+        :class:`roughvisc.mechanics.materials.models.Material` asks for.
+    kernel : Kernel
+        What its surface does under unit pressure at unit contact compliance; a half-space's unless given. See
+        :class:`roughvisc.mechanics.bodies.kernel.Kernel` for one of your own.
+
+    Raises
+    ------
+    InputError
+        If either is something else.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.Body(rv.elastic(1e6)) == rv.sheet(rv.elastic(1e6), thickness=float("inf"))
+    True
+    """
+
+    material: Material
+    kernel: Kernel = HALF_SPACE
+
+    def __post_init__(self) -> None:
+        if isinstance(self.material, Body):
+            raise InputError(f"material is the body {self.material!r}: expected a material")
+        complete(self.material)
+        for name in ("influence", "transfer"):
+            if not callable(getattr(self.kernel, name, None)):
+                found = type(self.kernel).__name__
+                raise InputError(f"kernel is a {found}: expected a Kernel; it has no {name}")
+
+    def terms(self) -> tuple[Term, ...]:
+        """What the response to pressure is a sum of: ``C(q, t) = sum_i C_i(t) K_i(q)``."""
+        return (Term(complete(self.material), self.kernel),)
+
+    def attributes(self) -> dict[str, Any]:
+        """What a result says of the body beside its material: names of attributes and their values."""
+        return self.kernel.described()
+
+
+def body_of(material: Any) -> Body:
+    """The body that is meant by a material, which is a half-space of it, or by a body."""
+    return material if isinstance(material, Body) else Body(material)
+
+
+def sheet(material: Material, thickness: float, base: Base = BASE) -> Body:
+    """A sheet of a material on a rigid base.
+
+    Parameters
+    ----------
+    material : Material
+        Of one body, with a Poisson ratio that is constant in time.
+    thickness : float
+        Infinite: a half-space. [m]
+    base : {"bonded", "slipping"}
+        Whether the sheet sticks to its base, or slides on it without friction.
+
+    Returns
+    -------
+    Body
+        To be given where a material is asked for.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive or the base is none of those; if the material stands for two bodies, or its
+        Poisson ratio is below zero or changes in time: space and time do not separate then.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> gel = rv.sheet(rv.zener(3e6, 1e6, 1e5), thickness=1e-4)
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=45)
+    >>> ds = rv.simulate(ball, gel, rv.Program().load(1e-4, over=0), progress=False)
+    >>> ds.attrs["thickness"], ds.attrs["base"]
+    (0.0001, 'bonded')
+    """
+    amiss = separability_error(material)
+    if amiss:
+        raise InputError(
+            f"thickness is {thickness!r}, and the material is {amiss}: expected one body, Poisson's ratio constant"
+        )
+    endless = thickness == math.inf
+    kernel = Sheet(1.0 if endless else thickness, complete(material).poisson, base)  # checks all of it
+    return Body(material) if endless else Body(material, kernel)
+
+
+def separability_error(material: Any) -> str:
+    """What a material stands for that is no one body of a constant Poisson ratio; empty if it is one."""
+    while material is not None:
+        amiss: str = getattr(material, "stands_for", "")
+        if amiss:
+            return amiss
+        material = getattr(material, "given", None)  # of one that was shifted or completed
+    return ""

@@ -1,0 +1,145 @@
+r"""The elastic half-space: ``K = 1 / (pi r)`` averaged over the loaded cell, ``K_q = 2 / |q|``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.mechanics.bodies.kernel import Counts, Kernel, check_grid
+
+Array = NDArray[np.float64]
+
+# Gauss points per side that give 1e-15 beyond a distance in units of the longer cell side. The closed form
+# cancels as eps (r / side)^2 (7e-8 at 16384 cells) and is used inside the first distance only.
+_GAUSS = ((4.0, 8), (16.0, 5), (40.0, 4), (200.0, 3))
+
+
+def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    r"""Displacement of a half-space's surface under one uniformly loaded cell.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+
+    Returns
+    -------
+    ndarray, shape (nx, ny)
+        Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
+        compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
+
+    Raises
+    ------
+    InputError
+        If a side is not positive and finite, or a number of cells is not positive.
+
+    Notes
+    -----
+    Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
+    alternating signs, loses digits far from the cell, where the corner terms cancel; Gauss quadrature of
+    ``1 / (pi r)`` over the cell takes over there.
+
+    References
+    ----------
+    .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
+    .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
+    """
+    check_grid(shape, spacing)
+    longer = max(spacing)
+    dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
+    x = np.arange(shape[0], dtype=float)[:, None] * dx
+    y = np.arange(shape[1], dtype=float)[None, :] * dy
+    distance = np.hypot(x, y)
+    kernel = np.empty(shape)
+
+    near = distance <= _GAUSS[0][0]
+    rows, columns = np.nonzero(near)
+    kernel[near] = _corner_sum(x[rows, 0], y[0, columns], dx, dy)
+    bounds = [start for start, _ in _GAUSS[1:]] + [math.inf]
+    for (start, points), end in zip(_GAUSS, bounds, strict=True):
+        ring = (distance > start) & (distance <= end)
+        if ring.any():
+            rows, columns = np.nonzero(ring)
+            kernel[ring] = _gauss_sum(x[rows, 0], y[0, columns], dx, dy, points)
+    return kernel * (longer / math.pi)
+
+
+def _corner_sum(x: Array, y: Array, dx: float | Array, dy: float | Array) -> Array:
+    total = np.zeros_like(x)
+    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
+        total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
+    return total
+
+
+def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float | Array, float | Array]) -> Array:
+    """Displacement due to unit pressure on a rectangle and unit contact compliance, in closed form.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Positions, which broadcast, from the rectangle's centre; none on its edges' lines. [m]
+    sides : tuple of float or ndarray
+        Of the rectangle, or of one rectangle for each position. [m]
+
+    Returns
+    -------
+    ndarray
+        Exact to rounding within the rectangle and near it. [m]
+    """
+    positions = np.broadcast_arrays(x, y)
+    return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
+
+
+def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    total = np.zeros_like(x)
+    for node_x, weight_x in zip(nodes, weights, strict=True):
+        x_squared = (x - node_x * dx / 2) ** 2
+        for node_y, weight_y in zip(nodes, weights, strict=True):
+            total += weight_x * weight_y / np.sqrt(x_squared + (y - node_y * dy / 2) ** 2)
+    return total * (dx * dy / 4)
+
+
+@dataclass(frozen=True)
+class Love(Kernel):
+    """The elastic half-space.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, sections 3.2 and 13.2.
+    """
+
+    raises_surface = False
+
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """As :func:`love_kernel`. [m]"""
+        return love_kernel(shape, spacing)
+
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """``2 / |q|``; zero at ``q = 0``: the mean displacement of a periodic half-space is undefined. [m]"""
+        magnitude = np.asarray(np.hypot(qx, qy), dtype=float)
+        return np.asarray(2 / np.where(magnitude > 0, magnitude, math.inf))
+
+    def described(self) -> dict[str, Any]:
+        """Nothing: it is what is pressed if nothing else is said."""
+        return {}
+
+    def under_rectangle(
+        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
+    ) -> Array:
+        """As for any kernel, by the closed form. [m]"""
+        axes = list(zip(before, after, spacing, strict=True))
+        x, y = ((a - b) / 2 * side for a, b, side in axes)
+        sides = [int(a[0] + b[0] + 1) * side for a, b, side in axes]
+        return rectangle_displacement(x[:, None], y, (sides[0], sides[1]))
+
+
+#: The body that is pressed if nothing else is said.
+HALF_SPACE = Love()

@@ -1,0 +1,228 @@
+r"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``, the half-space's kernel for waves shorter than the thickness.
+
+With a constant Poisson's ratio space and time separate as for a half-space: ``u = C(t) K * p``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
+from roughvisc.mechanics.bodies.long_cells import long_cell_influence
+from roughvisc.mechanics.bodies.love import love_kernel
+
+Array = NDArray[np.float64]
+Base = Literal["bonded", "slipping"]
+
+# In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
+_REACH = 46.0
+# 1 - S(s) dies as s^2 exp(-2 s): below rounding from here.
+SHORTEST_WAVE = 24.0
+# The correction in the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
+_PIECE, _NODES = 0.15, 10
+# Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
+_GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
+# Cells of more thicknesses than the first are long: see the module on them. Beyond the second they are refused.
+_LONG, _LONGEST = 0.5, 50.0
+# Below this, sinh(2 x) - 2 x comes from its series.
+_SERIES_BELOW = 0.5
+
+
+@dataclass(frozen=True)
+class Sheet(Kernel):
+    r"""A homogeneous sheet on a rigid base.
+
+    Parameters
+    ----------
+    thickness : float
+        [m]
+    poisson : float
+        Poisson's ratio, from 0 to 1/2. A slipping base does not depend on it.
+    base : {"bonded", "slipping"}
+        Whether the sheet sticks to its base, or slides on it without friction.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected.
+
+    Notes
+    -----
+    With ``x = |q| h`` and ``k = 3 - 4 nu`` the factor ``S`` is, on a bonded and on a slipping base [1]_,
+
+    .. math::
+        S = \frac{k \sinh 2x - 2x}{k \cosh 2x + 2x^2 + 5 - 12 \nu + 8 \nu^2},
+        \qquad S = \frac{\cosh 2x - 1}{\sinh 2x + 2x}.
+
+    In free space the kernel is that of the half-space less a smooth correction,
+    ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
+    the thickness it is that of :mod:`roughvisc.mechanics.bodies.long_cells`.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.8.
+    """
+
+    thickness: float
+    poisson: float = 0.5
+    base: Base = "bonded"
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.thickness, int | float) and 0 < self.thickness < math.inf):
+            raise InputError(f"thickness is {self.thickness!r}: expected a positive number [m]")
+        if not 0 <= self.poisson <= 0.5:
+            raise InputError(f"Poisson's ratio of a sheet is {self.poisson!r}: expected 0 to 1/2")
+        if self.base not in get_args(Base):
+            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
+
+    @property
+    def uniform_displacement(self) -> float:
+        """Displacement under uniform unit pressure: what the sheet itself gives way by. [m]"""
+        slope = (1 - 2 * self.poisson) / (1 - self.poisson) ** 2 if self.base == "bonded" else 1.0
+        return slope * self.thickness
+
+    @property
+    def relief(self) -> float:
+        """What the base takes off the displacement far inside the thickness, over load and compliance. [1/m]
+
+        A contact much smaller than the thickness has that much less approach than on a half-space, to first order.
+        """
+        s, weights = panels(96, SHORTEST_WAVE, 16)
+        return float(weights @ complement(s, self.poisson, self.base)) / (math.pi * self.thickness)
+
+    def described(self) -> dict[str, Any]:
+        """Thickness [m] and base."""
+        return {"thickness": self.thickness, "base": self.base}
+
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit of long waves, zero if the sheet keeps its volume. [m]"""
+        q = np.asarray(np.hypot(qx, qy), dtype=float)
+        long = q * self.thickness < 1e-150
+        q = np.where(long, 1.0, q)
+        return np.where(long, self.uniform_displacement, 2 / q * reduction(q * self.thickness, self.poisson, self.base))
+
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Love's kernel less the correction, to 1e-13 of a cell's displacement of itself; or that of long cells. [m]"""
+        check_grid(shape, spacing)
+        dx, dy = (side / self.thickness for side in spacing)
+        if max(dx, dy) > _LONG:
+            uniform = self.uniform_displacement / self.thickness
+            return self.thickness * long_cell_influence(shape, (dx, dy), self._scaled_transfer, uniform, _REACH)
+        kernel = love_kernel(shape, spacing)
+        x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
+        margin = _REACH - math.hypot(dx, dy) / 2
+        near = np.hypot(x[:, None], y) <= margin
+        kernel[~near] = 0
+        rows, columns = np.nonzero(near)
+        mean = np.zeros(rows.size)
+        correction = _correction(self.poisson if self.base == "bonded" else 0.5, self.base)
+        along_x, along_y = _gauss(dx), _gauss(dy)
+        for a, weight_a in zip(*along_x, strict=True):
+            square = (x[rows] + a) ** 2
+            for b, weight_b in zip(*along_y, strict=True):
+                mean += weight_a * weight_b * correction(np.sqrt(square + (y[columns] + b) ** 2))
+        kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
+        return kernel
+
+    def _scaled_transfer(self, x: Array) -> Array:
+        """The transfer function over the thickness, of wave numbers times the thickness."""
+        return 2 / x * reduction(x, self.poisson, self.base)
+
+    def check_cells(self, spacing: tuple[float, float]) -> None:
+        """Refuse cells longer than fifty thicknesses."""
+        ratio = max(spacing) / self.thickness
+        if ratio > _LONGEST * (1 + 1e-9):
+            raise InputError(
+                f"thickness is {self.thickness:.6g} m and a cell is {max(spacing):.6g} m long, {ratio:.4g} times the "
+                f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
+                "periodic boundaries, or a thicker sheet"
+            )
+
+
+def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
+    """The factor ``S`` of a wave: its displacement over that of a half-space.
+
+    Parameters
+    ----------
+    x : array_like
+        Wave number times thickness, positive.
+    poisson : float
+        Poisson's ratio.
+    base : {"bonded", "slipping"}
+
+    Returns
+    -------
+    ndarray
+        Between 0 and 1; exact to rounding for every `x`.
+    """
+    x = np.asarray(x, dtype=float)
+    e = np.exp(-2 * x)
+    if base == "slipping":
+        return np.asarray(np.expm1(-2 * x) ** 2 / (-np.expm1(-4 * x) + 4 * x * e))
+    k, rest = _bonded(x, poisson)
+    small = np.minimum(x, _SERIES_BELOW)
+    term, series = 2 * small, np.zeros_like(small)  # sinh(2 x) - 2 x, whose terms cancel where x is small
+    for n in range(3, 27, 2):
+        term = term * (2 * small) ** 2 / (n * (n - 1))
+        series = series + term
+    excess = np.where(x < _SERIES_BELOW, 2 * e * series, -np.expm1(-4 * x) - 4 * x * e)
+    return np.asarray((excess - (k - 1) * np.expm1(-4 * x)) / (k * (1 + e * e) + 2 * e * rest))
+
+
+def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
+    """``1 - S``, of which nothing is lost where it is small."""
+    x = np.asarray(x, dtype=float)
+    e = np.exp(-2 * x)
+    if base == "slipping":
+        with np.errstate(invalid="ignore"):
+            whole = 2 * e * (2 * x - np.expm1(-2 * x)) / (-np.expm1(-4 * x) + 4 * x * e)
+        return np.asarray(np.where(x > 0, whole, 1.0))
+    k, rest = _bonded(x, poisson)
+    return np.asarray(2 * e * (k * e + rest + 2 * x) / (k * (1 + e * e) + 2 * e * rest))
+
+
+def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
+    """``k``, and what stands beside ``k cosh 2x`` in the denominator."""
+    return 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
+
+
+def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
+    """Gauss nodes and weights on equal parts of an interval from zero."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    side = end / count
+    at = (np.arange(count)[:, None] + (nodes + 1) / 2) * side
+    return at.ravel(), np.tile(weights * side / 2, count)
+
+
+@lru_cache(maxsize=8)
+def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
+    """What the half-space's kernel has more, over the distance in thicknesses and in their inverse; to the reach."""
+    from scipy.interpolate import PPoly  # slow to import
+    from scipy.special import j0
+
+    s, weights = panels(96, SHORTEST_WAVE, 16)
+    amplitude = weights * complement(s, poisson, base) / math.pi
+    count = math.ceil(_REACH / _PIECE)
+    ends = np.linspace(0.0, _REACH, count + 1)
+    side = ends[1]
+    nodes = np.polynomial.chebyshev.chebpts1(_NODES)
+    at = ends[:-1, None] + (nodes + 1) / 2 * side
+    values = np.array([j0(np.outer(row, s)) @ amplitude for row in at])
+    powers = np.linalg.solve(np.vander((nodes + 1) / 2, increasing=False), values.T)
+    correction: Callable[[Array], Array] = PPoly(powers / side ** np.arange(_NODES - 1, -1, -1)[:, None], ends)
+    return correction
+
+
+def _gauss(side: float) -> tuple[Array, Array]:
+    """Gauss nodes about the centre of a side, in thicknesses, and weights that add up to one."""
+    points = next(count for longest, count in _GAUSS if side <= longest)
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return nodes * side / 2, weights / 2

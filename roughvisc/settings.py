@@ -1,0 +1,241 @@
+"""Settings of a solve, each declared once: its default, what it may be, what it means, and where it stands.
+
+From the entries here follow the checks of :class:`Settings`, the tables ``[solve]`` and ``[keep]`` of a study file with
+the page of their keys, the key of a case, and what is refused of experiments over another axis than time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.units import range_in_words, within
+from roughvisc.variables import FIELDS
+
+Method = Literal["fast", "seed"]
+Missing = Literal["refuse", "absent"]
+Edge = Literal["error", "accept"]
+Memory = Literal["auto", "direct"]
+TimeStep = float | Literal["auto"]
+
+#: Rounding leaves so much of the numbers that are held against a tolerance: a march to a finer one would not end.
+FINEST_TOLERANCE = 1e-12
+#: Instants that a run may keep.
+MOST_TIMES = 1_000_000
+_ENTRY = "entry"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """What is said of a setting, beside its type and its default.
+
+    Attributes
+    ----------
+    about, example : str
+        Its meaning, and how it is written in a study file.
+    table : {"solve", "keep", "surface"}
+        Table of a study file that it stands in.
+    bounds : dict
+        Of a number: some of ``above``, ``least``, ``most``, ``below``.
+    noun, unit : str
+        What a number is a number of; ``"1"`` of a pure one.
+    in_attributes : bool
+        Whether it stands in the attributes of a result, unless it is None.
+    always_in_key : bool
+        Whether it counts in the key of a case even where it is as usual; one that came later must not, so that the keys
+        of former cases stay.
+    only_over : str
+        Name of the axis whose experiments have it; empty: all have.
+    check : callable, optional
+        Of values that are neither one of a few words nor a number: gives the value as it is kept, or raises.
+    """
+
+    about: str
+    example: str
+    table: str = "solve"
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    noun: str = "a number"
+    unit: str = "1"
+    in_attributes: bool = False
+    always_in_key: bool = False
+    only_over: str = ""
+    check: Callable[[Any], Any] | None = None
+
+
+def setting(default: Any, about: str, example: str, **said: Any) -> Any:
+    """A field of :class:`Settings` with its entry; see :class:`Entry`."""
+    return field(default=default, metadata={_ENTRY: Entry(about=about, example=example, **said)})
+
+
+def _refusal(name: str, found: Any, expected: str) -> InputError:
+    return InputError(f"{name} is {found!r}: expected {expected}")
+
+
+def _times(value: Any) -> int | tuple[float, ...] | None:
+    if value is None:
+        return None
+    wanted = "a positive count, a list, or None"
+    if isinstance(value, int | np.integer):
+        if not 1 <= value <= MOST_TIMES:
+            raise _refusal("times", int(value), f"{wanted}; at most {MOST_TIMES} times")
+        return int(value)
+    try:
+        return tuple(np.unique(np.asarray(value, dtype=float)).tolist())
+    except (TypeError, ValueError):
+        raise _refusal("times", value, wanted) from None
+
+
+def _fields(value: Any) -> tuple[str, ...]:
+    wanted = f"some of {', '.join(FIELDS)}"
+    try:
+        names = tuple(value)
+    except TypeError:
+        raise _refusal("fields", value, wanted) from None
+    for name in names:
+        if name not in FIELDS:
+            raise InputError(f"fields holds {name!r}: expected {wanted}")
+    return names
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How an experiment is computed and what is kept of it; see :func:`roughvisc.simulate`.
+
+    The defaults stand here alone: of :func:`roughvisc.simulate`, and of the tables of a study file.
+
+    Parameters
+    ----------
+    boundary, tolerance, time_step, times, fields, method, missing, edge, memory, grid_error
+        As :func:`roughvisc.simulate` has them; any sequence of times or fields becomes a tuple.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected. What depends on the program or on the surface is refused where these
+        meet, in :func:`roughvisc.experiment.scene.build_scene`.
+
+    Examples
+    --------
+    >>> Settings(tolerance=1e-2, times=[1.0, 0.5]).times
+    (0.5, 1.0)
+    >>> Settings().to_attributes()
+    {'boundary': 'free', 'tolerance': 0.001, 'method': 'fast'}
+    """
+
+    boundary: Boundary = setting(
+        "free",
+        "free space, for an indenter; or periodic, for a nominally flat scan",
+        '"periodic"',
+        in_attributes=True,
+        always_in_key=True,
+    )
+    tolerance: float = setting(
+        1e-3,
+        "largest stated error of force, approach and pressure, relative to the largest so far",
+        "1e-2",
+        bounds={"least": FINEST_TOLERANCE, "below": 1},
+        in_attributes=True,
+        always_in_key=True,
+    )
+    time_step: TimeStep = setting(
+        "auto",
+        "steps chosen by the tolerance, or of one length",
+        '"10 ms"',
+        bounds={"above": 0},
+        noun="a time",
+        unit="s",
+        always_in_key=True,
+        only_over="time",
+    )
+    times: int | Sequence[float] | None = setting(
+        None,
+        "instants in the result: all steps, so many evenly, or these",
+        "50",
+        table="keep",
+        only_over="time",
+        check=_times,
+    )
+    fields: Sequence[str] = setting(
+        ("pressure", "gap"), "fields in the result", '["pressure", "gap"]', table="keep", check=_fields
+    )
+    method: Method = setting(
+        "fast",
+        "`fast`; or `seed`: the algorithm of the paper that the method started from",
+        '"seed"',
+        in_attributes=True,
+        always_in_key=True,
+        only_over="time",
+    )
+    missing: Missing = setting(
+        "refuse",
+        "whether missing points are refused, or places without material",
+        '"absent"',
+        table="surface",
+        only_over="time",
+    )
+    edge: Edge = setting(
+        "error",
+        "whether contact may reach the border in free space: the scan is then a punch of that outline",
+        '"accept"',
+        always_in_key=True,
+        only_over="time",
+    )
+    memory: Memory = setting(
+        "auto",
+        "exponentials as far as they are accurate; or every past pressure",
+        '"direct"',
+        only_over="time",
+    )
+    grid_error: bool = setting(
+        False, "whether to bound the error of the grid, by two more computations on coarser ones", "true"
+    )
+
+    def __post_init__(self) -> None:
+        for name, entry in ENTRIES.items():
+            object.__setattr__(self, name, _checked(name, entry, getattr(self, name)))
+
+    def to_attributes(self) -> dict[str, Any]:
+        """Those that stand in the attributes of a result."""
+        values = {name: getattr(self, name) for name, entry in ENTRIES.items() if entry.in_attributes}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+#: setting -> what is said of it
+ENTRIES: dict[str, Entry] = {one.name: one.metadata[_ENTRY] for one in fields(Settings) if _ENTRY in one.metadata}
+_KINDS = get_type_hints(Settings)
+#: setting -> the words that it may be, of those that are one of a few words
+WORDS: dict[str, tuple[str, ...]] = {
+    name: get_args(kind) for name, kind in _KINDS.items() if get_origin(kind) is Literal
+}
+#: setting -> the word that it may be in place of a number
+WORD_OR_NUMBER: dict[str, str] = {
+    name: get_args(word)[0]
+    for name, kind in _KINDS.items()
+    for word in get_args(kind)
+    if float in get_args(kind) and get_origin(word) is Literal
+}
+
+
+def _checked(name: str, entry: Entry, value: Any) -> Any:
+    """A value as it is kept, if it is one of those expected."""
+    if entry.check is not None:
+        return entry.check(value)
+    if name in WORDS:
+        if value not in WORDS[name]:
+            raise _refusal(name, value, " or ".join(map(repr, WORDS[name])))
+        return value
+    if _KINDS[name] is bool:
+        return bool(value)
+    word = WORD_OR_NUMBER.get(name)
+    if isinstance(value, str) and value == word:
+        return value
+    if not (isinstance(value, int | float) and math.isfinite(value) and within(value, **entry.bounds)):
+        wanted = f"{entry.noun}{range_in_words(**entry.bounds)}" + (f" [{entry.unit}]" if entry.unit != "1" else "")
+        raise _refusal(name, value, wanted if word is None else f"{word!r} or {wanted}")
+    return float(value)

@@ -1,0 +1,79 @@
+"""The grid's error of friction: what is stated against solutions on much finer grids."""
+
+import numpy as np
+import pytest
+from support import friction_whole
+
+import roughvisc as rv
+from roughvisc.experiment.faces import AxisTransform, SlidingGrid
+from roughvisc.experiment.profile import Profile
+from roughvisc.variables.sliding import SLIDING
+
+RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
+SPEEDS = [1e-2, 0.1, 1.0]
+#: Of the true error so much is stated at least; and of what the grid leaves so many times it at most, in the middle.
+LEAST, MIDDLE = 0.8, 20
+#: Errors of the grid below this part are lost in the tolerance of the solutions.
+NOISE = 5e-4
+
+
+def judged(scan, fine, pressure):
+    """Stated and true errors of friction, and of area."""
+    asked = {"pressure": pressure, "speeds": SPEEDS, "tolerance": 1e-4, "progress": False}
+    found, exact = friction_whole(scan, RUBBER, **asked, grid_error=True), friction_whole(fine, RUBBER, **asked)
+    true = abs(found / exact - 1)
+    return (
+        (found.grid_error_friction.values, true.friction_coefficient.values),
+        (found.grid_error_area.values, true.contact_area.values),
+    )
+
+
+@pytest.mark.parametrize("pressure", [3e3, 3e4])
+def test_grid_error__bounds_the_true_one_of_a_line_contact(pressure):
+    def wave(cells):
+        x = (np.arange(cells) + 0.5) / cells
+        return rv.from_array(1e-5 * np.cos(2 * np.pi * x)[:, None] * np.ones((1, 2)), spacing=(1e-3 / cells, 5e-4))
+
+    for stated, true in judged(wave(64), wave(448), pressure):
+        assert (stated > LEAST * true - NOISE).all()
+
+
+@pytest.mark.parametrize(("hurst", "seed", "pressure"), [(0.8, 2, 1e5), (0.8, 3, 5e3), (0.8, 1, 2e4), (0.5, 9, 5e3)])
+def test_grid_error__bounds_the_true_one_of_a_rough_surface(hurst, seed, pressure):
+    fine = rv.self_affine(1e-3, 120, hurst=hurst, rms_slope=0.1, rolloff=5e-4, shortcut=1e-3 / 40 * 8, seed=seed)
+    for stated, true in judged(rv.from_array(fine.values[1::3, 1::3], 1e-3 / 40), fine, pressure):
+        assert (stated > LEAST * true - NOISE).all()
+        assert np.median(stated / true.clip(NOISE)) < MIDDLE
+
+
+def test_grid_error__falls_with_the_grid_and_is_labelled():
+    surface = {"hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 2e-4, "seed": 1}
+    found = [
+        friction_whole(
+            rv.self_affine(1e-3, cells, **surface), RUBBER, pressure=5e4, speeds=0.1, grid_error=True, progress=False
+        )
+        for cells in (24, 96)
+    ]
+    for name in ("grid_error_friction", "grid_error_area"):
+        assert float(found[1][name][0]) < 0.5 * float(found[0][name][0])
+        assert found[0][name].attrs["long_name"] == SLIDING[name].long_name
+
+
+def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
+    rough = rv.self_affine(1e-3, 24, hurst=0.8, rms_slope=0.1, seed=1)
+    asked = {"pressure": 1e4, "speeds": 0.1, "grid_error": True, "progress": False}
+    assert np.isnan(friction_whole(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
+    few = rv.from_array(1e-6 * np.array([[0.0, 1.0], [2.0, 0.5]]), 1e-3)
+    assert np.isnan(friction_whole(few, RUBBER, **asked).grid_error_area).all()
+
+
+def test_coarser_face__has_the_same_waves_where_its_cells_can_hold_them():
+    x = (np.arange(48) + 0.5) / 48
+    height = rv.from_array(1e-6 * np.cos(2 * np.pi * x)[:, None] * np.cos(4 * np.pi * x), 1e-3 / 48)
+    face = SlidingGrid.of(Profile(height), AxisTransform.of("x"))
+    half = face.coarser(2.0)
+    assert half.gap.shape == (24, 24)
+    np.testing.assert_allclose(half.spacing, 2e-3 / 48)
+    at = (np.arange(24) * 2 + 0.5) / 48  # the transform keeps the first point
+    wave = 1e-6 * np.cos(2 * np.pi * at)[:, None] * np.cos(4 * np.pi * at)
+    np.testing.assert_allclose(half.gap - half.gap.mean(), -(wave - wave.mean()), atol=1e-18)

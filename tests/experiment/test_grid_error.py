@@ -1,0 +1,248 @@
+"""The grid's error on request: what it says against closed forms, and how a surface is made coarser."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, run_whole, simulate_whole, true_errors
+
+import roughvisc as rv
+from roughvisc import closed_forms
+from roughvisc.experiment import grid_error
+from roughvisc.experiment.coarser import block_means, coarser, pressure_distance
+from roughvisc.study.statement.case import Case, read_study
+from roughvisc.topography.grid import cell_edges
+from roughvisc.topography.indenters import grown
+
+
+def pressed(shape, **settings):
+    settings = {"times": TIMES, "tolerance": 1e-3, "progress": False, "grid_error": True, **settings}
+    return simulate_whole(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
+
+
+@pytest.mark.parametrize("shape", [(47, 60), (33, 31), 64])
+def test_grid_error__bounds_the_true_one_and_is_of_its_size(shape):
+    ds = pressed(shape)
+    true, true_area = true_errors(ds)
+    assert true < float(ds.grid_error.max()) < 8 * true
+    assert true_area < float(ds.grid_error_area.max()) < 10 * true_area
+
+
+def test_grid_error__falls_with_the_grid():
+    coarse, fine = (float(pressed(n, fields=("pressure",)).grid_error.max()) for n in (32, 96))
+    assert coarse / fine > 3  # first order at least
+
+
+def test_grid_error__is_large_where_no_grid_sees_the_contact():
+    """A ball on one cell and on four: all grids agree on the force there, and none on its shape."""
+    for shape in (15, 16):
+        few = rv.Program().load(LOAD * (0.4 * SIZE[0] / 15 / float(EXACT.radius(0.0))) ** 3, over=0)
+        ball = rv.sphere(RADIUS, SIZE[0], shape)
+        ds = simulate_whole(ball, rv.elastic(3e6), few, grid_error=True, progress=False)
+        assert int((ds.pressure > 0).sum()) <= 4
+        assert float(ds.grid_error[0]) > 0.8
+        assert float(ds.grid_error_area[0]) > 0.3
+
+
+@pytest.mark.parametrize("offset", [(0.5, 0.5), (0.1, -0.4), (0.0, 0.0)])
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, control):
+    """A cone as data: its peak is in no cell's centre, and force and area under given approach follow from it."""
+    cells, side, slope = 24, 1 / 7, 0.01
+    exact = closed_forms.sneddon_cone(slope, 1.0, np.pi / 2 * slope)
+    x, y = ((np.arange(cells) - cells // 2 - shift) * side for shift in offset)
+    height = rv.from_array(-slope * np.hypot(x[:, None], y), side)
+    program = rv.Program().load(np.pi / 2 * slope, over=0)
+    if control == "approach":
+        program = rv.Program().approach(exact.approach, over=0)
+    ds = simulate_whole(height, rv.elastic(0.25), program, grid_error=True, progress=False)
+    force = abs(float(ds.force[0]) / (np.pi / 2 * slope) - 1)
+    approach = abs(float(ds.approach[0]) / exact.approach - 1)
+    assert float(ds.grid_error[0]) > max(force, approach)
+    assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area[0]) / np.pi - 1)
+
+
+@pytest.mark.parametrize(
+    ("at", "falls", "higher"),
+    [((5, 3), ((2, 1), (3, 4)), (2 + 4) / 2), ((0, 5), ((9, 6), (3, 2)), (6 + 3) / 2), ((6, 0), ((2, 9), (9, 1)), 1.5)],
+)
+def test_peak__is_half_of_the_way_to_the_lower_neighbour_along_each_axis(at, falls, higher):
+    """Heights fall by so much from cell to cell, on both sides along each axis; at a border one side is not there."""
+    sides = [np.arange(n) - i for n, i in zip((7, 6), at, strict=True)]
+    x, y = (np.where(side < 0, -low * side, high * side) for side, (low, high) in zip(sides, falls, strict=True))
+    assert grid_error._peak(rv.from_array(-1.0 * (x[:, None] + y), 0.5)) == higher
+
+
+def pressed_by_hand(approach=(1.0, 2.0)):
+    """Contact of six of 6 x 5 cells at two instants, the second at twice the pressure."""
+    pressure = np.zeros((6, 5))
+    pressure[1:4, 1:3] = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
+    histories = {"approach": list(approach), "force": [21.0, 42.0]}
+    histories |= {"contact_area": [5.0, 4.0], "contact_area_counted": [6.0, 5.5]}
+    histories |= {"contact_area_solver_lower": [4.5, 3.5], "contact_area_solver_upper": [5.5, 4.0]}
+    return xr.Dataset(
+        {"height": (("x", "y"), np.zeros((6, 5))), "pressure": (("time", "x", "y"), np.stack([pressure, 2 * pressure]))}
+        | {name: ("time", values) for name, values in histories.items()},
+        coords={"time": [0.0, 1.0], "x": np.arange(6) + 0.5, "y": np.arange(5) + 0.5},
+        attrs={"boundary": "free"},
+    )
+
+
+def test_edge__of_a_contact_beside_absent_cells_by_hand():
+    """One cell lies beside absent ones alone, one beside both; the other four beside open ones."""
+    ds = pressed_by_hand()
+    for cell in ((0, 2), (1, 3), (3, 0)):
+        ds.height[cell] = np.nan
+    share, alone = 19 / 21, 2 / 21
+    faces = 2 + 1 + 1 + 1 + 2
+    hidden = 0.45 * share / (1 - 0.55 * share) + 0.9 * alone
+    counted = 0.5 * np.sqrt(faces) / 6
+    for time, (force, area) in enumerate([(1 / 2, 6 / 5), (1.0, 5.5 / 5)]):
+        assert grid_error._left_open(ds, time) == pytest.approx((hidden * force, counted * area), rel=1e-12)
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["approach", "load"])
+def test_peak_between_the_cells__errs_in_the_approach_or_in_force_and_area(given, monkeypatch):
+    """Where nothing else is left open: the grids agree, and the edge hides nothing."""
+    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0))
+    ds, height = pressed_by_hand(), rv.from_array(-np.hypot(np.arange(6)[:, None] - 2, np.arange(5) - 1.0), 1.0)
+    other = ds if given else pressed_by_hand((1.0 + 1e-9, 2.0 - 1e-9))
+    found = grid_error.with_grid_error(ds, height, lambda *_: other)
+    # the peak is one cell above its neighbours: it may be higher by half of one along each axis
+    if given:
+        expected, area = 2 * 1.0 / np.array([1, 2]) * [21 / 42, 42 / 42], 2 * 1.0 / np.array([1, 2]) * [5 / 5, 4 / 5]
+    else:
+        expected, area = [1.0 / 2] * 2, [0.0, 0.0]
+    assert found.grid_error.values == pytest.approx(expected, rel=1e-9)
+    assert found.grid_error_area.values == pytest.approx(area, rel=1e-9)
+
+
+def test_grid_error__takes_no_grid_for_another(monkeypatch):
+    """The fewest cells have no coarser ones; where a third grid is missing the two that are there count for less."""
+    for shape, missing in ((2, True), (3, True), (4, False)):
+        ds = pressed(shape, edge="accept")
+        assert bool(np.isnan(ds.grid_error).all()) is missing
+        assert np.isfinite(ds.pressure.values).all()
+    three = pressed((33, 31))
+    sound, asked = grid_error.coarser, []
+
+    def refused(height, factor, boundary):
+        asked.append(factor)
+        if factor > 2:
+            raise rv.InputError("no third grid")
+        return sound(height, factor, boundary)
+
+    monkeypatch.setattr(grid_error, "coarser", refused)
+    two = pressed((33, 31))
+    assert asked == [2.0, 4.0]
+    assert (two.grid_error_area >= three.grid_error_area).all()
+    assert (two.grid_error > three.grid_error).any()
+
+
+def test_grid_error__counts_faces_as_the_corrected_area_does():
+    """Cell by cell, on random contacts with absent cells."""
+    rng = np.random.default_rng(4)
+    for periodic in (False, True):
+        present = rng.random((7, 6)) < 0.8
+        contact = present & (rng.random((7, 6)) < 0.6)
+        at_edge, at_end, faces = grid_error._edge(contact, present & ~contact, periodic)
+        counted = 0
+        for i, j in np.argwhere(contact):
+            near = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+            if periodic:
+                near = [(k % 7, m % 6) for k, m in near]
+            there = [0 <= k < 7 and 0 <= m < 6 and present[k, m] for k, m in near]
+            open_ = [here and not contact[cell] for here, cell in zip(there, near, strict=True)]
+            counted += sum(open_)
+            assert at_edge[i, j] == any(open_)
+            assert at_end[i, j] == (not all(there))
+        assert faces == counted
+        assert not (at_edge | at_end)[~contact].any()
+
+
+def test_grid_error__is_missing_unless_asked_for_and_leaves_the_rest_alone():
+    plain, asked = pressed((24, 21), grid_error=False), pressed((24, 21))
+    assert not {"grid_error", "grid_error_area"} & set(plain.variables)
+    xr.testing.assert_equal(plain.drop_vars("wall_time"), asked[list(plain.variables)].drop_vars("wall_time"))
+    assert "pressure" not in pressed((24, 21), fields=())
+
+
+def test_grid_error__is_missing_where_the_coarser_solve_fails():
+    height = rv.sphere(RADIUS, SIZE, (24, 21)) * 1.0
+    height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
+    at_border = {"times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
+    load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
+    ds = simulate_whole(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
+    assert np.isnan(ds.grid_error).all()
+    assert np.isnan(ds.grid_error_area).all()
+
+
+def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
+    file = tmp_path / "ball.toml"
+    file.write_text(BALL + "[solve]\ngrid_error = true\n")
+    case = read_study(file)
+    with run_whole(case, tmp_path / "out", progress=False) as ds:
+        assert (ds.grid_error > 0).all()
+        assert ds.grid_error.attrs["long_name"].endswith("due to the grid")
+    file.write_text(BALL)
+    assert read_study(file).key != case.key
+    assert Case.from_json(case.to_json()).key == case.key
+
+
+def test_direct_memory__gives_the_same_contact():
+    settings = {"grid_error": False, "tolerance": 1e-4}
+    series, direct = pressed((33, 31), **settings), pressed((33, 31), memory="direct", **settings)
+    assert "direct history" in direct.attrs["memory"]
+    assert direct.approach.values == pytest.approx(series.approach.values, rel=2e-4)
+
+
+def test_direct_memory__is_refused_where_it_would_ring():
+    soft = rv.kelvin_voigt(1e6, 1e5)
+    with pytest.raises(rv.InputError, match="memory='direct'"):
+        simulate_whole(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, memory="direct", progress=False)
+
+
+def test_coarser__makes_an_indenter_anew_and_averages_where_points_are_missing():
+    ball = rv.sphere(RADIUS, SIZE, (31, 24))
+    few = coarser(ball, 2, "free")
+    assert few.shape == (17, 12)
+    assert grown(few) is not None
+    holed = rv.self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2)
+    holed[:2, :2] = np.nan
+    means = holed.values.reshape(15, 2, 12, 2).mean((1, 3))
+    for boundary in ("free", "periodic"):
+        found = coarser(holed, 2, boundary).values
+        assert found == pytest.approx(means, abs=1e-12 * float(abs(holed).max()), nan_ok=True)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_coarser__keeps_the_cosines_of_a_scan_or_its_waves_under_periodic_boundaries(boundary):
+    """Closed forms: one half wave along x has no step at mirror images, one whole wave none at the next period."""
+    number = {"free": 0.5, "periodic": 1.0}[boundary]
+
+    def wave(cells):
+        x = (np.arange(cells) + 0.5) / cells
+        return rv.from_array(1e-6 * np.cos(2 * np.pi * number * x)[:, None] * np.ones(cells), 1e-3 / cells)
+
+    xr.testing.assert_allclose(coarser(wave(30), 2, boundary), wave(15), rtol=1e-12, atol=1e-18)
+
+
+def test_block_means__conserve_the_force_on_any_grid():
+    field = np.random.default_rng(3).random((2, 7, 5))
+    cells = (np.linspace(0, 7, 8), np.linspace(0, 10, 6))
+    onto = (np.linspace(-1, 8, 4), np.linspace(0, 10, 4))
+    means = block_means(field, cells, onto)
+    area = np.diff(onto[0])[:, None] * np.diff(onto[1])
+    assert (means * area).sum((-2, -1)) == pytest.approx(field.sum((-2, -1)) * 1 * 2, rel=1e-12)
+    assert cell_edges(np.array([0.5, 1.5, 2.5])).tolist() == [0, 1, 2, 3]
+
+
+def test_pressure_distance__counts_what_lies_outside_the_other_grid():
+    def uniform(low, high, pressure):
+        centres = np.arange(low + 0.5, high)
+        shape = (1, len(centres), len(centres))
+        coords = {"time": [0.0], "x": centres, "y": centres}
+        return xr.Dataset({"pressure": (("time", "x", "y"), np.full(shape, pressure))}, coords=coords)
+
+    small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
+    assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]
+    assert pressure_distance(large, small).tolist() == [20.0]

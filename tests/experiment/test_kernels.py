@@ -1,0 +1,207 @@
+"""A body other than a half-space: whatever is built for a case keeps its kernel."""
+
+import json
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.experiment import profile
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.love import HALF_SPACE, Love, love_kernel
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.study.statement.case import Case
+from roughvisc.study.trade.exact import closed_form
+
+FIELDS = ("pressure", "gap", "displacement")
+#: What counts time, and what knows a closed form of the half-space.
+_NOT_ALIKE = {"wall_time", "mean_gap", "step_mean_gap"}
+
+
+@dataclass(frozen=True)
+class Scaled(Kernel):
+    """A half-space of so many times the compliance."""
+
+    factor: float
+    raises_surface: bool = False
+
+    def influence(self, shape, spacing):
+        return self.factor * love_kernel(shape, spacing)
+
+    def transfer(self, qx, qy):
+        magnitude = np.hypot(qx, qy)
+        return 2 * self.factor / np.where(magnitude > 0, magnitude, math.inf)
+
+
+@dataclass(frozen=True)
+class Screened(Kernel):
+    """``exp(-k r) / (pi r)``, whose transform is ``2 / sqrt(q^2 + k^2)``: beyond ``1/k`` pressure is not felt."""
+
+    k: float
+    raises_surface: bool = False
+
+    def influence(self, shape, spacing):
+        nodes, weights = np.polynomial.legendre.leggauss(6)
+        x, y = (np.arange(n) * side for n, side in zip(shape, spacing, strict=True))
+        r = np.hypot(
+            (x[:, None] + 0.5 * spacing[0] * nodes)[:, None, :, None],
+            (y[:, None] + 0.5 * spacing[1] * nodes)[None, :, None, :],
+        )
+        beside_love = np.einsum("ijkl,k,l->ij", np.expm1(-self.k * r) / r, weights, weights) / (4 * math.pi)
+        return love_kernel(shape, spacing) + spacing[0] * spacing[1] * beside_love
+
+    def transfer(self, qx, qy):
+        return 2 / np.sqrt(np.hypot(qx, qy) ** 2 + self.k**2)
+
+
+def zener(times=1.0):
+    return rv.zener(3e6 * times, 1e6 * times, 1e5 * times)
+
+
+RAMP = rv.Program().load(1e-4, over=0.1).hold(0.3)
+SMALL = rv.Program().load(1e-5, over=0.1)
+JUMP = rv.Program().load(1e-4, over=0).hold(0.3)
+PATHS = {
+    "free, mirrored, window": (rv.sphere(1e-3, 4e-4, (160, 128)), RAMP, {}),
+    "free, odd, window foreseen": (rv.sphere(1e-3, 4e-4, (129, 111)), JUMP, {}),
+    "free, grows": (rv.sphere(1e-3, 3e-5, 24), SMALL, {}),
+    "free, absent cells": (rv.flat_punch(5e-5, 2e-4, (40, 30)), JUMP, {"edge": "accept"}),
+    "free, grid error": (rv.sphere(1e-3, 1.2e-4, (45, 40)), SMALL, {"grid_error": True}),
+    "periodic, grid error": (rv.wavy(1e-6, 1e-4, 2e-4, (48, 45)), JUMP, {"boundary": "periodic", "grid_error": True}),
+    "periodic, mirrored, approach": (
+        rv.wavy(1e-6, 1e-4, 1e-4, 32),
+        rv.Program().approach(5e-7, over=0.1),
+        {"boundary": "periodic"},
+    ),
+    "seed": (rv.sphere(1e-3, 2e-4, 45), rv.Program().load(1e-4, over=0.1), {"method": "seed", "time_step": 0.02}),
+    "direct": (rv.sphere(1e-3, 2e-4, 45), RAMP, {"memory": "direct"}),
+}
+
+
+def pressed(path, kernel, material=None):
+    height, program, settings = PATHS[path]
+    given = {"times": 3, "fields": FIELDS, "tolerance": 1e-2, "progress": False, **settings}
+    return rv.simulate(height, rv.Body(material or zener(), kernel), program, **given)
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_twice_the_kernel__is_half_the_modulus(path):
+    found, expected = pressed(path, Scaled(2.0)), pressed(path, HALF_SPACE, zener(0.5))
+    assert set(found.variables) == set(expected.variables)
+    for name in set(found.variables) - _NOT_ALIKE:
+        assert np.array_equal(found[name], expected[name], equal_nan=True), name
+    assert found.mean_gap.values == pytest.approx(expected.mean_gap.values, rel=1e-9)
+    assert found.attrs["kernel"] == repr(Scaled(2.0))
+    assert "kernel" not in expected.attrs
+
+
+def refuse(*_):
+    raise AssertionError("the half-space was asked")
+
+
+@pytest.fixture
+def no_half_space(monkeypatch):
+    for name in ("influence", "transfer", "under_rectangle"):
+        monkeypatch.setattr(Love, name, refuse)
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_another_kernel__is_used_everywhere(path, no_half_space):
+    found = pressed(path, Screened(5e4))
+    assert (found.status == 0).any() or (found.force > 0).any()
+
+
+def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
+    kernel, n = Screened(0.05), 256
+    x = np.arange(n) - n / 2
+    gap = (x[:, None] ** 2 + x**2) / 2000
+    body = HalfSpace((n, n), (1.0, 1.0), kernel=kernel)
+    found = solve_contact(body, gap, load=200.0)
+    guessed = solve_contact(body, gap, load=200.0, start=np.ones((n, n)))
+    assert found.pressure == pytest.approx(guessed.pressure, abs=1e-5 * guessed.pressure.max())
+    assert body.on((9, 8)).kernel is kernel
+
+
+def case_on(kernel, monkeypatch, **settings):
+    monkeypatch.setattr(Case, "body", lambda self: rv.Body(self.settings.material.build(), kernel))
+    stated = {
+        "surface": {"generate": "sphere", "radius": 1e-3, "size": 4e-4, "shape": 128},
+        "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
+        "program": [{"load": 1e-4, "over": 0.1}],
+        "solve": {"tolerance": 1e-2, **settings},
+        "keep": {"times": 2},
+    }
+    return Case.from_json(json.dumps(stated))
+
+
+def test_cases__keep_their_kernel(no_half_space, monkeypatch, tmp_path):
+    case = case_on(Screened(5e4), monkeypatch)
+    planned = rv.plan([case], tmp_path)
+    assert planned.attrs["refusal"] == ""
+    assert "too deep" in str(planned.left_out.values[0])
+    found = rv.run(case, tmp_path, progress=False)
+    assert found.attrs["kernel"] == repr(Screened(5e4))
+    assert closed_form(case, np.array([0.1])) is None
+
+
+def test_cases__that_bulge_have_no_window(monkeypatch, tmp_path):
+    case = case_on(replace(Screened(5e4), raises_surface=True), monkeypatch)
+    assert "too deep" not in str(rv.plan([case], tmp_path).left_out.values[0])
+    assert "too deep" not in rv.run(case, tmp_path, progress=False).attrs["left_out"]
+
+
+@pytest.mark.parametrize("path", ["free, mirrored, window", "periodic, mirrored, approach"])
+def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeypatch):
+    kernel = Screened(5e4)
+    quick = pressed(path, kernel)
+    monkeypatch.setattr(profile, "is_mirrored", lambda height: False)
+    slow = pressed(path, replace(kernel, raises_surface=True))
+    assert quick.attrs["left_out"] != slow.attrs["left_out"]
+    for name in ("force", "approach", "mean_gap"):
+        assert quick[name].values == pytest.approx(slow[name].values, rel=2e-3), name
+    for name in FIELDS:
+        largest = np.nanmax(np.abs(slow[name].values))
+        assert quick[name].values == pytest.approx(slow[name].values, abs=0.02 * largest, nan_ok=True), name
+
+
+def test_preconditioner__knows_the_mean():
+    body = HalfSpace((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
+    pressure = 1 + np.random.default_rng(1).random((12, 15))
+    back = body.approximate_inverse(body.displacement(pressure).astype(np.float32))
+    assert back == pytest.approx(pressure, rel=1e-5)
+
+
+def test_a_local_kernel__presses_springs():
+    """Where 1/k is far smaller than the contact, u = (2/k) C p: springs, on which a ball has F = pi R d^2 k / (2 C)."""
+    radius, depth, k, soft = 1e-3, 1e-6, 2e6, rv.elastic(1e6)
+    ball = rv.sphere(radius, 1.2e-4, (121, 111))
+    springs = rv.Body(soft, Screened(k))
+    ds = rv.simulate(ball, springs, rv.Program().approach(depth, over=0), times=[0.0], progress=False)
+    compliance = float(soft.contact_compliance(0.0))
+    assert float(ds.force[0]) == pytest.approx(math.pi * radius * depth**2 * k / (2 * compliance), rel=0.05)
+
+
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_a_kernel_with_a_mean__has_an_approach_under_uniform_pressure(control):
+    """A flat punch over the whole period: u = (2/k) C p everywhere, and approaches beyond full contact exist."""
+    k, soft, size = 1e4, rv.elastic(1e6), 1e-3
+    compliance = float(soft.contact_compliance(0.0))
+    pressure, surface = 1e4, rv.wavy(1e-8, size, size, (24, 21))
+    full = float((surface.max() - surface).mean()) + 2 / k * compliance * pressure
+    load = pressure * size**2
+    program = rv.Program().load(load, over=0) if control == "load" else rv.Program().approach(full, over=0)
+    springs = rv.Body(soft, Screened(k))
+    ds = rv.simulate(surface, springs, program, boundary="periodic", times=[0.0], progress=False)
+    assert ds.attrs["kernel"]
+    assert float(ds.approach[0]) == pytest.approx(full, rel=1e-3)
+    assert float(ds.force[0]) == pytest.approx(load, rel=1e-3)
+    assert float(ds.contact_fraction[0]) == 1
+
+
+def test_kernel__with_an_older_name_is_refused():
+    """It would count as one that raises the surface, and lose its window without a word."""
+    with pytest.raises(rv.InputError, match="Mattress: bulges is now raises_surface"):
+        type("Mattress", (Kernel,), {"bulges": False})

@@ -1,0 +1,154 @@
+"""Surfaces that are their own mirror images: recognised, solved on a quarter, and shown whole."""
+
+import numpy as np
+import pytest
+from support import run_whole, simulate_whole
+
+import roughvisc as rv
+from roughvisc.experiment import loading
+from roughvisc.experiment.mirror import is_mirrored, quarter, unfold
+from roughvisc.experiment.profile import Profile
+from roughvisc.variables import FIELDS
+
+ZENER = rv.zener(1.0, 1.0, 1.0)
+LOADED_TWICE = rv.Program().load(0.05, over=0).hold(0.5).load(0, over=0.2).hold(0.2).load(0.08, over=0.3)
+SCAN = rv.self_affine((1.0, 0.8), (22, 17), hurst=0.8, rms_slope=0.05, shortcut=0.15, seed=4)
+
+
+MIRRORED = {
+    "followed by a window": (rv.sphere(1.0, 4.0, (120, 96)), LOADED_TWICE, {}),
+    "grown": (rv.sphere(1.0, 0.3, (18, 24)), LOADED_TWICE, {}),
+    "whole": (rv.cone(0.3, 1.0, (20, 26)), LOADED_TWICE, {"edge": "accept"}),
+    "absent cells": (rv.flat_punch(0.3, 1.0, (20, 26)), LOADED_TWICE, {"missing": "absent", "edge": "accept"}),
+    "periodic": (rv.wavy(0.02, 0.5, 1.0, (20, 26)), LOADED_TWICE, {"boundary": "periodic"}),
+    "under given approach": (rv.sphere(1.0, 1.0, (24, 20)), rv.Program().approach(0.05, over=0.2).hold(0.3), {}),
+    "mirrored scan": (rv.mirror(SCAN), LOADED_TWICE, {"boundary": "periodic"}),
+    "every pressure remembered": (rv.sphere(1.0, 0.7, (24, 20)), LOADED_TWICE, {"memory": "direct"}),
+}
+
+
+@pytest.fixture
+def profiles(monkeypatch):
+    """Those that were solved on, in order."""
+    noted = []
+
+    class Noted(Profile):
+        def __init__(self, *given, **named):
+            super().__init__(*given, **named)
+            noted.append(self)
+
+    monkeypatch.setattr(loading, "Profile", Noted)
+    return noted
+
+
+@pytest.mark.parametrize("name", MIRRORED)
+def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch):
+    height, program, settings = MIRRORED[name]
+    given = {"times": 5, "tolerance": 1e-6, "time_step": 0.05, "fields": FIELDS, "progress": False, **settings}
+    found = simulate_whole(height, ZENER, program, **given)
+    monkeypatch.setattr("roughvisc.experiment.profile.is_mirrored", lambda height: False)
+    whole = simulate_whole(height, ZENER, program, **given)
+    assert [profile.mirrored for profile in profiles] == [True, False]
+    if name == "grown":
+        assert whole.sizes["x"] > height.sizes["x"]
+    assert found.sizes == whole.sizes
+    assert "mirror images" in found.attrs["left_out"]
+    assert "mirror images" not in whole.attrs["left_out"]
+    # the contact of each step is solved to 3e-8 in energy, 2e-4 in the norm of energy
+    scales = dict.fromkeys(("gap", "displacement", "mean_gap"), float(whole.displacement.max()))
+    for field in FIELDS:
+        scale = scales.get(field, float(whole[field].max()))
+        np.testing.assert_allclose(found[field], whole[field], rtol=0, atol=2e-4 * scale, err_msg=field)
+    for figure in [
+        "force",
+        "approach",
+        "work",
+        "contact_area",
+        "contact_area_counted",
+        "contact_fraction",
+        "mean_gap",
+    ]:
+        scale = scales.get(figure, float(whole[figure].max()))
+        np.testing.assert_allclose(found[figure], whole[figure], rtol=0, atol=1e-6 * scale, err_msg=figure)
+    for axis in (1, 2):
+        assert np.array_equal(found.pressure, np.flip(found.pressure, axis))
+
+
+def test_quarter__is_all_that_is_solved(solved_on):
+    settings = {"times": 2, "tolerance": 1e-2, "progress": False, "boundary": "periodic"}
+    simulate_whole(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    assert set(solved_on) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
+    solved_on.clear()
+    simulate_whole(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    assert set(solved_on) == {(22, 17)}
+    solved_on.clear()
+    simulate_whole(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
+    assert set(solved_on) == {(24, 21)}, "the middle of 21 cells is a cell"
+
+
+def test_border__of_a_quarter_is_that_of_the_surface():
+    """Its inner sides are not."""
+    with pytest.raises(rv.EdgeContactError, match="20 x 24 cells"):
+        simulate_whole(rv.from_array(rv.sphere(1.0, 0.2, (20, 24)).values, 0.01), ZENER, LOADED_TWICE, progress=False)
+
+
+def test_seed_method__solves_all_of_it(profiles):
+    settings = {"method": "seed", "time_step": 0.1, "edge": "accept", "tolerance": 1e-2, "progress": False}
+    simulate_whole(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
+    assert not profiles[0].mirrored
+
+
+@pytest.mark.parametrize(
+    ("height", "expected"),
+    [
+        (rv.sphere(1.0, 1.0, (8, 6)), True),
+        (1e3 + rv.sphere(1.0, 1.0, (8, 6)), True),
+        (rv.flat_punch(0.3, 1.0, (8, 6)), True),
+        (rv.sphere(1.0, 1.0, (7, 6)), False),
+        (rv.sphere(1.0, 1.0, (6, 7)), False),
+        (rv.self_affine(1.0, (8, 6), hurst=0.5, rms_slope=0.1, seed=0), False),
+        (rv.from_array(np.repeat([[0.0, 1.0, 1.0, 0.0]], 4, axis=0), 1.0), True),
+        (rv.from_array(np.repeat([[0.0, 1.0, 2.0, 0.0]], 4, axis=0), 1.0), False),
+        (rv.from_array(np.repeat([[0.0, 1.0, 2.0, 0.0]], 4, axis=0).T, 1.0), False),
+        (rv.from_array(np.array([[np.nan, 1.0], [1.0, 1.0]]), 1.0), False),
+        (rv.from_array(np.array([[1.0, 1.0 + 1e-13], [1.0, 1.0]]), 1.0), False),
+    ],
+)
+def test_is_mirrored__in_both_axes_to_rounding(height, expected):
+    assert is_mirrored(height.values) is expected
+
+
+@pytest.mark.parametrize("shape", [(8, 6), (2, 4), (2, 2)])
+def test_unfold__fills_the_other_three_quarters(shape):
+    field = np.random.default_rng(0).random(shape)
+    corner = field[quarter(shape)].copy()
+    unfold(field)
+    assert is_mirrored(field)
+    assert np.array_equal(field[quarter(shape)], corner)
+
+
+def test_checkpoint__goes_on_with_a_quarter(tmp_path):
+    """Interrupted and resumed, bit for bit."""
+    study = tmp_path / "study.toml"
+    study.write_text(
+        '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.4 mm"\nshape = [16, 18]\n'
+        '[material]\nmodel = "zener"\nshear_modulus = "1 MPa"\nkelvin_modulus = "1 MPa"\nkelvin_viscosity = "1 MPa s"\n'
+        '[[program]]\nload = "1 mN"\nover = "0.5 s"\n[[program]]\nload = "30 mN"\nover = "0.5 s"\n'
+        "[keep]\ntimes = 9\n"
+    )
+    case = rv.read_study(study)
+    whole = run_whole(case, tmp_path / "whole", progress=False)
+
+    class Enough(Exception):
+        pass
+
+    def stop(now, end):
+        if now > 0.6 * end:
+            raise Enough
+
+    with pytest.raises(Enough):
+        run_whole(case, tmp_path / "part", progress=stop)
+    resumed = run_whole(case, tmp_path / "part", progress=False)
+    assert whole.sizes["x"] > 16, "it grew"
+    for name in ("pressure", "gap", "approach", "iterations"):
+        assert resumed[name].values.tobytes() == whole[name].values.tobytes(), name

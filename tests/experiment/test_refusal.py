@@ -1,0 +1,232 @@
+"""Cases that cannot fit into memory: refused before anything is taken, with what would fit."""
+
+import resource
+import subprocess
+import sys
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import fft
+
+import roughvisc as rv
+from roughvisc.errors import InputError, TooLargeError, TransientError
+from roughvisc.experiment import available, refusal
+from roughvisc.experiment.available import Available, cores, memory_available, threads_for
+from roughvisc.experiment.footprint import PROCESS, curve_bytes
+from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.steady_sliding import SlidingRows
+from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.settings import Settings
+from roughvisc.study.execution import side_by_side as side_module
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.study.storage.store import open_result
+
+ROUGH = """
+title = "Rough"
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [600, 512]
+hurst = 0.8
+rms_slope = 0.1
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+pressure = "6 kPa"
+over = "10 ms"
+[solve]
+boundary = "periodic"
+[keep]
+times = 5
+"""
+RUBBER, PRESS = rv.zener(3e6, 1e6, 1e5), rv.Program().pressure(6e3, over=0.01)
+
+
+@pytest.fixture
+def limited(monkeypatch):
+    """Sets how much memory there is."""
+
+    def limit(size, words="free in this machine"):
+        for module in (refusal, side_module):
+            monkeypatch.setattr(module, "memory_available", lambda: Available(size, words))
+
+    return limit
+
+
+@pytest.fixture
+def study(tmp_path):
+    def write(text):
+        (tmp_path / "study.toml").write_text(text)
+        return tmp_path / "study.toml"
+
+    return write
+
+
+def test_run__refuses_what_cannot_fit(study, limited, tmp_path, monkeypatch, invoke):
+    path = study(ROUGH)
+    limited(40e6)
+    monkeypatch.setattr(Profile, "_lay_out", lambda *_: pytest.fail("an array was made"))
+    with pytest.raises(TooLargeError, match=r"study\.toml: 600 x 512 cells need about \d+ MB") as found:
+        rv.run(path, tmp_path / "out", progress=False)
+    assert "40 MB are free in this machine: what would fit: 300 x 256 cells, 2 times as long, need" in str(found.value)
+    assert isinstance(found.value, InputError)
+    assert isinstance(found.value, TransientError)
+    assert not list(tmp_path.glob("out/*")), "nothing is kept of it"
+    status, _, wrong = invoke("run", str(path), "--no-plots")
+    assert status == 2
+    assert "300 x 256 cells" in wrong
+    limited(1e6)
+    with pytest.raises(TooLargeError, match="need about 10 MB"):
+        rv.run(path, tmp_path / "out", progress=False)
+
+
+def test_simulate__refuses_what_cannot_fit_and_says_what_would(limited):
+    height = rv.self_affine((1e-3, 1e-3), (512, 512), hurst=0.8, rms_slope=0.1, seed=1)
+    limited(120e6, "left of the container's limit")
+    with pytest.raises(TooLargeError) as found:
+        rv.simulate(height, RUBBER, PRESS, boundary="periodic", times=100, progress=False)
+    assert "120 MB are left of the container's limit" in str(found.value)
+    assert "rv.run, which keeps the fields in a file" in str(found.value)
+
+
+def test_small_case__is_not_asked_about(monkeypatch):
+    monkeypatch.setattr(refusal, "memory_available", lambda: pytest.fail("the memory was looked at"))
+    height = rv.sphere(1e-2, 1e-3, (24, 21))
+    rv.simulate(height, rv.elastic(1e6), rv.Program().load(1e-3, over=0), progress=False)
+
+
+def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
+    ball, given = rv.sphere(1e-2, 1e-3, (600, 600)), {"area": 1e-6, "in_memory": False}
+    settings = Settings(boundary="periodic", times=2)
+    fields = 8.0 * ball.size
+    limited(12 * fields)
+    refusal.require_memory(ball.shape, settings, RUBBER, PRESS, heights=ball.values, **given)
+    off = ball.values + 1e-6 * np.arange(600)
+    with pytest.raises(TooLargeError):
+        refusal.require_memory(ball.shape, settings, RUBBER, PRESS, heights=off, **given)
+    refusal.require_memory(ball.shape, Settings(times=2), RUBBER, PRESS, heights=off, **given)
+
+
+def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
+    path = study(ROUGH.replace("times = 5", "times = 2") + '[sweep]\n"surface.shape" = [[600, 512], [24, 20]]\n')
+    limited(40e6)
+    cases = read_cases(path)
+    results = rv.sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert results.sizes["case"] == 1
+    assert not list((tmp_path / "out").glob("*.failed.json")), "it may fit elsewhere"
+    limited(1e12)
+    assert side_module.side_by_side(cases, 4) == 4
+    limited(500e6)
+    assert side_module.side_by_side([cases[0]] * 4, 4) == 1
+    assert side_module.threads_each(1) == cores()
+
+
+def test_curves_of_friction__run_side_by_side_as_memory_allows(study, limited):
+    """A curve has no program that could be marched."""
+    head = ROUGH.partition("[[program]]")[0]
+    curve = '[friction]\npressure = "20 kPa"\nspeeds = ["1 mm/s"]\n'
+    sizes = '[solve]\nboundary = "periodic"\n[sweep]\n"surface.shape" = [[600, 512], [512, 600]]\n'
+    cases = read_cases(study(head + curve + sizes))
+    each = PROCESS + curve_bytes(cases[0].solving(), 600 * 512)
+    limited(2.1 * each / refusal.PART)
+    assert side_module.side_by_side(cases, 2) == 2
+    limited(1.9 * each / refusal.PART)
+    assert side_module.side_by_side(cases, 2) == 1
+
+
+def test_curve_of_friction__is_refused_where_it_cannot_fit(study, limited, tmp_path, monkeypatch, invoke):
+    monkeypatch.setattr(SlidingRows, "_at", lambda *_: pytest.fail("a speed was solved"))
+    head = ROUGH.partition("[[program]]")[0]
+    path = study(head + '[friction]\npressure = "20 kPa"\nspeeds = ["1 mm/s"]\n[solve]\nboundary = "periodic"\n')
+    limited(40e6)
+    status, _, wrong = invoke("run", str(path), "--no-plots")
+    assert status == 2
+    assert "study.toml: 600 x 512 cells need about" in wrong.replace("\n", " ")
+    assert "what would fit: 300 x 256 cells" in wrong.replace("\n", " ")
+    assert not list(tmp_path.glob("results/**/*.nc")), "nothing is kept of it"
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# what there is
+
+
+def test_control_groups__of_both_versions_and_all_levels_count(tmp_path, monkeypatch):
+    groups, process = tmp_path / "groups", tmp_path / "self"
+    monkeypatch.setattr(available, "_GROUPS", groups)
+    monkeypatch.setattr(available, "_PROCESS", process)
+    process.mkdir()
+
+    def group(folder, names, limit, used, cache, statistic):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, value in zip(names, (limit, used), strict=True):
+            (folder / name).write_text(f"{value}\n")
+        (folder / "memory.stat").write_text(f"other 7\n{statistic} {cache}\n")
+
+    first = ("memory.limit_in_bytes", "memory.usage_in_bytes")
+    second = ("memory.max", "memory.current")
+    group(groups / "memory" / "job" / "task", first, 9223372036854771712, 5000, 0, "total_inactive_file")
+    group(groups / "memory" / "job", first, 9000, 5000, 1000, "total_inactive_file")
+    (process / "cgroup").write_text("4:memory:/job/task\n3:cpu:/\n")
+    assert min(one.size for one in available._groups()) == 9000 - (5000 - 1000)
+    group(groups / "job" / "task", second, "max", 5000, 0, "inactive_file")
+    group(groups / "job", second, 8000, 5000, 500, "inactive_file")
+    (process / "cgroup").write_text("0::/job/task\n")
+    assert [one.size for one in available._groups()] == [8000 - (5000 - 500)]
+    (process / "cgroup").unlink()
+    assert not list(available._groups())
+
+
+def test_limit_of_the_address_space__counts():
+    limit = 8 << 30
+    script = (
+        "import resource\n"
+        f"resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}))\n"
+        "from roughvisc.experiment.available import _own\n"
+        "(found,) = _own()\n"
+        "print(int(found.size), found.words)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split(
+        " ", 1
+    )
+    assert 0 < int(said[0]) < limit
+    assert "ulimit -v" in said[1]
+    assert resource.getrlimit(resource.RLIMIT_AS)[0] != limit
+
+
+def test_limit_of_a_dask_worker__counts(monkeypatch):
+    worker = SimpleNamespace(memory_manager=SimpleNamespace(memory_limit=10**6))
+    monkeypatch.setattr(available, "_dask_worker", lambda: worker)
+    assert memory_available().words == "left of the Dask worker's memory limit"
+
+
+def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatch):
+    assert threads_for(3) == 3
+    assert threads_for(None) == cores()
+    with fft.set_workers(5):
+        assert threads_for(None) == 5
+    found = []
+    thread = threading.Thread(target=lambda: found.append(threads_for(None)))
+    thread.start()
+    thread.join()
+    assert found == [1], "beside other threads"
+    with pytest.raises(InputError, match="threads is 0: expected a whole number of at least 1"):
+        threads_for(0)
+
+
+def test_bits__do_not_depend_on_the_threads(study, tmp_path, monkeypatch):
+    """With the grid counted as large: threads are in use."""
+    monkeypatch.setattr(threads_module, "_THREADED", 1)
+    case = vary(read_study(study(ROUGH)), {"surface.shape": [72, 60], "keep.times": 3, "solve.tolerance": 1e-2})
+    found = []
+    for threads in (1, 2, 3):
+        path = run_case(case, tmp_path / str(threads), threads=threads)
+        with open_result(path) as ds:
+            found.append([ds.pressure.values.tobytes(), ds.gap.values.tobytes(), ds.approach.values.tobytes()])
+    assert found[0] == found[1] == found[2]

@@ -1,0 +1,330 @@
+"""The labelled result: what is in it, what is refused, the two validations of the seed paper."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy import fft
+from support import simulate_whole
+
+import roughvisc as rv
+from roughvisc import closed_forms
+from roughvisc.experiment import profile
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.labels import annotate
+from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.recorder import RowsInMemory
+from roughvisc.variables import FIELDS, VARIABLES
+
+BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
+PRESS = rv.Program().load(2e-3, over=0).hold(1.0)
+ZENER = rv.zener(1e6, 1e6, 1e6)
+
+
+def simulate(height=BALL, material=ZENER, program=PRESS, **settings):
+    return simulate_whole(height, material, program, **{"progress": False, "times": 3, "tolerance": 1e-2, **settings})
+
+
+def test_result__holds_declared_variables_with_units():
+    ds = simulate(fields=FIELDS)
+    assert {name: size for name, size in ds.sizes.items() if name != "step"} == {"time": 3, "x": 31, "y": 34}
+    assert ds.sizes["step"] > 3
+    assert set(ds.variables) <= set(VARIABLES)
+    for name in ds.variables:
+        assert ds[name].attrs.get("units", "") == VARIABLES[name].units
+        assert "long_name" in ds[name].attrs
+        assert "axis" not in ds[name].attrs
+    assert ds.attrs["Conventions"] == "CF-1.11"
+    assert ds["status"].attrs["flag_meanings"].split()[int(ds["status"][0])] == "converged"
+    np.testing.assert_allclose(ds["time"], [0.0, 1e-3**0.5, 1.0])
+
+
+def test_result__is_a_contact_state():
+    ds = simulate(fields=FIELDS, tolerance=1e-5)
+    area = float(ds.x[1] - ds.x[0]) * float(ds.y[1] - ds.y[0])
+    assert (ds.pressure >= 0).all()
+    assert (ds.gap >= 0).all()
+    assert not ((ds.pressure > 0) & (ds.gap > 0)).any()
+    assert (ds.pressure.sum(("x", "y")) * area).values == pytest.approx(ds.force.values, rel=1e-12)
+    undeformed = -BALL  # from the apex, which lies between two cells
+    opening = undeformed + ds.displacement - ds.approach
+    assert (ds.gap - opening).where(ds.pressure == 0, 0.0).values == pytest.approx(0, abs=1e-4 * float(ds.approach[0]))
+    counted = (ds.pressure > 0).sum(("x", "y")) * area
+    assert ds.contact_area_counted.values == pytest.approx(counted.values)
+    assert ds.mean_gap.values == pytest.approx(ds.gap.mean(("x", "y")).values)
+
+
+def test_fields__not_asked_for_are_not_there():
+    ds = simulate(fields=())
+    assert not set(FIELDS) & set(ds.variables)
+
+
+@pytest.mark.parametrize(
+    ("material", "duration"),
+    [(rv.maxwell(1e6, 1e6), 2.0), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
+    ids=["maxwell", "zener"],
+)
+def test_seed_papers_validations__at_the_default_tolerance(material, duration):
+    """128 x 128, free space, step load: L1 pressure 5e-3, approach 1e-3, force 1e-8 at every kept time."""
+    radius, load = 1e-3, 8e-2
+    exact = closed_forms.lee_radok_step(radius, material, load)
+    size = 2.4 * float(exact.radius(duration))
+    height = rv.sphere(radius, size, 128)
+    times = np.linspace(0, duration, 9)
+    ds = simulate_whole(
+        height, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=1e-3, progress=False
+    )
+    distance = np.hypot(ds.x - size / 2, ds.y - size / 2).values
+    for i, t in enumerate(times):
+        error = np.abs(ds.pressure[i].values - exact.pressure(distance, t)).sum() * (size / 128) ** 2 / load
+        assert error < 5e-3
+    assert ds.approach.values == pytest.approx(exact.approach(times), rel=1e-3)
+    assert ds.force.values == pytest.approx(load, rel=1e-8)
+    assert float(ds.time_error.max()) < 1e-3
+    radii = np.sqrt(ds.contact_area.values / np.pi)
+    assert radii == pytest.approx(exact.radius(times), rel=5e-3)
+
+
+def test_flat_punch__is_absent_outside_and_displaces_evenly():
+    radius, load = 1e-4, 1e-2
+    ds = simulate(rv.flat_punch(radius, size=3e-4, shape=(63, 64)), rv.elastic(1e6), rv.Program().load(load, over=0))
+    exact = closed_forms.flat_punch(radius, 4e6, load)
+    assert float(ds.approach[0]) == pytest.approx(exact.approach, rel=2e-2)
+    assert np.isnan(ds.gap.values[0, 0, 0])
+    assert ds.pressure.values[0, 0, 0] == 0
+
+
+def test_westergaard__wavy_surface_under_periodic_boundaries():
+    amplitude, wavelength, modulus = 1e-7, 1e-4, 4e6
+    surface = rv.wavy(amplitude, wavelength, size=(wavelength, 2e-6), shape=(257, 3), waves=1)
+    mean = 0.3 * np.pi * modulus * amplitude / wavelength
+    area = wavelength * 2e-6
+    ds = simulate(surface, rv.elastic(1e6), rv.Program().load(mean * area, over=0), boundary="periodic", tolerance=1e-6)
+    exact = closed_forms.westergaard(amplitude, wavelength, modulus, mean)
+    assert float(ds.contact_fraction[0]) == pytest.approx(exact.contact_fraction, abs=1.5 / 257)
+    expected = exact.pressure(ds.x.values)  # a crest is at x = 0
+    assert np.abs(ds.pressure.values[0, :, 1] - expected).sum() < 5e-3 * expected.sum()
+
+
+@pytest.mark.parametrize("program", [rv.Program().load(0.1, over=0), rv.Program().load(0.1, over=0.2).hold(1.0)])
+def test_analytic_profile__grows_and_ends_as_on_a_large_grid(program):
+    """Growth changes nothing but cost; what was kept before it is reported on the final grid."""
+    small = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29))
+    large = rv.sphere(1e-3, size=(702e-6, 698e-6), shape=(351, 349))
+    settings = {"tolerance": 1e-2, "times": 3, "fields": FIELDS}
+    grown, exact = (simulate(h, rv.maxwell(1e6, 1e6), program, **settings) for h in (small, large))
+    assert grown.sizes["x"] > 100
+    assert grown.approach.values == pytest.approx(exact.approach.values, rel=3e-3)
+    inside = exact.isel(x=slice(160, 191), y=slice(160, 189))
+    first = int(np.searchsorted(grown.x, 0)), int(np.searchsorted(grown.y, 0))
+    same = grown.isel(x=slice(first[0], first[0] + 31), y=slice(first[1], first[1] + 29))
+    assert same.height.values == pytest.approx(inside.height.values, abs=1e-12)
+    for name, scale in (("pressure", exact.pressure.max()), ("displacement", exact.displacement.max())):
+        assert np.abs(same[name].values - inside[name].values).max() < 2e-2 * float(scale)
+    assert "grown from" in grown.attrs["history"]
+
+
+def test_recipe_that_no_longer_holds__does_not_grow():
+    with xr.set_options(keep_attrs=True):
+        scaled = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29)) * 0.5
+    assert "recipe" in scaled.attrs
+    with pytest.raises(rv.EdgeContactError):
+        simulate(scaled, program=rv.Program().load(0.1, over=0))
+
+
+def test_work__is_that_of_the_force_on_the_approach():
+    """Hertz: two fifths of force times approach, for an elastic ramp."""
+    program = rv.Program().load(2e-3, over=1.0)
+    ds = simulate(BALL, rv.elastic(1e6), program, times=81, tolerance=1e-6)
+    assert float(ds.work[-1]) == pytest.approx(0.4 * float(ds.force[-1] * ds.approach[-1]), rel=1e-2)
+    assert (np.diff(ds.work) >= 0).all()
+
+
+def test_zero_load__is_open():
+    ds = simulate(program=rv.Program().load(2e-3, over=0).hold(0.5).load(0, over=0).hold(0.5), times=[0.25, 0.75])
+    assert [ds.status.attrs["flag_meanings"].split()[i] for i in ds.status.values] == ["converged", "open"]
+    assert np.isfinite(ds.approach.values).all()
+    assert np.isfinite(ds.gap.values).all()
+
+
+def test_seed_method__gives_the_same_dataset():
+    fast, seed = (simulate(method=m, time_step=0.02) for m in ("fast", "seed"))
+    assert set(fast.variables) == set(seed.variables)
+    assert float(abs(fast.pressure - seed.pressure).sum() / fast.pressure.sum()) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [(None, None), (1, (2.0,)), (3, (0.0, 0.5, 2.0)), (2, (0.0, 2.0)), ([0.5 + 1e-14, 2.0], (0.5, 2.0))],
+)
+def test_kept_times__are_counted_listed_or_snapped(times, expected):
+    assert kept_times(rv.Program().load(1.0, over=0.5).hold(1.5), times) == expected
+
+
+def with_value(value):
+    height = BALL.copy()
+    height[3, 4] = value
+    return height
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: simulate(height=with_value(np.nan)), r"missing at 1 of 1054 points, the first at cell \(3, 4\)"),
+        (lambda: simulate(height=with_value(np.inf)), "infinite values"),
+        (lambda: simulate(height=BALL * np.nan), "missing everywhere"),
+        (lambda: simulate(height=BALL.values), "simulate: found ndarray: expected an xarray.DataArray"),
+        (lambda: simulate(height=BALL.assign_attrs(units="K")), "simulate: the height has the unit 'K'"),
+        (lambda: simulate(height=BALL[[0, 1, 5]]), "expected a uniform, ascending grid"),
+        (lambda: simulate(boundary="open"), "boundary is 'open'"),
+        (lambda: simulate(tolerance=0), "tolerance is 0"),
+        (lambda: simulate(time_step=-1.0), r"time_step is -1\.0"),
+        (lambda: simulate(program=rv.Program()), "program is empty"),
+        (lambda: simulate(fields=("stress",)), "fields holds 'stress': expected some of pressure, gap, displacement"),
+        (lambda: simulate(method="slow"), "method is 'slow'"),
+        (lambda: simulate(times=[2.0]), "times holds 2 s: expected times from 0 to the program's end at 1 s"),
+        (lambda: simulate(times=0), "times is 0"),
+        (lambda: simulate(missing="ignore"), "missing is 'ignore'"),
+        (
+            lambda: simulate(height=rv.from_array(BALL.values, 1e-5), program=rv.Program().load(10.0, over=0)),
+            "contact reaches the border of the free-space domain of 31 x 34 cells",
+        ),
+        (
+            lambda: simulate(boundary="periodic", program=rv.Program().approach(1e-3, over=1)),
+            "with periodic boundaries contact is full",
+        ),
+    ],
+)
+def test_bad_input__is_one_readable_message(call, message):
+    with pytest.raises(rv.InputError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_progress__is_reported_to_a_function():
+    seen = []
+    simulate(progress=lambda now, end: seen.append((now, end)))
+    assert seen[-1] == (1.0, 1.0)
+    assert seen == sorted(seen)
+
+
+def test_annotate__refuses_what_is_not_declared():
+    with pytest.raises(KeyError, match="stress"):
+        annotate(xr.Dataset({"stress": ("time", [1.0])}))
+    with pytest.raises(ValueError, match="declared are"):
+        annotate(xr.Dataset({"force": ("x", [1.0])}))
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# the window follows the contact
+
+
+def two_hills(shape=(151, 133)):
+    """Rough hills of unequal height on a slope: the lower one is touched late, far from the first contact."""
+    rough = rv.self_affine((3e-4, 2.6e-4), shape, hurst=0.8, rms_height=1.5e-8, rolloff=1e-4, shortcut=1e-5, seed=5)
+    x, y = rough.x.values[:, None], rough.y.values
+    first = 4e-7 - ((x - 1.1e-4) ** 2 + (y - 1.2e-4) ** 2) / 2e-3
+    second = 1.5e-7 - ((x - 2.2e-4) ** 2 + (y - 1.6e-4) ** 2) / 2e-3
+    return rough.copy(data=rough.values + np.maximum(first, second)).drop_attrs()
+
+
+FOLLOWED = {
+    "loading and unloading": (
+        ZENER,
+        rv.Program().load(2e-3, over=0.5).hold(0.5).load(0, over=0.3).load(1e-3, over=0.2),
+    ),
+    "stress relaxation": (ZENER, rv.Program().approach(7e-7, over=0.2).hold(0.5).approach(1e-7, over=0.2)),
+    "soft": (rv.kelvin_voigt(1e6, 1e5), rv.Program().load(1e-3, over=0.2).hold(0.2)),
+    "direct history": (
+        rv.Tabulated(tuple(np.linspace(0, 1, 21)), tuple(1e-7 * (1 + np.linspace(0, 1, 21) ** 2))),
+        rv.Program().load(1e-3, over=0.2).hold(0.8),
+    ),
+    "jump": (rv.maxwell(1e6, 1e6), rv.Program().load(2e-3, over=0).hold(0.5)),
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.thorough) if n == "soft" else n for n in FOLLOWED])
+def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
+    material, program = FOLLOWED[name]
+    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "memory": "direct" if "direct" in name else "auto"}
+    followed = simulate(two_hills(), material, program, **settings)
+    assert len(set(solved_on)) >= 2, "the window grew"
+    assert solved_on[0][0] < 60
+    monkeypatch.setattr(profile, "_WORTH_FOLLOWING", 10**9)
+    whole = simulate(two_hills(), material, program, **settings)
+    assert solved_on[-1] == (151, 133)
+    force, depth = float(whole.force.max()), float(whole.approach.max())
+    area = float(whole.x[1] - whole.x[0]) * float(whole.y[1] - whole.y[0])
+    assert np.abs(followed.approach - whole.approach).max() < 3e-3 * depth
+    assert (np.abs(followed.pressure - whole.pressure).sum(("x", "y")) * area).max() < 2 * 3e-3 * force
+    for field in ("gap", "displacement"):
+        assert np.abs(followed[field] - whole[field]).max() < 1e-2 * depth
+    assert np.abs(followed.mean_gap - whole.mean_gap).max() < 3e-3 * depth
+    assert followed.mean_gap.values == pytest.approx(followed.gap.mean(("x", "y")).values, rel=1e-3)
+    right = followed.x > 1.7e-4
+    assert (followed.pressure.where(right).max() > 0) == (whole.pressure.where(right).max() > 0)
+    assert (np.abs(followed.contact_area - whole.contact_area) <= 0.02 * whole.contact_area.max()).all()
+
+
+def test_window__finds_the_contact_on_the_second_hill(solved_on):
+    ds = simulate(two_hills(), *FOLLOWED["loading and unloading"])
+    assert ds.pressure[1].where(ds.x > 1.7e-4).max() > 0
+
+
+def test_window__stops_at_the_border_of_a_scan():
+    with pytest.raises(rv.EdgeContactError, match="151 x 133"):
+        simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5))
+
+
+def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
+    bored = two_hills()
+    bored[40:50, 40:50] = np.nan
+    press = rv.Program().load(1e-4, over=0)
+    simulate(bored, ZENER, press, missing="absent")
+    simulate(two_hills(), ZENER, press, edge="accept")
+    simulate(two_hills(), ZENER, press, boundary="periodic")
+    assert set(solved_on) == {(151, 133)}
+
+
+def test_threads__change_no_bit(monkeypatch):
+    """Nor does the next run."""
+    monkeypatch.setattr(threads_module, "_THREADED", 0)
+    rough = rv.self_affine((1e-4, 1.1e-4), (41, 45), hurst=0.8, rms_slope=0.1, shortcut=8e-6, seed=3)
+    found = []
+    for threads in (1, 2, 2):
+        with fft.set_workers(threads):
+            found.append(simulate(rough, program=rv.Program().load(1e-3, over=0.1), boundary="periodic", fields=FIELDS))
+    for ds in found[1:]:
+        for name in (*FIELDS, "approach", "work", "iterations"):
+            assert ds[name].values.tobytes() == found[0][name].values.tobytes(), name
+
+
+def test_window__after_a_jump_is_foreseen(solved_on):
+    """One coarse grid to foresee it, and one window from then on."""
+    ball = rv.sphere(1e-3, size=1.2e-3, shape=(301, 297))
+    ds = simulate(ball, rv.elastic(1e6), rv.Program().load(2e-2, over=0).hold(1.0))
+    assert len(solved_on) == 2
+    assert solved_on[1] < (301, 297)
+    assert float(ds.force[-1]) == 2e-2
+
+
+def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on):
+    with pytest.raises(rv.InputError, match="expected at most 1e\\+100 N"):
+        simulate(two_hills(), program=rv.Program().load(1e200, over=0))
+    assert not solved_on
+
+
+@pytest.mark.parametrize("size", [1.2e-3, 0.3e-3], ids=["window", "whole"])
+def test_kept_rows__hold_nothing_but_what_they_keep(size, monkeypatch):
+    """A field that is a part of a larger array would keep all of that in memory."""
+    kept = []
+    append = RowsInMemory.append
+
+    def appended(self, plain, arrays):
+        kept.extend(arrays.values())
+        append(self, plain, arrays)
+
+    monkeypatch.setattr(RowsInMemory, "append", appended)
+    ball = rv.sphere(1e-3, size=size, shape=(101, 97))
+    simulate(ball, ZENER, rv.Program().load(1e-4, over=0).hold(1.0), times=3, fields=FIELDS)
+    assert kept
+    assert all(array.base is None for array in kept)

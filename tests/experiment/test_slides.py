@@ -1,0 +1,192 @@
+"""Results of programs that slide: what they hold, when, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from support import friction_whole, simulate_whole
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.slides import snap_to_cells
+from roughvisc.study.statement.case import Case, read_study, vary
+from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.views.sweep_figures.case_text import program_words
+
+SIDE = 1e-3
+RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
+PRESS = rv.Program().pressure(1e4, over=0).hold(2e-3)
+STUDY = """
+title = "Stop and go"
+[surface]
+generate = "wavy"
+amplitude = "2 um"
+wavelength = "1 mm"
+size = "1 mm"
+shape = [24, 2]
+waves = 1
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.3 MPa"
+kelvin_viscosity = "0.3 kPa s"
+[[program]]
+pressure = "10 kPa"
+over = 0
+[[program]]
+hold = "2 ms"
+[[program]]
+slide = "1 mm"
+speed = "0.1 m/s"
+[[program]]
+hold = "2 ms"
+[[program]]
+slide = "0.5 mm"
+over = "5 ms"
+direction = "-x"
+[solve]
+boundary = "periodic"
+[keep]
+times = 9
+"""
+
+
+def wave(cells=24):
+    return rv.wavy(2e-6, SIDE, (SIDE, SIDE), (cells, 2), waves=1)
+
+
+def slid(program, height=None, **settings):
+    settings = {"boundary": "periodic", "progress": False} | settings
+    return simulate_whole(wave() if height is None else height, RUBBER, program, **settings)
+
+
+def test_result__holds_friction_over_time_and_steps():
+    program = PRESS.slide(2 * SIDE, speed=0.1).hold(2e-3).slide(0.5 * SIDE, speed=0.1, direction="-x").hold(0.05)
+    ds = slid(program, times=12, fields=("pressure",))
+    steps = rv.observables.history(ds)
+    assert ds.sliding_distance[-1] == pytest.approx(2.5 * SIDE)
+    assert (np.diff(steps.sliding_distance) >= 0).all()
+    assert steps.friction_force.sizes["time"] > 60
+    np.testing.assert_allclose(ds.friction_coefficient[1:], ds.friction_force[1:] / ds.force[1:])
+    curve = friction_whole(wave(), RUBBER, speeds=0.1, pressure=1e4)
+    ends = steps.friction_coefficient.sel(time=[program.corners[3], program.corners[5]], method="nearest")
+    np.testing.assert_allclose(ends, curve.friction_coefficient.item(), rtol=0.02)
+    assert "slope_friction_force" not in ds
+    assert float(abs(steps.friction_force_across).max()) < 1e-9 * float(ds.friction_force.max())
+    assert abs(ds.friction_force[-1]) < 1e-3 * ds.friction_force.max(), "what is left of the slide fades in a rest"
+    integral = np.trapezoid(steps.friction_force, steps.sliding_distance)
+    assert ds.friction_work[-1] == pytest.approx(integral, rel=0.02)
+    assert (ds.friction_force_error >= 0).all()
+    for name in ("friction_force", "step_friction_force"):
+        assert ds[name].attrs["units"] == "N"
+    assert "sliding_distance" not in slid(PRESS, times=2)
+
+
+def test_kept_times__come_to_whole_cells():
+    program = PRESS.slide(SIDE, speed=0.1).hold(1e-3)
+    asked = [1e-3, 2e-3, 2.1e-3, 2.55e-3, 2.56e-3, program.duration]
+    cell = 0.01 / 24
+    expected = [1e-3, 2e-3, 2e-3 + cell, program.duration]
+    np.testing.assert_allclose(snap_to_cells(program, asked, (SIDE / 24, 1.0)), expected, rtol=1e-12)
+    ds = slid(program, times=asked)
+    np.testing.assert_allclose(ds.time, expected, rtol=1e-12)
+    np.testing.assert_allclose(ds.sliding_distance, [0, 0, SIDE / 24, SIDE], rtol=1e-12)
+    assert len(kept_times(program, 20)) == 20
+
+
+def test_every_step_of_a_slide__is_a_row_where_all_are_kept():
+    ds = slid(PRESS.slide(0.5 * SIDE, speed=0.1), times=None, tolerance=1e-4)
+    inside = ds.time > 2e-3 * (1 + 1e-9)
+    assert int(inside.sum()) == 12
+    assert float(ds.stated_error.where(inside).max()) > 1e-4
+    assert "one cell a step" in ds.attrs["accuracy_note"]
+
+
+def test_distance__is_told_where_it_is_not_of_whole_cells():
+    ds = slid(PRESS.slide(0.49 * SIDE, speed=0.1), times=1)
+    assert ds.attrs["slide_note"] == "program.2 slides 500 µm, 12 whole cells, of 490 µm"
+    assert ds.sliding_distance.item() == pytest.approx(0.5 * SIDE)
+    assert ds.time.item() == pytest.approx(2e-3 + 4.9e-3), "its time is as asked for"
+    assert "slide_note" not in slid(PRESS.slide(0.5 * SIDE, speed=0.1), times=1).attrs
+
+
+def test_mirror_images__do_not_slide_apart():
+    """A surface that is its own mirror image is solved whole, and leans into the motion."""
+    ds = slid(PRESS.slide(SIDE, speed=0.1), times=1, fields=("pressure",))
+    across = ds.pressure.values[0].sum(axis=1)
+    assert across[:12].sum() > 1.05 * across[12:].sum(), "the crest is at x = 0"
+
+
+@pytest.mark.parametrize(
+    ("program", "settings", "message"),
+    [
+        (PRESS.slide(SIDE, speed=1.0), {"boundary": "free"}, "boundary is 'free' and the program slides"),
+        (PRESS.slide(SIDE, speed=1.0), {"method": "seed", "time_step": 1e-3}, "method is 'seed'"),
+        (PRESS.slide(SIDE, speed=1.0), {"grid_error": True}, "grid_error compares the same instants"),
+        (PRESS.slide(1e-5, speed=1.0), {}, "program.2: a slide of 10 µm is less than half a cell of 41.6667 µm"),
+        (rv.Program().slide(SIDE, speed=1.0), {}, "program.0 slides and nothing is pressed yet"),
+    ],
+)
+def test_what_cannot_be_computed__is_refused(program, settings, message):
+    with pytest.raises(InputError, match=message):
+        slid(program, **settings)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    path = tmp_path_factory.mktemp("study") / "study.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_study__states_the_same_program(study):
+    case = read_study(study)
+    program = PRESS.slide(SIDE, speed=0.1).hold(2e-3).slide(0.5 * SIDE, over=5e-3, direction="-x")
+    assert case.program() == program
+    assert Case.from_json(case.to_json()).program() == program
+    words = program_words(json.loads(case.to_json())["program"])
+    assert words[2] == "slide 1 mm, speed 100 mm/s, direction x"
+    assert unit_of("program.2.speed") == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("program.2.slide", 2e-3), ("program.2.speed", 0.2), ("program.2.direction", "y"), ("program.4.over", 1e-3)],
+)
+def test_key_of_a_case__counts_all_of_a_slide(study, key, value):
+    case = read_study(study)
+    assert vary(case, {key: value}).key != case.key
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('speed = "0.1 m/s"', "", "program.2: a slide has a speed, or a time over which it goes: found neither"),
+        ('speed = "0.1 m/s"', "speed = 1\nover = 1", "program.2: a slide has a speed, .*: found both, expected one"),
+        ('speed = "0.1 m/s"', 'speed = "1 m"', "program.2.speed: found '1 m'"),
+        ('slide = "1 mm"', "slide = 0", "program.2.slide: found 0: expected"),
+        ('direction = "-x"', 'direction = "z"', "program.4.direction: found 'z': expected"),
+        ('slide = "1 mm"', 'slide = "1 mm"\ncontrol = "load"', "program.2.control: unknown key"),
+    ],
+)
+def test_study__refuses_in_plain_words(tmp_path, old, new, message):
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        read_study(tmp_path / "study.toml")
+
+
+def test_plan__counts_the_cells(study):
+    found = rv.plan([read_study(study)]).isel(case=0)
+    ds = simulate_whole(wave(), RUBBER, read_study(study).program(), boundary="periodic", times=9, progress=False)
+    assert found.refusal.item() == ""
+    assert "36 of one cell in slides" in found.scheme.item()
+    assert found.steps.item() == pytest.approx(rv.observables.history(ds).sizes["time"], rel=0.4)
+    assert found.rows.item() == 9
+    refused = rv.plan([vary(read_study(study), {"program.2.slide": 1e-5})]).refusal.item()
+    assert "program.2: a slide of 10 µm is less than half a cell" in refused
+
+
+def test_trade__is_refused(study):
+    with pytest.raises(InputError, match="the program slides"):
+        rv.trade(read_study(study))

@@ -1,0 +1,118 @@
+"""Histories at every accepted step beside fields at kept times, and where kept times lie."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from support import simulate_whole
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.experiment.kept_times import spread_times
+
+RADIUS, LOAD = 1e-3, 1e-4
+CELL = 2e-4 / 33
+BALL = rv.sphere(RADIUS, 33 * CELL, 33)
+RUBBER = rv.zener(3e6, 1e6, 2e6)
+PROGRAM = rv.Program().load(LOAD, over=0.5).hold(4.0)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return simulate_whole(BALL, RUBBER, PROGRAM, times=[4.5], tolerance=1e-3, progress=False)
+
+
+def test_histories__hold_the_steps_between_kept_times(result):
+    steps = rv.observables.history(result)
+    assert result.sizes["time"] == 1
+    assert steps.sizes["time"] > 5
+    assert np.all(np.diff(steps.time) > 0)
+    assert steps.time[0] == 0
+    assert steps.time[-1] == 4.5
+    assert np.any(np.isclose(steps.time, 0.5, rtol=1e-12)), "the end of the ramp"
+    for name in ("force", "approach", "contact_area", "work", "mean_gap", "time_error"):
+        assert float(steps[name][-1]) == float(result[name][-1])
+        assert steps[name].attrs["units"] == result[name].attrs["units"]
+    np.testing.assert_allclose(steps.force, np.minimum(LOAD * steps.time / 0.5, LOAD), rtol=1e-12)
+
+
+def test_histories__follow_the_closed_form(result):
+    # a growing contact: the approach of a ball by the functional equation of Lee and Radok, exact at every instant
+    steps = rv.observables.history(result)
+    dense = np.concatenate([np.linspace(0, 0.5, 2001), np.linspace(0.5, 4.5, 2001)[1:]])
+    load = np.minimum(LOAD * dense / 0.5, LOAD)
+    for time, approach in zip(steps.time.values[1:], steps.approach.values[1:], strict=True):
+        past = dense[dense < time - 1e-12]
+        ends, values = np.append(past, time), np.append(load[: past.size], np.interp(time, dense, load))
+        middle = 0.5 * (ends[1:] + ends[:-1])
+        hereditary = np.sum(RUBBER.contact_compliance(time - middle) * np.diff(values))
+        exact = (0.75 * hereditary / np.sqrt(RADIUS)) ** (2 / 3)
+        # the grid's part is of second order in the cell over the contact's radius
+        assert abs(approach - exact) < (1e-3 + 0.1 * (CELL**2 / (RADIUS * exact))) * exact
+
+
+def test_histories__are_stored_and_read_by_the_same_names(result, tmp_path):
+    from roughvisc.study.storage.store import open_result, write_result
+
+    with open_result(write_result(result, tmp_path / "result.nc")) as found:
+        xr.testing.assert_identical(rv.observables.history(found).load(), rv.observables.history(result).load())
+
+
+def test_histories__where_every_step_is_kept_are_the_result():
+    ds = simulate_whole(BALL, RUBBER, PROGRAM, tolerance=1e-2, progress=False)
+    assert "step" not in ds.dims
+    xr.testing.assert_identical(rv.observables.history(ds).force, ds.force)
+
+
+def test_histories__of_many_cases_ask_for_one():
+    both = xr.concat([simulate_whole(BALL, RUBBER, PROGRAM, times=1, tolerance=1e-2, progress=False)] * 2, "case")
+    with pytest.raises(InputError, match="choose one case first"):
+        rv.observables.history(both)
+    steps = rv.observables.history(both.isel(case=0))
+    assert steps.sizes["time"] > 1
+
+
+def test_force_of_a_whole_step__is_no_history():
+    # no compliance at once: under given approach the force of an implicit step is not that at its end
+    soft = rv.kelvin_voigt(1e6, 1e6)
+    program = rv.Program().approach(1e-6, over=0.5).hold(1.0)
+    ds = simulate_whole(BALL, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
+    kept = set(ds.time.values)
+    assert set(rv.observables.history(ds).time.values) - {0.0} <= kept
+
+
+@st.composite
+def programs(draw):
+    chain = rv.Program()
+    for _ in range(draw(st.integers(1, 6))):
+        duration = draw(st.floats(1e-3, 1e3))
+        kind = draw(st.sampled_from(["ramp", "hold", "jump", "cycle"]))
+        if kind == "ramp":
+            chain = chain.load(draw(st.floats(0.1, 1.0)), over=duration)
+        elif kind == "jump":
+            chain = chain.load(draw(st.floats(0.1, 1.0)), over=0)
+        elif kind == "hold" or not chain.segments or chain.segments[-1].end is None:
+            chain = chain.hold(duration)
+        else:
+            chain += rv.Program.cycle(chain.segments[-1].end, 0.05, duration, draw(st.integers(1, 5)))
+    return chain
+
+
+@given(programs(), st.integers(1, 300))
+def test_spread_times__are_as_many_as_asked_and_hold_the_corners(program, count):
+    times, corners = spread_times(program, count), np.unique(program.corners)
+    assert np.all(np.diff(times) > 0)
+    assert times[-1] == program.duration
+    assert times[0] >= 0
+    if count >= len(corners):
+        assert set(corners) <= set(times)
+    if program.duration > 0:
+        assert len(times) == count
+
+
+def test_spread_times__of_a_hold_lie_evenly_in_the_logarithm():
+    times = spread_times(rv.Program().load(1.0, over=0.03).hold(10.0), 30) - 0.03
+    since = times[(times > 1e-9) & (times < 9.999)]
+    ends = np.concatenate([[0.01], since, [10.0]])  # from a third of the ramp before it
+    np.testing.assert_allclose(np.diff(np.log(ends)), np.diff(np.log(ends))[0])

@@ -1,0 +1,365 @@
+"""A sheet on a rigid base, from the study to the result: against the integral equation, and what is refused."""
+
+import json
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.interpolate import CubicSpline
+from support import run_whole, simulate_whole
+
+import roughvisc as rv
+from roughvisc.cli import main
+from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.trade.exact import closed_form
+
+RADIUS, THICKNESS = 1e-3, 1e-4
+WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
+
+
+def pressed(height, material, program, *, thickness=THICKNESS, **settings):
+    """On a sheet, bonded unless a base is given; on a half-space if it has no thickness."""
+    base = {name: settings.pop(name) for name in ("base",) if name in settings}
+    body = material if thickness is None else rv.sheet(material, thickness, **base)
+    return simulate_whole(height, body, program, **{"progress": False, **settings})
+
+
+@pytest.mark.parametrize("wide", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("poisson", [0.3, 0.45, 0.5])
+@pytest.mark.parametrize("base", ["bonded", "slipping"])
+def test_elastic_sphere__agrees_with_the_integral_equation(wide, poisson, base):
+    exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS, poisson, base)), wide * THICKNESS
+    load = rv.Program().load(float(exact.scaled_force(a)) * 2e6 / (1 - poisson), over=0)
+    ds = pressed(rv.sphere(RADIUS, 2.6 * a, 128), rv.elastic(1e6, poisson), load, base=base)
+    assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
+    assert math.sqrt(float(ds.contact_area[0]) / math.pi) == pytest.approx(a, rel=2e-3)
+
+
+@pytest.mark.parametrize(("poisson", "base"), [(0.5, "bonded"), (0.3, "bonded"), (0.45, "slipping")])
+def test_creeping_sphere__agrees_with_the_integral_equation(poisson, base):
+    rubber = rv.zener(1e6, 3e5, 1e5, poisson)
+    exact = StepLoad(OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS, poisson, base)), rubber, 2e-3)
+    ball = rv.sphere(RADIUS, 2.6 * float(exact.radius(2.0)), 128)
+    times = [0.0, 0.1, 0.5, 2.0]
+    ds = pressed(ball, rubber, rv.Program().load(2e-3, over=0).hold(2.0), base=base, times=times, fields=())
+    np.testing.assert_allclose(ds.approach, exact.approach(times), rtol=1e-3)
+    np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=2e-3)
+
+
+def test_cone__agrees_with_the_integral_equation():
+    exact, a = OnSheet(Cone(0.1), Sheet(THICKNESS)), 1.5 * THICKNESS
+    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
+    ds = pressed(rv.cone(0.1, 2.6 * a, 65), rv.elastic(1e6), load)
+    assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
+
+
+def orders(exact, thickness, cells=(33, 65, 129)):
+    """Orders in the cell's side of approach and pressure (L1) under a sphere, at a contact radius of 0.1 mm."""
+    a = THICKNESS
+    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
+    errors = []
+    for count in cells:
+        ball = rv.sphere(RADIUS, 2.6 * a, count)
+        ds = pressed(ball, rv.elastic(1e6), load, tolerance=1e-6, thickness=thickness)
+        found = ds.pressure[0]
+        at = exact.scaled_pressure(np.hypot(found.x.values[:, None] - 1.3 * a, found.y.values - 1.3 * a), a) * 4e6
+        approach = abs(float(ds.approach[0]) / float(exact.reduced(a)) - 1)
+        errors.append((approach, np.abs(found.values - at).sum() / at.sum()))
+    return -np.polyfit(np.log(cells), np.log(errors), 1)[0]
+
+
+def test_sphere__converges_as_on_a_half_space():
+    on_sheet = orders(OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), THICKNESS)
+    on_half_space = orders(Paraboloid(RADIUS), None)
+    assert on_sheet[0] > 1.6
+    np.testing.assert_allclose(on_sheet, on_half_space, atol=0.1)
+
+
+def test_flat_punch__agrees_with_the_integral_equation_up_to_its_outline():
+    """Of counted cells it has a radius right to half of one, as on a half-space: the ratio of both is closer."""
+    sheet, a, cells = Sheet(THICKNESS), THICKNESS, 65
+    load, punch = rv.Program().load(1e-3, over=0), rv.flat_punch(a, 2.6 * a, cells)
+    on_sheet, on_half_space = (pressed(punch, rv.elastic(1e6), load, thickness=h) for h in (THICKNESS, None))
+    stiffer = float(on_half_space.approach[0] / on_sheet.approach[0])
+    assert stiffer == pytest.approx(PunchOnSheet(a, sheet).scaled_stiffness / (2 * a), rel=1.3 / cells)
+
+
+@pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.5, "bonded"), (0.5, "slipping")])
+def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base):
+    side, amplitude, cells = 1e-3, 1e-6, (15, 12)
+    sheet, q = Sheet(THICKNESS, poisson, base), 2 * math.pi / 1e-3
+    wave = rv.wavy(amplitude, side, side, cells, waves=1)
+    modulus = 2e6 / (1 - poisson)
+    crest = modulus * amplitude / float(sheet.transfer(q, 0.0))
+    ds = pressed(
+        wave, rv.elastic(1e6, poisson), rv.Program().load(3 * crest * side**2, over=0), base=base, boundary="periodic"
+    )
+    expected = 3 * crest + crest * np.cos(q * ds.x.values)[:, None] * np.ones(cells[1])
+    np.testing.assert_allclose(ds.pressure[0], expected, rtol=1e-5)
+    # the mean of the gap is zero: the highest cell has sunk by its height and by the sheet's compression
+    sunk = 3 * crest / modulus * sheet.uniform_displacement
+    assert float(ds.approach[0]) == pytest.approx(float(wave.max()) + sunk, rel=1e-3)
+    assert ("compression of the sheet" in ds.attrs["body_note"]) == (sheet.uniform_displacement > 0)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_thick_sheet__tends_to_the_half_space(boundary):
+    load = rv.Program().load(0.02, over=0.1).hold(0.2)
+    rubber = rv.zener(1e6, 3e5, 1e5)
+    edge = {"edge": "accept"} if boundary == "free" else {}
+    thin, thick, half = (
+        pressed(WAVY, rubber, load, boundary=boundary, times=[0.1, 0.3], thickness=h, **edge) for h in (0.02, 2.0, None)
+    )
+    differences = [float(abs(one.pressure - half.pressure).sum() / half.pressure.sum()) for one in (thin, thick)]
+    assert differences[1] < max(1e-3, 0.02 * differences[0])
+    assert float(abs(thick.approach / half.approach - 1).max()) < 1e-3
+    endless = pressed(WAVY, rubber, load, boundary=boundary, times=[0.1, 0.3], thickness=math.inf, **edge)
+    np.testing.assert_array_equal(endless.pressure, half.pressure)
+    assert "thickness" not in endless.attrs
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize(("poisson", "base"), [(0.5, "bonded"), (0.3, "bonded"), (0.5, "slipping")])
+def test_iterations__are_about_those_on_a_half_space(boundary, poisson, base):
+    rough = rv.self_affine(1.0, (63, 64), hurst=0.8, rms_slope=0.2, rolloff=0.3, seed=3).values
+    gap, cell = rough.max() - rough, (1 / 63, 1 / 64)
+    for load in (0.002, 0.02, 0.05):
+        half = solve_contact(HalfSpace((63, 64), cell, boundary), gap, load=load * gap.size, tolerance=1e-8)
+        for thickness in (0.1, 0.3, 1.0):
+            body = HalfSpace((63, 64), cell, boundary, kernel=Sheet(thickness, poisson, base))
+            found = solve_contact(body, gap, load=load * gap.size, tolerance=1e-8)
+            assert found.converged
+            assert found.iterations <= 1.3 * half.iterations + 1
+
+
+def test_both_memories_and_the_grid_that_grows__agree():
+    """The history of pressures, which survives a change of grid, and that of displacements."""
+    rubber, load = rv.zener(1e6, 3e5, 1e5), rv.Program().load(2e-3, over=0.1).hold(1.0).load(1e-3, over=0.1)
+    ball, small = rv.sphere(RADIUS, 3.4e-4, (51, 51)), rv.sphere(RADIUS, 1.4e-4, (21, 21))
+    one = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2])
+    direct = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2], memory="direct")
+    grown = pressed(small, rubber, load, times=[0.1, 1.1, 1.2])
+    assert grown.sizes["x"] > 21
+    for other in (direct, grown):
+        np.testing.assert_allclose(other.approach, one.approach, rtol=2e-3)
+        np.testing.assert_allclose(other.force, one.force, rtol=2e-3)
+
+
+def test_unloading__is_that_of_ting_on_a_sheet():
+    """His solution asks of the body only that space and time separate; tables stand for the integral equation."""
+    exact, rubber = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), rv.zener(1e6, 3e5, 1e5)
+    radii = np.linspace(0, 1.6e-4, 60)
+    force, depth = exact.scaled_force(radii) ** (1 / 3), exact.reduced(radii)
+    table = SimpleNamespace(
+        radius_at_scaled_force=lambda value: np.interp(np.cbrt(value), force, radii),
+        reduced=CubicSpline(radii, depth),
+    )
+    program, times = rv.Program().load(2e-3, over=1.0).load(0.0, over=1.0), [0.5, 1.0, 1.25, 1.5, 1.75]
+    ds = pressed(rv.sphere(RADIUS, 3.2e-4, 25), rubber, program, times=times, tolerance=5e-3)
+    np.testing.assert_allclose(ds.approach, ting(table, rubber, program).approach(times), rtol=5e-3)
+
+
+def test_grid_error__knows_the_base():
+    exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), THICKNESS
+    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
+    ds = pressed(rv.sphere(RADIUS, 2.6 * a, 32), rv.elastic(1e6), load, grid_error=True)
+    true = abs(float(ds.approach[0]) / float(exact.reduced(a)) - 1)
+    assert true < float(ds.grid_error[0]) < 0.1
+
+
+# --------------------------------------------------------------------------------------------------------------
+# studies
+
+STUDY = """
+title = "A ball on a gel"
+[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.3 mm"
+shape = [24, 21]
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.3 MPa"
+kelvin_viscosity = "0.1 MPa s"
+thickness = "0.1 mm"
+base = "slipping"
+[[program]]
+load = "1 mN"
+over = 0
+[[program]]
+hold = "0.5 s"
+[keep]
+times = [0, 0.5]
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "gel.toml"
+    path.write_text(STUDY)
+    return read_cases(path)[0]
+
+
+def test_study__presses_the_sheet_that_it_states(case, tmp_path):
+    assert case.body().kernel == Sheet(1e-4, 0.5, "slipping")
+    ds = run_whole(case, out=tmp_path / "out", progress=False)
+    assert (ds.attrs["thickness"], ds.attrs["base"]) == (1e-4, "slipping")
+    assert "kernel" not in ds.attrs
+    same = pressed(case.height(), case.material(), case.program(), base="slipping", times=[0, 0.5])
+    np.testing.assert_array_equal(ds.pressure, same.pressure)
+    assert Case.from_json(ds.attrs["case"]).body() == case.body()
+    assert "base matters" in ds.attrs["body_note"]
+
+
+def test_key__knows_the_sheet_and_leaves_half_spaces_as_they_were(case):
+    bare = vary(case, {"material.thickness": math.inf})
+    assert bare.body().kernel == HALF_SPACE
+    sheets = [{"material.thickness": h, "material.base": b} for h in (1e-4, 2e-4) for b in ("bonded", "slipping")]
+    keys = [vary(case, changes).key for changes in sheets]
+    assert len({*keys, bare.key}) == 5
+    assert case.key == keys[1]
+    without = json.loads(case.to_json())
+    for key in ("thickness", "base"):
+        without["material"].pop(key)
+    assert bare.key == Case.from_json(json.dumps(without)).key
+
+
+def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
+    path = tmp_path / "sweep.toml"
+    path.write_text(STUDY + '[sweep]\n"material.thickness" = ["50 um", "0.2 mm", inf]\n')
+    results = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
+    assert results["material_thickness"].values.tolist() == [5e-5, 2e-4, math.inf]
+    approach = results.approach.isel(time=-1).values.tolist()
+    assert approach == sorted(approach), "the thicker the softer"
+    assert len(set(approach)) == 3
+    again = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
+    assert again.approach.identical(results.approach)
+
+
+def test_trade__offers_no_closed_form_of_a_half_space(case):
+    assert closed_form(case, np.array([0.5])) is None
+    assert closed_form(vary(case, {"material.thickness": math.inf}), np.array([0.5])) is not None
+
+
+@pytest.mark.parametrize(
+    ("thickness", "words"),
+    [(0.5, "A half-space would have done"), (1e-4, "The base matters: on a half-space the approach would be")],
+)
+def test_plan_and_result__say_whether_a_half_space_would_have_done(case, thickness, words):
+    other = vary(case, {"material.thickness": thickness})
+    assert words in str(rv.plan([other]).body_note.values[0])
+    ds = pressed(other.height(), other.material(), other.program(), thickness=thickness, base="slipping")
+    assert words in ds.attrs["body_note"]
+
+
+def test_screens_of_plan_and_run__show_what_the_base_does(case, tmp_path):
+    study = tmp_path / "gel.toml"  # written by the fixture
+    for verb in (["plan"], ["run", "--out", str(tmp_path / "out"), "--no-plots"]):
+        done = CliRunner().invoke(main, [*verb, str(study)])
+        assert done.exit_code == 0, done.output
+        assert "Body" in done.output
+        assert "The base matters" in done.output
+
+
+def test_note__bounds_what_a_half_space_has_more(case):
+    """To first order, and from above."""
+    for thickness in (2e-4, 1e-3, 4e-3):
+        on_sheet, half = (
+            pressed(case.height(), rv.elastic(1e6), rv.Program().load(1e-3, over=0), thickness=h)
+            for h in (thickness, None)
+        )
+        said = float(on_sheet.attrs["body_note"].split("up to ")[1].split(" %")[0]) / 100
+        true = float(half.approach[0] / on_sheet.approach[0]) - 1
+        assert true < said * 1.01
+        assert said < 2 * true
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"material.thickness": "-1 mm"}, "material.thickness: found '-1 mm': expected a number in m"),
+        ({"material.thickness": "2 s"}, "material.thickness: found '2 s'"),
+        ({"material.base": "glued"}, "material.base: found 'glued': expected 'bonded' or 'slipping'"),
+        ({"material.poisson": -0.2}, "material.thickness: Poisson's ratio of a sheet is -0.2: expected 0 to 1/2"),
+        ({"material.bulk_modulus": "2 GPa"}, "Poisson ratio changes in time: expected one body"),
+    ],
+)
+def test_study__refuses(case, change, message):
+    with pytest.raises(rv.InputError, match=message):
+        vary(case, change)
+
+
+def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path):
+    thickness, load = 2e-4 / 51 / 15, rv.Program().load(1e-3, over=0)
+    message = r"thickness is 2.61438e-07 m and a cell is 1.33333e-05 m long, 51 times .* expected cells of at most 50"
+    ball = rv.sphere(RADIUS, 2e-4, (15, 16))
+    with pytest.raises(rv.InputError, match=message):
+        pressed(ball, rv.elastic(1e6), load, thickness=thickness)
+    assert float(pressed(ball, rv.elastic(1e6), load, thickness=thickness, boundary="periodic").force[0]) > 0
+    study = tmp_path / "gel.toml"
+    text = STUDY.replace('"0.1 mm"', f"{thickness}").replace('"0.3 mm"', '"0.2 mm"').replace("[24, 21]", "[15, 16]")
+    study.write_text(text)
+    for verb in (["plan"], ["run", "--out", str(tmp_path / "out"), "--no-plots"]):
+        done = CliRunner().invoke(main, [*verb, str(study)])
+        assert done.exit_code == 2, done.output
+        assert "51 times the thickness" in " ".join((done.output + done.stderr).split())
+    assert not list(tmp_path.glob("out/*.nc"))
+
+
+def test_study__refuses_a_base_without_thickness_and_sheets_in_a_pair(tmp_path):
+    study = tmp_path / "s.toml"
+    study.write_text(STUDY.replace('thickness = "0.1 mm"\n', ""))
+    done = CliRunner().invoke(main, ["run", str(study)])
+    assert done.exit_code == 2
+    assert "material.base: base is 'slipping' without a thickness: expected both, or neither" in done.stderr
+    body = '{ model = "elastic", shear_modulus = "1 MPa"%s }'
+    pair = 'model = "pair"\na = ' + body + "\nb = " + body
+    start, end = STUDY.index('model = "zener"'), STUDY.index("[[program]]")
+    for one, other, below, message in (
+        (', thickness = "1 mm"', "", "", "material.a: found a thickness: expected none"),
+        ("", "", '\nthickness = "1 mm"', "the material is a pair of bodies: expected one body"),
+    ):
+        study.write_text(STUDY[:start] + pair % (one, other) + below + "\n" + STUDY[end:])
+        with pytest.raises(rv.InputError, match=message):
+            read_cases(study)
+
+
+def test_python__refuses(case):
+    load = rv.Program().load(1e-3, over=0)
+    thick = rv.Body(rv.elastic(1e6), Sheet(1.0))
+    with pytest.raises(rv.InputError, match="material is a Body: expected one of roughvisc's materials"):
+        pressed(case.height(), thick, load)
+    with pytest.raises(rv.InputError, match=r"material is the body Body.*: expected a material"):
+        rv.Body(thick, Sheet(1.0))
+    with pytest.raises(rv.InputError, match="kernel is a float: expected a Kernel; it has no influence"):
+        rv.Body(rv.elastic(1e6), 1e-4)
+    for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.PowerLaw(1e-7, 1e-6, 0.3), rv.elastic(1e9))):
+        with pytest.raises(rv.InputError, match="a pair of bodies"):
+            pressed(case.height(), two, load)
+    with pytest.raises(rv.InputError, match="changes in time"):
+        pressed(case.height(), rv.zener(1e6, 1e6, 1e5, bulk_modulus=1e9), load)
+
+
+@pytest.mark.parametrize(
+    ("former", "told"),
+    [
+        ({"thickness": 1e-3}, r"rv\.sheet\(material, thickness, base\)"),
+        ({"base": "bonded"}, r"rv\.sheet\(material, thickness, base\)"),
+        ({"kernel": Sheet(1.0)}, r"rv\.Body\(material, kernel\)"),
+    ],
+)
+def test_former_arguments__are_refused_with_what_to_write_in_their_place(former, told):
+    (name,) = former
+    message = f"^{name} is no argument of {{}} any more: give a body in place of the material: {told}$"
+    with pytest.raises(rv.InputError, match=message.format("simulate")):
+        rv.simulate(WAVY, rv.elastic(1e6), rv.Program().load(1e-3, over=0), **former)
+    with pytest.raises(rv.InputError, match=message.format("friction")):
+        rv.friction(WAVY, rv.elastic(1e6), pressure=1e3, speeds=1e-3, **former)

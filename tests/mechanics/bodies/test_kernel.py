@@ -1,0 +1,86 @@
+"""Influence of one cell: full precision at any distance, positive symbols."""
+
+import math
+import pickle
+
+import mpmath
+import numpy as np
+import pytest
+from support import direct
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.bodies.love import HALF_SPACE, Love, love_kernel
+
+
+def love_exact(x, y, dx, dy):
+    """Love's closed form in 50 digits."""
+    with mpmath.workdps(50):
+        total = mpmath.mpf(0)
+        for sx in (1, -1):
+            for sy in (1, -1):
+                a, b = mpmath.mpf(x) + sx * mpmath.mpf(dx) / 2, mpmath.mpf(y) + sy * mpmath.mpf(dy) / 2
+                total += sx * sy * (a * mpmath.asinh(b / abs(a)) + b * mpmath.asinh(a / abs(b)))
+        return float(total / mpmath.pi)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "error"), [((1.0, 1.0), 1e-14), ((3.0, 0.75), 2e-14), ((1.0, 16.0), 2e-13)], ids=["1", "4", "16"]
+)
+def test_love_kernel__is_exact_at_any_distance(spacing, error):
+    kernel = love_kernel((801, 301), spacing)
+    rng = np.random.default_rng(3)
+    cells = [(0, 0), (0, 1), (1, 0), (4, 0), (0, 5), (17, 1), (41, 3), (200, 1), (800, 300)]
+    cells += [(int(i), int(j)) for i, j in rng.integers(0, (801, 301), (30, 2))]
+    for i, j in cells:
+        exact = love_exact(i * spacing[0], j * spacing[1], *spacing)
+        assert kernel[i, j] == pytest.approx(exact, rel=error)
+
+
+def test_love_kernel__scales_with_length():
+    assert love_kernel((7, 5), (2e-9, 3e-9)) == pytest.approx(1e-9 * love_kernel((7, 5), (2.0, 3.0)), rel=1e-14)
+
+
+@pytest.mark.parametrize("aspect", [1, 4, 16])
+def test_free_space_symbol__is_positive(aspect):
+    symbol = free_space_symbol(HALF_SPACE, (64, 48), (1.0, float(aspect)))
+    assert symbol.min() > 0.5  # of the short side; zero at the middle offset would make it negative
+
+
+def test_periodic_symbol__is_two_over_the_wave_number():
+    symbol = periodic_symbol(HALF_SPACE, (9, 6), (0.5, 0.25))
+    assert symbol[2, 1] == pytest.approx(2 / math.hypot(2 * 2 * math.pi / 4.5, 2 * math.pi / 1.5), rel=1e-14)
+    assert symbol[0, 0] == 0
+
+
+@pytest.mark.parametrize(("shape", "spacing"), [((0, 3), (1, 1)), ((3, 3), (0, 1)), ((3, 3), (1, math.nan))])
+def test_kernels__refuse_impossible_grids(shape, spacing):
+    with pytest.raises(InputError, match="expected two positive"):
+        love_kernel(shape, spacing)
+    with pytest.raises(InputError, match="expected two positive"):
+        periodic_symbol(HALF_SPACE, shape, spacing)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 4)])
+def test_under_rectangle__sums_the_influence_of_all_cells(shape):
+    spacing, (nx, ny) = (1.3, 0.7), shape
+    before = (np.arange(nx), np.arange(ny))
+    after = (nx - 1 - before[0], ny - 1 - before[1])
+    expected = direct(np.ones(shape), spacing)
+    assert Kernel.under_rectangle(HALF_SPACE, before, after, spacing) == pytest.approx(expected, rel=1e-14)
+    assert HALF_SPACE.under_rectangle(before, after, spacing) == pytest.approx(expected, rel=1e-14)
+
+
+def test_half_space__is_a_value():
+    assert Love() == HALF_SPACE
+    assert pickle.loads(pickle.dumps(HALF_SPACE)) == HALF_SPACE
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
+def test_periodic_symbol__refuses_a_transfer_function_that_is_not_positive(value):
+    class Wrong(Love):
+        def transfer(self, qx, qy):
+            return np.where(np.hypot(qx, qy) > 3, value, super().transfer(qx, qy))
+
+    with pytest.raises(InputError, match=r"transfer function of .* expected a positive number"):
+        periodic_symbol(Wrong(), (8, 9), (1.0, 1.0))

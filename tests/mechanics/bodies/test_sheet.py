@@ -1,0 +1,204 @@
+"""The kernel of a sheet on a rigid base: against plane-strain elasticity, and at its limits."""
+
+import math
+import pickle
+
+import mpmath
+import numpy as np
+import pytest
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies import sheet as sheet_module
+from roughvisc.mechanics.bodies.kernel import free_space_symbol, has_finite_mean, periodic_symbol
+from roughvisc.mechanics.bodies.love import love_kernel
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.sheet import Sheet, complement, reduction
+from roughvisc.mechanics.closed_forms import OnSheet, Paraboloid
+from roughvisc.mechanics.contact import solve_contact
+
+BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
+
+
+def wave_on_sheet(x, poisson, base):
+    """``S`` from the equations of plane strain: Airy's function ``f(z) cos(q x)``, four constants, four conditions.
+
+    With ``q = 1`` and the thickness `x`: stresses ``-f, f', f''``, displacements along the sheet
+    ``(1 - nu) f'' + nu f`` and through it ``(1 - nu) f''' - (2 - nu) f'``, over twice the shear modulus.
+    """
+    with mpmath.workdps(60):
+        nu, h, z = mpmath.mpf(poisson), mpmath.mpf(x), mpmath.mpf(0)
+
+        def derivatives(z):
+            """Of f = e^-z, z e^-z, e^z, z e^z: rows f, f', f'', f'''."""
+            down, up = mpmath.exp(-z), mpmath.exp(z)
+            return [[(-1) ** n * down, (-1) ** n * (z - n) * down, up, (z + n) * up] for n in range(4)]
+
+        top, bottom = derivatives(z), derivatives(h)
+
+        def along(d):
+            return [(1 - nu) * d[2][i] + nu * d[0][i] for i in range(4)]
+
+        def through(d):
+            return [(1 - nu) * d[3][i] - (2 - nu) * d[1][i] for i in range(4)]
+
+        conditions = mpmath.matrix([top[0], top[1], through(bottom), along(bottom) if base == "bonded" else bottom[1]])
+        constants = mpmath.lu_solve(conditions, mpmath.matrix([1, 0, 0, 0]))
+        sinks = sum(a * b for a, b in zip(through(top), constants, strict=True)) / 2  # over p / G
+        return float(sinks / (1 - nu)), sinks / (1 - nu)  # a half-space: u = (1 - nu) p / (G q)
+
+
+@pytest.mark.parametrize(("base", "poisson"), [*BODIES, ("bonded", 0.4999999)])
+@pytest.mark.parametrize("x", [1e-5, 1e-3, 0.0999, 0.499, 0.501, 1.0, 4.0, 15.0])
+def test_reduction__is_that_of_plane_strain(base, poisson, x):
+    exact, digits = wave_on_sheet(x, poisson, base)
+    assert float(reduction(x, poisson, base)) == pytest.approx(exact, rel=2e-13)
+    assert float(complement(x, poisson, base)) == pytest.approx(float(1 - digits), rel=2e-13)
+
+
+@pytest.mark.parametrize(("base", "poisson"), BODIES)
+def test_transfer__of_long_waves_tends_to_uniform_pressure(base, poisson):
+    sheet = Sheet(2e-3, poisson, base)
+    uniform = float(sheet.transfer(0.0, 0.0))
+    assert has_finite_mean(sheet) == (uniform > 0)
+    # in one dimension: M = 2 G (1 - nu) / (1 - 2 nu) between plates that hold the sheet; plane strain if it may slip
+    expected = 2e-3 * ((1 - 2 * poisson) / (1 - poisson) ** 2 if base == "bonded" else 1.0)
+    assert uniform == pytest.approx(expected, abs=1e-18)
+    assert float(sheet.transfer(1e-3, 0.0)) == pytest.approx(expected, rel=1e-5, abs=1e-12)
+    short = 40 / 2e-3
+    assert float(sheet.transfer(0.0, short)) == pytest.approx(2 / short, rel=1e-14)
+
+
+@pytest.mark.parametrize(("base", "poisson"), BODIES)
+@pytest.mark.parametrize("sides", [(0.03, 0.05), (0.14, 0.1), (0.5, 0.3)], ids=str)
+def test_influence__of_a_short_cell_is_that_of_its_parts(base, poisson, sides):
+    """The mean over a cell is taken with enough points, up to half of the thickness."""
+    sheet, (dx, dy) = Sheet(1.0, poisson, base), sides
+    whole = sheet.influence((4, 3), sides)
+    parts = sheet.influence((14, 11), (dx / 3, dy / 3))
+    for i, j in ((0, 0), (1, 0), (2, 1), (3, 2)):
+        of_parts = sum(parts[abs(3 * i + a), abs(3 * j + b)] for a in (-1, 0, 1) for b in (-1, 0, 1))
+        assert whole[i, j] == pytest.approx(of_parts, abs=1e-12 * whole[0, 0] + 1e-13)
+
+
+@pytest.mark.parametrize(("base", "poisson"), BODIES)
+def test_influence__adds_up_to_uniform_pressure(base, poisson):
+    """Under pressure everywhere: the sum over cells is exact, whatever their size."""
+    for sides in ((0.4, 0.3), (1.7, 2.1), (0.3, 21.0), (50.0, 40.0)):
+        reach = [math.ceil(50 / side) + 3 for side in sides]
+        influence = Sheet(1.0, poisson, base).influence(tuple(reach), sides)
+        influence[1:] *= 2
+        influence[:, 1:] *= 2
+        assert influence.sum() == pytest.approx(float(Sheet(1.0, poisson, base).transfer(0.0, 0.0)), abs=2e-8)
+
+
+@pytest.mark.parametrize(("base", "poisson"), BODIES)
+@pytest.mark.parametrize(
+    "side", [0.4, 1.0, 50.0, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0.51, 0.8, 2.0, 4.0, 16.0, 400.0))]
+)
+def test_influence__answers_long_waves_as_plane_strain_does(base, poisson, side):
+    """On cells of any length, also where the wave is thousands of thicknesses long and the sheet almost rigid to it."""
+    sides, q = (side, 0.8 * side), 2 * math.pi / (24 * side)
+    reach = [math.ceil(50 / length) + 3 for length in sides]
+    influence = Sheet(1.0, poisson, base).influence(tuple(reach), sides)
+    influence[1:] *= 2
+    influence[:, 1:] *= 2
+    answer = float(influence.sum(axis=1) @ np.cos(q * side * np.arange(reach[0])))
+    assert answer == pytest.approx(2 / q * wave_on_sheet(q, poisson, base)[0], rel=5e-3)
+
+
+@pytest.mark.parametrize("ratio", [0.51, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 50.0])
+def test_ball_on_an_incompressible_sheet__agrees_with_the_integral_equation_on_long_cells(ratio):
+    """Thin sheets tend to lubrication theory, ``F = pi E* a^6 / 128 h^3 R`` and ``d = a^2 / 4 R``.
+
+    The series in ``h/a`` from there is that of the integral equation at radii of 8 to 20 thicknesses.
+    """
+    sheet, a, radii = Sheet(1.0), 8.3 * ratio, np.array([8.0, 11.0, 15.0, 20.0])
+    contact = OnSheet(Paraboloid(1.0), sheet)
+
+    def of(values, lubricated):
+        powers = np.vander(1 / radii, 5, increasing=True)[:, 1:]
+        series = np.linalg.solve(powers, values(radii) / lubricated(radii) - 1)
+        return lubricated(a) * (1 + float(series @ (1 / a) ** np.arange(1, 5)))
+
+    if a < 10:
+        force, approach = float(contact.scaled_force(a)), float(contact.reduced(a))
+    else:
+        force = of(contact.scaled_force, lambda a: math.pi * a**6 / 128)
+        approach = of(contact.reduced, lambda a: a**2 / 4)
+    x, y = (ratio * (np.arange(n) - (n - 1) / 2) for n in (23, 25))
+    body = HalfSpace((23, 25), (ratio, ratio), kernel=sheet)
+    found = solve_contact(body, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
+    assert found.converged
+    assert found.approach == pytest.approx(approach, rel=3e-3)
+    periodic = HalfSpace((23, 25), (ratio, ratio), "periodic", kernel=sheet)
+    same = solve_contact(periodic, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
+    if ratio > 4:  # waves as long as the grid hardly move it, and its images are not felt
+        assert found.approach == pytest.approx(same.approach, rel=3e-3)
+
+
+def test_influence__costs_the_same_on_cells_of_any_length(monkeypatch):
+    """So many evaluations of the factor S at most; on cells of 200 thicknesses the sum over points took 10^6."""
+    asked = []
+    monkeypatch.setattr(sheet_module, "reduction", lambda x, *body: asked.append(x.size) or reduction(x, *body))
+    for ratio in (1.0, 50.0, 400.0):
+        Sheet(1.0).influence((257, 257), (ratio, ratio))
+    assert len({*asked}) == 1
+    assert sum(asked) < 1e6
+
+
+def test_check_cells__refuses_more_than_fifty_thicknesses():
+    Sheet(1e-6).check_cells((5e-5, 2e-5))
+    with pytest.raises(InputError, match=r"thickness is 1e-06 m and a cell is 5.1e-05 m long, 51 times .* at most 50"):
+        Sheet(1e-6).check_cells((2e-5, 5.1e-5))
+
+
+@pytest.mark.parametrize(("base", "coefficient"), [("bonded", 1.7702), ("slipping", 1.16758)])
+def test_influence__near_the_load_on_a_thick_sheet_is_the_half_space_less_a_constant(base, coefficient):
+    """At a Poisson's ratio of a half; first order in distance over thickness."""
+    sides, area = (1e-3, 0.8e-3), 0.8e-6
+    less = love_kernel((5, 6), sides) - Sheet(10.0, 0.5, base).influence((5, 6), sides)
+    np.testing.assert_allclose(less, area * coefficient / (math.pi * 10.0), rtol=2e-5)
+    assert Sheet(10.0, 0.5, base).relief == pytest.approx(coefficient / (10 * math.pi), rel=2e-5)
+
+
+@pytest.mark.parametrize(("base", "poisson"), BODIES)
+@pytest.mark.parametrize("side", [0.03, 0.5, 3.0, 50.0])
+def test_symbols__are_positive(base, poisson, side):
+    sheet = Sheet(1.0, poisson, base)
+    free = free_space_symbol(sheet, (60, 54), (side, 0.9 * side))
+    assert free.min() >= -1e-12 * free.max()
+    symbol = periodic_symbol(sheet, (31, 24), (side, 0.9 * side))
+    assert (symbol.ravel()[1:] > 0).all()
+
+
+def test_influence__of_any_thickness_and_length_unit_is_the_same():
+    metres, microns = Sheet(3e-4, 0.4).influence((9, 7), (1e-4, 2e-4)), Sheet(300.0, 0.4).influence((9, 7), (100, 200))
+    np.testing.assert_allclose(metres * 1e6, microns, rtol=1e-12, atol=1e-12 * microns.max())
+
+
+def test_influence__of_a_slipping_sheet_does_not_depend_on_poisson():
+    one, other = (Sheet(1.0, nu, "slipping").influence((5, 4), (0.3, 0.2)) for nu in (0.1, 0.5))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_sheet__is_a_value_that_travels():
+    sheet = Sheet(1e-3, 0.45, "slipping")
+    assert pickle.loads(pickle.dumps(sheet)) == sheet == Sheet(1e-3, 0.45, "slipping")
+    assert hash(sheet) == hash(Sheet(1e-3, 0.45, "slipping")) != hash(Sheet(1e-3, 0.45))
+    assert sheet.described() == {"thickness": 1e-3, "base": "slipping"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.0,), "thickness is 0.0: expected a positive number"),
+        ((math.nan,), "thickness is nan"),
+        ((math.inf,), "thickness is inf"),
+        (("1 mm",), "thickness is '1 mm'"),
+        ((1.0, -0.1), "Poisson's ratio of a sheet is -0.1: expected 0 to 1/2"),
+        ((1.0, 0.5, "glued"), "base is 'glued': expected 'bonded' or 'slipping'"),
+    ],
+)
+def test_sheet__refuses(arguments, message):
+    with pytest.raises(InputError, match=message):
+        Sheet(*arguments)

@@ -1,0 +1,223 @@
+"""How a contact is computed, as one value: its defaults, what it refuses, and that all its doors agree."""
+
+import inspect
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.hereditary.choice import Kind
+from roughvisc.settings import WORDS, Settings
+from roughvisc.study.statement.case import Case, read_study, vary
+from roughvisc.study.statement.schema import study_schema
+from roughvisc.study.statement.schema.conditioning import Conditioned
+from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
+from roughvisc.study.trade.ladder import Setting
+from roughvisc.variables import FIELDS
+
+USUAL = {
+    "boundary": "free",
+    "tolerance": 1e-3,
+    "time_step": "auto",
+    "times": None,
+    "fields": ("pressure", "gap"),
+    "method": "fast",
+    "missing": "refuse",
+    "edge": "error",
+    "memory": "auto",
+    "grid_error": False,
+}
+
+
+def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
+    assert {one.name: getattr(Settings(), one.name) for one in fields(Settings)} == USUAL
+    signature = inspect.signature(rv.simulate).parameters
+    given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
+    assert given == USUAL | {"threads": None, "progress": True}
+    solve, keep = SolveSection(), KeepSection()
+    assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
+    assert (keep.fields, keep.times) == (USUAL["fields"], "all")
+    assert Conditioned().missing == USUAL["missing"]
+    stated = {*dict(solve), "fields", "times", "missing"}
+    assert stated == set(USUAL)
+    assert all(getattr(Setting(), name) == USUAL[name] for name in ("tolerance", "method", "memory"))
+
+
+def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
+    assert WORDS["memory"] == get_args(Kind)
+    properties = study_schema()["$defs"]["SolveSection"]["properties"]
+    stated = {name: tuple(one["enum"]) for name, one in properties.items() if "enum" in one}
+    assert stated == {name: words for name, words in WORDS.items() if name != "missing"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"boundary": "open"}, "boundary is 'open': expected 'free' or 'periodic'"),
+        ({"method": "slow"}, "method is 'slow': expected 'fast' or 'seed'"),
+        ({"missing": None}, "missing is None: expected 'refuse' or 'absent'"),
+        ({"edge": "wrap"}, "edge is 'wrap': expected 'error' or 'accept'"),
+        ({"memory": "none"}, "memory is 'none': expected 'auto' or 'direct'"),
+        ({"tolerance": 1}, "tolerance is 1: expected a number at least 1e-12 and below 1"),
+        ({"tolerance": "1e-3"}, "tolerance is '1e-3': expected a number at least 1e-12 and below 1"),
+        ({"tolerance": float("nan")}, "tolerance is nan: expected a number at least 1e-12 and below 1"),
+        ({"time_step": 0}, "time_step is 0: expected 'auto' or a time above 0 [s]"),
+        ({"time_step": float("inf")}, "time_step is inf: expected 'auto' or a time above 0 [s]"),
+        ({"time_step": "10 ms"}, "time_step is '10 ms': expected 'auto' or a time above 0 [s]"),
+        ({"times": 0}, "times is 0: expected a positive count, a list, or None; at most 1000000 times"),
+        ({"times": "all"}, "times is 'all': expected a positive count, a list, or None"),
+        ({"times": [0.1, "soon"]}, "times is [0.1, 'soon']: expected a positive count, a list, or None"),
+        ({"fields": None}, "fields is None: expected some of pressure, gap, displacement"),
+        ({"fields": ("gap", "stress")}, "fields holds 'stress': expected some of pressure, gap, displacement"),
+    ],
+)
+def test_settings__refuse_with_what_was_found_and_what_was_expected(wrong, message):
+    with pytest.raises(InputError) as caught:
+        Settings(**wrong)
+    assert str(caught.value) == message
+
+
+def test_settings__are_one_frozen_value():
+    one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step=1)
+    assert one == Settings(times=(0.25, 0.5), fields=("gap",), time_step=1.0)
+    assert len({one, Settings(times=[0.25, 0.5], fields=iter(["gap"]), time_step=1.0)}) == 1
+    with pytest.raises(FrozenInstanceError):
+        one.tolerance = 0.1
+
+
+BALL = """
+[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.2 mm"
+shape = [9, 8]
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+load = "0.1 mN"
+over = 0
+[solve]
+"""
+
+STUDY = Case.from_json(
+    json.dumps(
+        {
+            "surface": {"generate": "sphere", "radius": 1e-2, "size": 1e-3, "shape": 24},
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "program": [{"load": 1e-3, "over": 1.0}],
+        }
+    )
+)
+TABLES = {"fields": "keep", "times": "keep", "missing": "surface"}
+
+
+def decimal(least, most):
+    """Numbers of fifteen digits, as a study file has them."""
+    return st.floats(least, most).map(lambda value: float(f"{value:.15g}"))
+
+
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            **{name: st.sampled_from(words) for name, words in WORDS.items()},
+            "tolerance": decimal(1e-9, 0.5),
+            "time_step": st.one_of(st.just("auto"), decimal(1e-6, 1.0)),
+            "times": st.one_of(st.none(), st.integers(1, 9), st.lists(decimal(0.0, 1.0), min_size=1)),
+            "fields": st.lists(st.sampled_from(FIELDS), unique=True),
+            "grid_error": st.booleans(),
+        },
+    )
+)
+def test_study__states_the_settings_that_the_solver_gets(chosen):
+    wanted = Settings(**chosen)
+    written = chosen | ({"times": "all"} if wanted.times is None else {})
+    case = vary(STUDY, {f"{TABLES.get(name, 'solve')}.{name}": value for name, value in written.items()})
+    kept = tuple(name for name in FIELDS if name in wanted.fields)
+    assert case.solving() == Settings(**{**vars(wanted), "fields": kept})
+
+
+#: What a new setting touches: its entry, the signature that takes it, and where it is used.
+NEW_SETTING = {
+    "settings.py": (
+        "    def __post_init__(self) -> None:\n        for name, entry",
+        "    patience: float = setting(\n"
+        '        2.0, "how long to wait", \'"3 s"\', bounds={"least": 1}, noun="a time", unit="s",\n'
+        '        in_attributes=True, only_over="time",\n    )\n\n',
+    ),
+    "api.py": (
+        '    threads: int | None = None,\n    progress: bool | Progress = True,\n) -> xr.Dataset:\n    """Press',
+        "    patience: float = Settings.patience,\n",
+    ),
+    "experiment/notes.py": ("def accuracy_note(", "PATIENCE = Settings.patience\n\n\n"),
+}
+HANDED_ON = ('    )\n    problem = Problem(checked(height, "simulate"', "        patience=patience,\n")
+
+USED = """
+import sys, tomllib
+from pathlib import Path
+import roughvisc as rv
+from roughvisc.study.statement.case import read_study
+from roughvisc.study.statement.schema.meanings import meaning
+
+def refused(call):
+    try:
+        call()
+    except rv.InputError as error:
+        return str(error)
+
+path = Path(sys.argv[1])
+text = path.read_text()
+plain = read_study(path)
+path.write_text(text + 'patience = "3 s"\\n')
+patient = read_study(path)
+assert plain.solving().patience == 2.0 and patient.solving().patience == 3.0
+assert len({plain.key, patient.key}) == 2
+path.write_text(text + "patience = 2\\n")
+assert read_study(path).key == plain.key == sys.argv[2], "the keys of former cases stay"
+path.write_text(text + "patience = 0.5\\n")
+told = refused(lambda: read_study(path))
+wanted = "expected a number in s, or a string with a unit of its kind, at least 1"
+assert told.endswith(f"solve.patience: found 0.5: {wanted}"), told
+about = rv.study_schema()["$defs"]["SolveSection"]["properties"]["patience"]["description"]
+assert about.startswith("how long to wait; a number in s") and meaning(["solve"], "patience")[1] == '"3 s"'
+friction = '[friction]\\nspeeds = [1]\\nload = 1\\n[solve]\\nboundary = "periodic"\\npatience = 3\\n'
+path.write_text(text.split("[[program]]")[0] + friction)
+assert "patience: found 3.0: steady sliding has none" in refused(lambda: read_study(path))
+ball, press = rv.sphere(1e-3, 2e-4, (9, 8)), rv.Program().load(1e-4, over=0)
+found = rv.simulate(ball, rv.elastic(1e6), press, patience=4, progress=False)
+assert found.attrs["patience"] == 4.0
+told = refused(lambda: rv.simulate(ball, rv.elastic(1e6), press, patience=0))
+assert told == "patience is 0: expected a time at least 1 [s]", told
+"""
+
+
+def test_new_setting__touches_three_files(tmp_path):
+    """Study file, key, schema, page of keys, refusals and checks follow from its entry."""
+    shutil.copytree(Path(rv.__file__).parent, tmp_path / "roughvisc", ignore=shutil.ignore_patterns("__pycache__"))
+    for name, (before, added) in NEW_SETTING.items():
+        path = tmp_path / "roughvisc" / name
+        text = path.read_text()
+        assert text.count(before) == 1
+        path.write_text(text.replace(before, added + before))
+    path = tmp_path / "roughvisc" / "api.py"
+    assert path.read_text().count(HANDED_ON[0]) == 1
+    path.write_text(path.read_text().replace(HANDED_ON[0], HANDED_ON[1] + HANDED_ON[0]))
+    study = tmp_path / "ball.toml"
+    study.write_text(BALL)
+    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, "-c", USED, str(study), read_study(study).key]
+    done = subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
