@@ -13,8 +13,7 @@ from roughvisc.groups import root_of
 from roughvisc.mechanics.bodies.body import Body, body_of
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.slide import Direction
+from roughvisc.mechanics.stepping.program import Direction, Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.solve import solve

@@ -33,19 +33,18 @@ ROOMS = {
     "contact": (("mechanics/contact",), ("mechanics/contact", "mechanics/test_contact.py")),
     "stepping": (
         tuple(f"mechanics/stepping/{name}.py" for name in (
-            "apart", "attempt", "companion", "control", "domain", "energy", "events", "fading", "march", "pace",
-            "scene",
+            "companion", "controller", "energy", "events", "march", "scene", "step",
         )),
         ("mechanics/stepping", "study/storage/test_checkpoint.py", "test_convergence.py"),
     ),
     "hereditary": (("mechanics/hereditary",), ("mechanics/hereditary", "mechanics/stepping/test_march.py")),
     "halfspace": (("mechanics/bodies",), ("mechanics/bodies",)),
     "rows": (
-        ("experiment/rows.py",),
+        ("experiment/loading.py", "experiment/stated.py"),
         tuple(f"experiment/test_{name}.py" for name in ("kept_rows", "rows", "perimeter", "simulate")),
     ),
     "grid_error": (
-        ("experiment/grid_error.py", "experiment/grid_convergence.py"),
+        ("experiment/grid_error.py",),
         ("experiment/test_grid_error.py",),
     ),
     "checkpoint": (("study/storage/checkpoint.py",), ("study/storage/test_checkpoint.py",)),
@@ -89,7 +88,7 @@ TUNING = {
     "_ROW_POINTS": "halfspace: what is transformed together",
     "_SHORT": "halfspace: what is transformed together",
     "_LINE": "halfspace: where rows begin",
-    "_THREADED": "fields: cells from which threads pay",
+    "_THREADED": "arrays: cells from which threads pay",
     "_SMALLEST": "halfspace: smallest window",
     "_LARGEST": "halfspace: part of the domain from which a window does not pay",
     "_CALIBRATION": "estimate: seconds for timing solves",

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import roughvisc as rv
 from roughvisc.groups import whole_of
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.love import love_kernel
+from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene

@@ -14,10 +14,15 @@ PACKAGE = ROOT / "roughvisc"
 #: room -> rooms it may import from (its own is implied). A room is a sub-package, or a folder or file that has none.
 _LABELS = {"errors", "groups", "labels", "notebook", "units", "variables"}
 _BODY = {"mechanics.bodies", "mechanics.materials"}
-_MARCH = {*_BODY, "mechanics.contact", "mechanics.fields", "mechanics.hereditary", "mechanics.stepping"}
+_ARRAYS = {"mechanics.arrays", "mechanics.sparse"}
+_MARCH = {*_BODY, *_ARRAYS, "mechanics.contact", "mechanics.hereditary", "mechanics.stepping"}
 _PROBLEM = {*_LABELS, *_BODY, "topography", "settings"}
 _EXPERIMENT = {*_PROBLEM, *_MARCH, "mechanics.sliding", "problem", "recorder"}
-_SOLVE = {*_EXPERIMENT, "experiment", "progress", "result"}
+_SOLVE = {
+    *_EXPERIMENT,
+    "experiment",
+    "progress",
+}
 _STATEMENT = {*_PROBLEM, "mechanics.stepping", "experiment"}
 _STORAGE = {*_STATEMENT, *_MARCH, "recorder", "study.statement"}
 _EXECUTION = {*_SOLVE, *_STORAGE, "solve", "study.storage"}
@@ -33,10 +38,11 @@ ALLOWED = {
     "notebook": set(),
     "progress": {"errors"},
     "mechanics.materials": {"errors", "notebook", "units"},
-    "mechanics.fields": set(),
-    "mechanics.bodies": {"errors", "mechanics.fields", "mechanics.materials"},
-    "mechanics.contact": {"errors", "mechanics.fields", "mechanics.bodies"},
-    "mechanics.hereditary": {"errors", "mechanics.fields", "mechanics.materials"},
+    "mechanics.arrays": set(),
+    "mechanics.sparse": {"mechanics.arrays"},
+    "mechanics.bodies": {*_ARRAYS, "errors", "mechanics.materials"},
+    "mechanics.contact": {*_ARRAYS, "errors", "mechanics.bodies"},
+    "mechanics.hereditary": {*_ARRAYS, "errors", "mechanics.materials"},
     "mechanics.stepping": {*_MARCH, "errors", "notebook", "units"} - {"mechanics.stepping"},
     "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.bodies"},
     "mechanics.transport": {"errors", "mechanics.contact", "mechanics.bodies"},
@@ -46,7 +52,6 @@ ALLOWED = {
     "problem": _PROBLEM,
     "recorder": {"mechanics.bodies"},
     "experiment": _EXPERIMENT,
-    "result": {*_EXPERIMENT, "experiment"},
     "solve": _SOLVE,
     "study.statement": _STATEMENT,
     "study.storage": _STORAGE,

@@ -13,36 +13,40 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.experiment.footprint import march_bytes
-from roughvisc.experiment.friction_rows import friction_row
-from roughvisc.experiment.mirror import quarter, unfold
-from roughvisc.experiment.notes import accuracy_note, body_note, border_note, edge_note, left_out, slope_note
-from roughvisc.experiment.profile import Profile, uses_window
+from roughvisc.experiment.notes import (
+    accuracy_note,
+    body_note,
+    border_note,
+    contact_stands_alone,
+    creep_left,
+    edge_note,
+    left_out,
+    slope_note,
+    surface_stands_alone,
+    wake_note,
+)
+from roughvisc.experiment.profile import Profile, quarter, unfold, uses_window
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.refusal import least_rows, require_memory
-from roughvisc.experiment.scene import build_scene, memory_options
-from roughvisc.experiment.slides import slide_note
+from roughvisc.experiment.resources import march_bytes
+from roughvisc.experiment.scene import build_scene, memory_options, slide_note
 from roughvisc.experiment.stated import area_columns, error_columns, is_end_value, meets_tolerance
-from roughvisc.experiment.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
+from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.contact.neighbours import staircase
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.sparse import Sparse
-from roughvisc.mechanics.fields.threads import is_wide
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.stepping.domain import at_border
+from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.pace import ControllerState
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Trajectory
+from roughvisc.mechanics.stepping.program import Program, Slid
+from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, State, Step, Trajectory, Uncertainty
 from roughvisc.mechanics.stepping.seed import march_seed
-from roughvisc.mechanics.stepping.slide import Slid
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.stepping.step import at_border, segment_number
+from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
@@ -50,9 +54,30 @@ from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
+
+def friction_row(step: Step) -> dict[str, float]:
+    """Distance, forces and work of an accepted step; empty for a program without slides."""
+    scene, state = step.scene, step.state
+    if not scene.motions:
+        return {}
+    slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
+    pressure, force = step.shown.pressure, step.shown.force
+    friction = tangential_force(scene.halfspace, pressure, step.displacement, slide)
+    return {
+        "sliding_distance": slid.distance,
+        "friction_force": friction,
+        "friction_coefficient": friction / force if force > 0 else math.nan,
+        "friction_force_across": force_across(scene.halfspace, pressure, step.displacement, slide),
+        "friction_force_error": step.uncertainty.friction,
+        "friction_work": slid.work,
+    }
+
+
 log = logging.getLogger("roughvisc")
 
+
 Array = NDArray[np.float64]
+
 
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
@@ -418,7 +443,7 @@ class LoadingRows(Rows):
         def fill(rows: slice) -> None:
             found[rows] = self._gap(step, contact, rows)
 
-        passes.of_rows(fill, contact.shape, step.scene.halfspace.threads)
+        over_rows(fill, contact.shape, step.scene.halfspace.threads)
         return found
 
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
@@ -435,7 +460,7 @@ class LoadingRows(Rows):
         def total(rows: slice) -> float:
             return float(np.sum(self._gap(step, contact, rows), where=present[rows]))
 
-        gaps = passes.of_rows(total, contact.shape, step.scene.halfspace.threads)
+        gaps = over_rows(total, contact.shape, step.scene.halfspace.threads)
         return sum(gaps) / np.count_nonzero(present)
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:

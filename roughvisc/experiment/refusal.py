@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import TooLargeError
-from roughvisc.experiment.available import Available, memory_available
-from roughvisc.experiment.footprint import curve_bytes, march_bytes
-from roughvisc.experiment.mirror import is_mirrored
-from roughvisc.experiment.profile import uses_window
+from roughvisc.experiment.profile import is_mirrored, uses_window
+from roughvisc.experiment.resources import Available, curve_bytes, march_bytes, memory_available
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.materials.models import Material

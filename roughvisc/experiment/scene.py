@@ -4,26 +4,280 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.representable import check_loads, check_times
-from roughvisc.experiment.slides import check_slides, snap_to_cells
 from roughvisc.mechanics.bodies.kernel import has_finite_mean
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import ActsOn
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.stepping.control import SMALLEST_STEP
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.controller import SMALLEST_STEP
+from roughvisc.mechanics.stepping.program import Program, Segment, instant
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Settings
+from roughvisc.units import said
+
+#: Times that differ by less, in lengths of the program, are one.
+_ROUNDING = 1e-12
+
+
+#: In a hold the first of them lies no later than this part of it. [-]
+_FIRST = 1e-3
+
+
+Array = NDArray[np.float64]
+
+
+def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Times to keep, ascending, snapped to the program's corners; those that differ by rounding alone are one. [s]
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    times : int, sequence of float or None
+        A count, see :func:`spread_times`; a list; None for every accepted step.
+
+    Raises
+    ------
+    InputError
+        If a time lies outside the program.
+    """
+    if times is None:
+        return None
+    duration = program.duration
+    listed = spread_times(program, times) if isinstance(times, int) else np.unique(np.asarray(times, dtype=float))
+    corners = np.array(program.corners)
+    kept: list[float] = []
+    for value in listed:
+        nearest = float(corners[np.argmin(np.abs(corners - value))])
+        snapped = nearest if abs(nearest - value) <= _ROUNDING * duration else float(value)
+        if not 0 <= snapped <= duration:
+            raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
+        if not kept or snapped - kept[-1] > _ROUNDING * duration:
+            kept.append(snapped)
+    return tuple(kept)
+
+
+def spread_times(program: Program, count: int) -> Array:
+    """So many times where the result changes: the corners of the program, and between them the denser after each.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    count : int
+        How many. The last one is the program's end. Where the program has more corners, some of them, evenly.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Ascending; fewer than `count` where the program has no duration. [s]
+
+    Notes
+    -----
+    A hold takes three parts of the times between the corners where a ramp or a slide takes two and a cycle sixteen.
+    In a hold they lie evenly in the logarithm of the time since it began, between a third of the segment before it or
+    a thousandth of its own length, whichever is less, and its end; elsewhere evenly in time.
+    """
+    corners = np.unique(program.corners)
+    if count <= len(corners):
+        return corners[np.linspace(len(corners) - 1, 0, count).round().astype(int)[::-1]]
+    lasting = [(began, one) for began, one in zip(program.corners, program.segments, strict=False) if one.duration > 0]
+    shares = _apportioned([_weight(segment) for _, segment in lasting], count - len(corners))
+    found, before = [corners], math.inf
+    for (began, segment), number in zip(lasting, shares, strict=True):
+        parts = np.arange(1, number + 1) / (number + 1)
+        if segment.holds and number:
+            shortest = min(_FIRST, before / (3 * segment.duration))
+            parts = shortest ** (1 - parts)
+        found.append(began + parts * segment.duration)
+        before = segment.duration
+    return np.unique(np.concatenate(found))
+
+
+def _weight(segment: Segment) -> float:
+    """How many of the kept times a segment takes, relative to others."""
+    if segment.amplitude:
+        return 16 * segment.duration / segment.period
+    return 3.0 if segment.holds else 2.0
+
+
+def _apportioned(weights: Sequence[float], count: int) -> list[int]:
+    """Whole numbers in proportion to weights, that add up to a count: those rounded up have the largest remainders."""
+    if not weights:
+        return []
+    exact = np.array(weights) * count / sum(weights)
+    whole = np.floor(exact).astype(int)
+    order = np.argsort(whole - exact, kind="stable")
+    whole[order[: count - int(whole.sum())]] += 1
+    return [int(number) for number in whole]
+
+
+#: A segment, or the period of a cycle, is as long as so many roundings of its end: a march may take steps of a
+#: millionth of it, and each must move the time.
+LEAST_ROUNDINGS = 4e6
+
+
+#: Times and loads whose squares and products stay far from overflow. [s], [N]
+LARGEST = 1e100
+
+
+#: Displacements of a periodic surface may exceed its heights by so much before their rounding exceeds a tenth of these.
+MOST_HEIGHTS = 1e15
+
+
+def check_times(program: Program, time_step: float | Literal["auto"]) -> None:
+    """Refuse a program whose times lie too close for where they are, and steps that would not move the time.
+
+    Raises
+    ------
+    InputError
+        Naming the segment, what its end is known to, and what is expected.
+    """
+    for i, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
+        if segment.duration == 0:
+            continue
+        shortest, least = min(segment.duration, segment.period), LEAST_ROUNDINGS * math.ulp(end)
+        what = "the period of a cycle" if segment.period < segment.duration else "a segment"
+        if not (shortest >= 1 / LARGEST and end <= LARGEST):
+            raise InputError(
+                f"program.{i}: {what} lasts {shortest:g} s and ends by {end:g} s: expected times from "
+                f"{1 / LARGEST:g} to {LARGEST:g} s"
+            )
+        if shortest < least:
+            raise InputError(
+                f"program.{i}: {what} lasts {shortest:g} s where time has reached {end:g} s, which is known to "
+                f"{math.ulp(end):.2g} s: expected at least {least:.2g} s"
+            )
+    if time_step != "auto" and time_step < 4 * math.ulp(program.duration):
+        raise InputError(
+            f"time_step is {time_step!r} s and the program ends at {program.duration:g} s, which is known to "
+            f"{math.ulp(program.duration):.2g} s: expected a longer step"
+        )
+
+
+def check_loads(
+    program: Program, material: Material, boundary: Boundary, sides: tuple[float, float], gap: NDArray[np.float64]
+) -> None:
+    """Refuse a load under which rounding is all that is left of a surface with these sides [m] and undeformed gaps [m].
+
+    Raises
+    ------
+    InputError
+        If the load is beyond what can be computed with, or presses a periodic surface so far past full contact that
+        the pressure's variation is lost in its mean.
+    """
+    load = program.largest_load
+    if load > LARGEST:
+        raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
+    heights = float(np.ptp(gap))
+    if boundary == "free" or heights == 0:
+        return
+    displaced = load / math.prod(sides) * float(material.contact_compliance(program.duration)) * max(sides)
+    if displaced > MOST_HEIGHTS * heights:
+        raise InputError(
+            f"the load reaches {load:g} N, which would close gaps {displaced / heights:.1g} times as high as this "
+            f"surface has: the pressure's variation is lost in its mean; expected at most "
+            f"{load * MOST_HEIGHTS * heights / displaced:.1g} N"
+        )
+
+
+Spacing = tuple[float, float]
+
+
+#: A slide's cells differ from what was asked for by more than this part of it where that is told.
+_TOLD = 1e-9
+
+
+def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None:
+    """Refuse slides that cannot be computed.
+
+    Raises
+    ------
+    InputError
+        Naming the segment or the setting, and what is expected.
+    """
+    if not program.slides:
+        return
+    if settings.boundary != "periodic":
+        raise InputError(
+            "boundary is 'free' and the program slides: in free space the wake of the profile leaves the grid at its "
+            "back; expected boundary = 'periodic'"
+        )
+    if settings.method != "fast":
+        raise InputError(
+            f"method is {settings.method!r}, which knows no motion along the surface, and the program slides: expected "
+            "method = 'fast'"
+        )
+    if settings.grid_error:
+        raise InputError(
+            "grid_error compares the same instants on coarser grids, where a slide comes to other ones: expected "
+            "grid_error = false, and a run on a resampled surface beside this one"
+        )
+    if program.segments[0].slide is not None:
+        raise InputError("program.0 slides and nothing is pressed yet: expected load, pressure or approach before it")
+    for number, segment in enumerate(program.segments):
+        if segment.slide is not None:
+            try:
+                segment.slide.cells(spacing)
+            except InputError as error:
+                raise InputError(f"program.{number}: {error}") from None
+
+
+def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spacing) -> tuple[float, ...] | None:
+    """Kept times, those within a slide brought to the nearest whole cell. [s]
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    times : sequence of float or None
+        Ascending; None for every accepted step. [s]
+    spacing : tuple of float
+        Cell sides. [m]
+    """
+    if times is None or not program.slides:
+        return None if times is None else tuple(times)
+    found = np.array(times)
+    corners = program.corners
+    for segment, began, end in zip(program.segments, corners, corners[1:], strict=False):
+        if segment.slide is None:
+            continue
+        cells = segment.slide.cells(spacing)
+        for place in np.flatnonzero((found > began) & (found < end)):
+            taken = round((found[place] - began) / (end - began) * cells)
+            found[place] = instant(began, end, taken, cells)
+    return tuple(np.unique(found).tolist())
+
+
+def slide_note(program: Program, spacing: Spacing) -> str:
+    """What is slid where that is not what was asked for; empty if it is.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    spacing : tuple of float
+        Cell sides. [m]
+    """
+    notes = []
+    for number, segment in enumerate(program.segments):
+        if segment.slide is None:
+            continue
+        asked, cells = segment.slide.distance, segment.slide.cells(spacing)
+        real = cells * spacing[segment.slide.axis]
+        if abs(real - asked) > _TOLD * asked:
+            notes.append(f"program.{number} slides {said(real, 'm')}, {cells} whole cells, of {said(asked, 'm')}")
+    return "; ".join(notes)
+
 
 #: Cells of the longer side on which the window after a jump at the start is foreseen.
 _FORESEEN_ON = 40

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.arrays import over_rows
 from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.scene import Step
+from roughvisc.mechanics.stepping.step import segment_number
 
 #: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
 #: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
@@ -46,7 +46,7 @@ def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
             outside &= scene.present[rows]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
 
-    found = passes.of_rows(counted, contact.shape, threads)
+    found = over_rows(counted, contact.shape, threads)
     return area * sum(inside for inside, _ in found), area * sum(outside for _, outside in found)
 
 

@@ -13,20 +13,26 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.faces import AxisTransform, SlidingGrid, areas, on_rows
-from roughvisc.experiment.footprint import curve_bytes
-from roughvisc.experiment.friction_grid_error import CoarserFaces
-from roughvisc.experiment.notes import border_note, octave_note, slope_note
+from roughvisc.experiment.notes import (
+    border_note,
+    contact_stands_alone,
+    creep_left,
+    octave_note,
+    slope_note,
+    surface_stands_alone,
+    wake_note,
+)
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.refusal import require_memory_of_curve
-from roughvisc.experiment.wake import contact_stands_alone, creep_left, surface_stands_alone, wake_note
+from roughvisc.experiment.resources import curve_bytes
+from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.materials.frequency import over_frequencies
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
-from roughvisc.mechanics.stepping.slide import Direction
+from roughvisc.mechanics.stepping.program import Direction
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings

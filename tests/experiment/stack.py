@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from roughvisc.experiment.faces import areas
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
+from roughvisc.experiment.sliding_grid import areas
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.schema.entries import listed, measured
 from roughvisc.study.statement.schema.experiments import ExperimentSection

@@ -12,7 +12,7 @@ from support import simulate_whole
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.stepping import attempt
+from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.topography.grid import nominal_area
 
 SHAPE, SIZE, APEX = (35, 32), (1.6, 1.5), (0.81, 0.735)

@@ -7,11 +7,13 @@ import pytest
 from support import simulate_whole
 
 import roughvisc as rv
-from roughvisc.experiment import loading, malloc
-from roughvisc.experiment.footprint import march_bytes
+from roughvisc.experiment import loading
+from roughvisc.experiment import resources as malloc
+from roughvisc.experiment.resources import march_bytes
 from roughvisc.experiment.scene import memory_options
+from roughvisc.mechanics import arrays as passes
+from roughvisc.mechanics import arrays as reuse
 from roughvisc.mechanics.bodies import operator
-from roughvisc.mechanics.fields import passes, reuse
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
@@ -70,7 +72,7 @@ def study(tmp_path_factory):
 def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
     monkeypatch.setattr(malloc, "expect_arrays", lambda size: None)  # is never touched
     # as on a wide grid: by parts that are a small part of it, in memory that is used again
-    monkeypatch.setattr(passes, "_PART", 1 << 12)
+    monkeypatch.setattr(passes, "_BLOCK", 1 << 12)
     monkeypatch.setattr(reuse, "_FROM", 1 << 17)
     case, folder = vary(study[0], changes), study[1]
     gc.collect()
@@ -112,7 +114,7 @@ def held(monkeypatch):
     gc.collect()  # what others have left would be counted as given back
     size, counts = 8 * COUNTED[0] * COUNTED[1], {"now": 0, "most": 0}
     monkeypatch.setattr(reuse, "_FROM", 1)
-    monkeypatch.setattr(passes, "_PART", 1 << 10)
+    monkeypatch.setattr(passes, "_BLOCK", 1 << 10)
     monkeypatch.setattr(operator, "_BLOCKED", 1)
     monkeypatch.setattr(loading, "is_wide", lambda size: True)
     lend, take_back = reuse._Kept.lend, reuse._Kept.take_back

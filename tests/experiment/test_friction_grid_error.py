@@ -5,8 +5,8 @@ import pytest
 from support import friction_whole
 
 import roughvisc as rv
-from roughvisc.experiment.faces import AxisTransform, SlidingGrid
 from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.sliding_grid import AxisTransform, SlidingGrid
 from roughvisc.variables.sliding import SLIDING
 
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)

@@ -11,14 +11,13 @@ from roughvisc.experiment.loading import Loading, LoadingRows
 from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics.bodies.body import body_of
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.sparse import Sparse, Sum
+from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowsInMemory
-from roughvisc.result import dataset_of
 from roughvisc.settings import Settings
+from roughvisc.solve import dataset_of
 from roughvisc.variables import FIELDS, STATUS_MEANINGS
 
 MATERIAL, PROGRAM = rv.zener(1.0, 1.0, 0.3), rv.Program().load(1.0, over=1.0)

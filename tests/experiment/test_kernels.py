@@ -9,8 +9,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment import profile
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.love import HALF_SPACE, Love, love_kernel
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case

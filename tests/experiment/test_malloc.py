@@ -7,9 +7,9 @@ import sys
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment import malloc
+from roughvisc.experiment import resources as malloc
 from roughvisc.experiment.loading import LoadingRows
-from roughvisc.experiment.malloc import keep_memory, retain_arena
+from roughvisc.experiment.resources import keep_memory, retain_arena
 
 MB = 1 << 20
 MMAP, TRIM = -3, -1
@@ -98,7 +98,7 @@ def test_memory_freed_in_a_wide_march__is_used_again(tmp_path):
     """128 arrays of a megabyte, freed and had again."""
     script = (
         "import numpy as np\n"
-        "from roughvisc.experiment.malloc import retain_arena\n"
+        "from roughvisc.experiment.resources import retain_arena\n"
         "with retain_arena(int(sys.argv[1])):\n"
         "    for _ in range(6):\n"
         "        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"

@@ -6,8 +6,7 @@ from support import run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.experiment import loading
-from roughvisc.experiment.mirror import is_mirrored, quarter, unfold
-from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.profile import Profile, is_mirrored, quarter, unfold
 from roughvisc.variables import FIELDS
 
 ZENER = rv.zener(1.0, 1.0, 1.0)

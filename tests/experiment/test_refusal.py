@@ -12,12 +12,12 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.errors import InputError, TooLargeError, TransientError
-from roughvisc.experiment import available, refusal
-from roughvisc.experiment.available import Available, cores, memory_available, threads_for
-from roughvisc.experiment.footprint import PROCESS, curve_bytes
+from roughvisc.experiment import refusal
+from roughvisc.experiment import resources as available
 from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.resources import PROCESS, Available, cores, curve_bytes, memory_available, threads_for
 from roughvisc.experiment.steady_sliding import SlidingRows
-from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.mechanics import arrays as threads_module
 from roughvisc.settings import Settings
 from roughvisc.study.execution import side_by_side as side_module
 from roughvisc.study.execution.run import run_case
@@ -188,7 +188,7 @@ def test_limit_of_the_address_space__counts():
     script = (
         "import resource\n"
         f"resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}))\n"
-        "from roughvisc.experiment.available import _own\n"
+        "from roughvisc.experiment.resources import _own\n"
         "(found,) = _own()\n"
         "print(int(found.size), found.words)\n"
     )

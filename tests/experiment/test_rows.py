@@ -8,8 +8,9 @@ from support import simulate_whole
 import roughvisc as rv
 from roughvisc.experiment import loading
 from roughvisc.experiment.stated import error_columns, meets_tolerance
+from roughvisc.mechanics import arrays as passes
+from roughvisc.mechanics import sparse
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields import passes, sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -45,7 +46,7 @@ def test_rows__of_a_wide_grid_hold_the_same_numbers(monkeypatch, absent):
     program = rv.Program().load(0.02, over=0.3).hold(0.3)
     settings = {"boundary": "periodic", "tolerance": 3e-2, "fields": FIELDS, "missing": "absent", "times": 4}
     monkeypatch.setattr(sparse, "_ABOVE", 10)
-    monkeypatch.setattr(passes, "_PART", 100)
+    monkeypatch.setattr(passes, "_BLOCK", 100)
 
     def pressed():
         return simulate_whole(height, MATERIALS["zener"], program, progress=False, **settings).drop_vars("wall_time")

@@ -9,9 +9,9 @@ from support import simulate_whole
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment import profile
-from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.scene import kept_times
 from roughvisc.labels import annotate
-from roughvisc.mechanics.fields import threads as threads_module
+from roughvisc.mechanics import arrays as threads_module
 from roughvisc.recorder import RowsInMemory
 from roughvisc.variables import FIELDS, VARIABLES
 

@@ -8,8 +8,7 @@ from support import friction_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.experiment.kept_times import kept_times
-from roughvisc.experiment.slides import snap_to_cells
+from roughvisc.experiment.scene import kept_times, snap_to_cells
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words

@@ -12,7 +12,7 @@ from support import run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting

@@ -13,10 +13,12 @@ from strategies import boundaries, examples, shapes
 from support import direct, rough_gap
 
 import roughvisc as rv
+from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.contact import descent, iteration, solve_contact, solver
-from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.contact import solver as descent
+from roughvisc.mechanics.contact import solver as iteration
 
 
 def check_optimal(halfspace, gap, state, precision, present=None):
@@ -491,7 +493,7 @@ def test_unconverged_state__has_its_own_displacement():
 @pytest.mark.parametrize(("mean", "fields"), [(0.3, 10.8), (3.0, 12.5)], ids=["half", "full"])
 def test_memory__is_that_of_a_few_fields(monkeypatch, mean, fields):
     """What a step needs is freed when it is taken, and the displacement of the last before the next is convolved."""
-    monkeypatch.setattr(passes, "_PART", 1000)
+    monkeypatch.setattr(passes, "_BLOCK", 1000)
     gap = rough_gap((128, 125))
     halfspace = HalfSpace(gap.shape, (1.0, 1.0))
     solve_contact(halfspace, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already

@@ -10,7 +10,7 @@ from strategies import examples, shapes
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser
-from roughvisc.experiment.mirror import is_mirrored
+from roughvisc.experiment.profile import is_mirrored
 from roughvisc.topography.borders import border_mismatch, is_periodic
 
 SIZE = (1e-3, 0.8e-3)

@@ -27,7 +27,7 @@ from scenes import load_for_area, rough_gap, sphere_gap
 from scipy import fft
 
 import roughvisc as rv
-from roughvisc.experiment.malloc import retain_arena
+from roughvisc.experiment.resources import retain_arena
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact, solver
 

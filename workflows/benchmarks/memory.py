@@ -10,7 +10,7 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
-from roughvisc.experiment.footprint import PROCESS, march_bytes
+from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.love import HALF_SPACE
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.materials.protocol import Material, complete
 

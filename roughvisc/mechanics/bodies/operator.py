@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.arrays import blocks, empty, parallel_map, threads_of
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol
-from roughvisc.mechanics.bodies.love import HALF_SPACE
 from roughvisc.mechanics.bodies.transforms import transforms
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.sparse import Scattered
-from roughvisc.mechanics.fields.threads import blocks, parallel_map, threads_of
+from roughvisc.mechanics.sparse import Scattered
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

@@ -1,4 +1,4 @@
-r"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``, the half-space's kernel for waves shorter than the thickness.
+"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``, the half-space's kernel for waves shorter than the thickness.
 
 With a constant Poisson's ratio space and time separate as for a half-space: ``u = C(t) K * p``.
 """
@@ -15,23 +15,127 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.half_space import love_kernel, rectangle_displacement
 from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
-from roughvisc.mechanics.bodies.long_cells import long_cell_influence
-from roughvisc.mechanics.bodies.love import love_kernel
 
 Array = NDArray[np.float64]
+
+
+# With this kappa the response to long waves is right to 1e-3 of 4/3 q^2 on cells of any length (measured).
+_KAPPA = 3.0
+
+
+# Distance at which erfc(kappa r) is below rounding, and Gauss points that integrate over as much to rounding.
+_SHORT_REACH, _GAUSS_POINTS = 6.2 / _KAPPA, 32
+
+
+# Wave number at which the second part of the kernel, 2/q erfc(q / 2 kappa), is below rounding.
+_LAST_WAVE = 12 * _KAPPA
+
+
+# Minus the second derivative, to fourth order in the spacing.
+_SECOND_DIFFERENCE = (-1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12)
+
+
+_MARGIN = len(_SECOND_DIFFERENCE) // 2
+
+
+def long_cell_influence(
+    shape: tuple[int, int],
+    sides: tuple[float, float],
+    transfer: Callable[[Array], Array],
+    uniform: float,
+    reach: float,
+) -> Array:
+    """Displacement of cells due to unit pressure on the cell at the origin.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    sides : tuple of float
+        Cell sides. [thicknesses]
+    transfer : callable
+        ``K_q`` of positive wave numbers. [thicknesses]
+    uniform : float
+        Its limit ``K_0`` at zero. [thicknesses]
+    reach : float
+        Distance beyond which the kernel is zero to rounding. [thicknesses]
+
+    Returns
+    -------
+    ndarray, shape (nx, ny)
+        [thicknesses]
+    """
+    from scipy.special import erf  # slow to import
+
+    rest = uniform - 2 / (math.sqrt(math.pi) * _KAPPA)
+    influence = np.zeros(shape)
+
+    # a Fourier sum over half-integer wave numbers: its nearest images lie two reaches away
+    waves = np.asarray((np.arange(math.ceil(_LAST_WAVE * reach / math.pi)) + 0.5) * math.pi / reach, dtype=np.float64)
+    squared = waves[:, None] ** 2 + waves**2
+    q = np.sqrt(squared)
+    smooth = (transfer(q) - 2 / q * erf(q / (2 * _KAPPA)) - rest * np.exp(-squared / (12 * _KAPPA**2))) / squared
+    nx, ny = (min(n, math.ceil(reach / side + 0.5) + _MARGIN) for n, side in zip(shape, sides, strict=True))
+    means = _cell_waves(nx, sides[0], waves, reach) @ smooth @ _cell_waves(ny, sides[1], waves, reach).T
+    for shift, weight in enumerate(_SECOND_DIFFERENCE):
+        influence[:nx, :ny] -= weight / sides[0] ** 2 * means[shift : shift + nx, _MARGIN:-_MARGIN]
+        influence[:nx, :ny] -= weight / sides[1] ** 2 * means[_MARGIN:-_MARGIN, shift : shift + ny]
+
+    nx, ny = (min(n, math.ceil(_SHORT_REACH / side + 0.5)) for n, side in zip(shape, sides, strict=True))
+    x, width = _clipped_cells(np.arange(nx), sides[0], _SHORT_REACH)
+    y, depth = _clipped_cells(np.arange(ny), sides[1], _SHORT_REACH)
+    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    at_x, at_y = (at[:, None] + side[:, None] * nodes / 2 for at, side in ((x, width), (y, depth)))
+    distance = np.hypot(at_x[:, None, :, None], at_y[:, None, :])
+    beyond = erf(_KAPPA * distance) / (math.pi * distance)  # what 1 / (pi r) has more than the first part
+    influence[:nx, :ny] += rectangle_displacement(x[:, None], y, (width[:, None], depth))
+    influence[:nx, :ny] -= np.outer(width, depth) / 4 * (beyond @ weights @ weights)
+    share_x, share_y = (
+        (erf(math.sqrt(3) * _KAPPA * (at + side / 2)) - erf(math.sqrt(3) * _KAPPA * (at - side / 2))) / 2
+        for at, side in ((x, width), (y, depth))
+    )
+    influence[:nx, :ny] += rest * np.outer(share_x, share_y)
+    return influence
+
+
+def _clipped_cells(cells: NDArray[np.intp], side: float, reach: float) -> tuple[Array, Array]:
+    """Centre and length of what lies within a distance of the origin, of each cell along an axis."""
+    lower, upper = (np.clip((cells + end) * side, -reach, reach) for end in (-0.5, 0.5))
+    return (lower + upper) / 2, upper - lower
+
+
+def _cell_waves(count: int, side: float, waves: Array, reach: float) -> Array:
+    """Integrals of waves over so many cells from the origin on, and over some on either side of these."""
+    centre, length = _clipped_cells(np.arange(-_MARGIN, count + _MARGIN), side, reach)
+    integrals = np.cos(np.outer(centre, waves)) * np.sin(np.outer(length / 2, waves)) * (2 / waves)
+    return np.asarray(integrals / reach)
+
+
 Base = Literal["bonded", "slipping"]
+
 
 # In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
 _REACH = 46.0
+
+
 # 1 - S(s) dies as s^2 exp(-2 s): below rounding from here.
 SHORTEST_WAVE = 24.0
+
+
 # The correction in the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
 _PIECE, _NODES = 0.15, 10
+
+
 # Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
+
+
 # Cells of more thicknesses than the first are long: see the module on them. Beyond the second they are refused.
 _LONG, _LONGEST = 0.5, 50.0
+
+
 # Below this, sinh(2 x) - 2 x comes from its series.
 _SERIES_BELOW = 0.5
 
@@ -64,7 +168,7 @@ class Sheet(Kernel):
 
     In free space the kernel is that of the half-space less a smooth correction,
     ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
-    the thickness it is that of :mod:`roughvisc.mechanics.bodies.long_cells`.
+    the thickness it is that of :mod:`roughvisc.mechanics.bodies.sheet`.
 
     References
     ----------

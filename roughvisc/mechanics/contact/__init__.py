@@ -24,7 +24,6 @@ The method is that of constrained conjugate gradients on an evolving contact are
 .. [1] I. A. Polonsky, L. M. Keer, Wear 231 (1999) 206.
 """
 
-from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.contact.state import ContactState
+from roughvisc.mechanics.contact.solver import ContactState, solve_contact
 
 __all__ = ["ContactState", "solve_contact"]

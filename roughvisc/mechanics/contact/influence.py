@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.arrays import Cells as Cells
+from roughvisc.mechanics.arrays import blockwise, gather
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.sparse import Scattered
+from roughvisc.mechanics.sparse import Scattered
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
-Cells = passes.Cells
 
 
 class Influence:
@@ -45,7 +45,7 @@ class Influence:
 
     def at(self, field: Array, cells: Cells) -> Array:
         """Values of a field at some cells, as flat indices."""
-        return passes.gather(field, cells, self.threads)
+        return gather(field, cells, self.threads)
 
     @property
     def largest(self) -> float:
@@ -56,7 +56,7 @@ class Influence:
         """Displacement by a pressure, in double precision; into some memory on large grids, where that is given."""
         self.convolutions += 1
         displacement = self.halfspace.displacement(pressure, out)
-        passes.multiply(displacement, self.scale, self.threads)
+        blockwise(np.multiply, displacement, self.scale, out=displacement, threads=self.threads)
         return displacement
 
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:

@@ -10,12 +10,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.arrays import (
+    any_positive,
+    blockwise,
+    concatenate,
+    empty,
+    is_wide,
+    local_index,
+    over_blocks,
+    over_cells,
+    total,
+)
+from roughvisc.mechanics.arrays import lowest as lowest_value
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.threads import is_wide
 
 Mask = NDArray[np.bool_]
 
@@ -83,7 +92,7 @@ class Problem:
         present: Mask | None,
     ) -> Problem:
         """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
-        lowest = passes.lowest(gap, present, halfspace.threads)
+        lowest = lowest_value(gap, present, halfspace.threads)
         if load is not None:
             unit = load
             length = load * halfspace.self_influence or load * halfspace.spacing[0]
@@ -91,7 +100,8 @@ class Problem:
             assert approach is not None
             length = approach - lowest
             unit = length / (halfspace.self_influence or halfspace.spacing[0])
-        passes.scale(gap, lowest, length, halfspace.threads)
+        blockwise(np.subtract, gap, lowest, out=gap, threads=halfspace.threads)
+        blockwise(np.divide, gap, length, out=gap, threads=halfspace.threads)
         target = math.nan if approach is None else 1.0
         known = load is None and not halfspace.definite and present is None
         return cls(
@@ -131,7 +141,9 @@ class Problem:
 
     def separation(self, displacement: Array) -> Array:
         """Gap under pressure at zero approach."""
-        return passes.add(self.gap, displacement, empty(self.gap.shape), self.influence.threads)
+        found = empty(self.gap.shape)
+        blockwise(np.add, self.gap, displacement, out=found, threads=self.influence.threads)
+        return found
 
     def separation_of(self, displaced: Array, part: slice) -> Array:
         """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
@@ -154,10 +166,10 @@ class Problem:
 
         def work(part: slice, few: slice) -> float:
             here = self.separation_of(displaced, part)
-            here.take(passes.local_index(part, contact[few]), out=apart[few], mode="clip")  # by others by way of a copy
+            here.take(local_index(part, contact[few]), out=apart[few], mode="clip")  # by others by way of a copy
             return self.lowest_of(here, part)
 
-        return min(passes.with_cells(work, displaced.size, contact, self.influence.threads)), apart, None
+        return min(over_cells(work, displaced.size, contact, self.influence.threads)), apart, None
 
     def free_set(self, pressure: Array, displacement: Array, level: float, separation: Array | None = None) -> FreeSet:
         """The free set at an approach; ``separation`` is that of all cells, flat, where it is known."""
@@ -177,19 +189,20 @@ class Problem:
                 cells += part.start
             return FreeSet(cells, *values)
 
-        found = passes.of_parts(free, pressure.size, threads)
+        found = over_blocks(free, pressure.size, threads)
         if len(found) == 1:
             return found[0]
         parts = [list(each) for each in zip(*found, strict=True)]
         del found
         # the parts go as they are joined
-        return FreeSet(*(passes.concatenate(parts.pop(0), threads) for _ in range(3)))
+        return FreeSet(*(concatenate(parts.pop(0), threads) for _ in range(3)))
 
     def tangent(self, vector: Array) -> Array:
         """Part of a vector on the free set that keeps a given load, in its place."""
         if self.load is not None:
             threads = self.influence.threads
-            passes.lower(vector, passes.total(vector, threads) / vector.size, threads)
+            mean = total(vector, threads) / vector.size
+            blockwise(np.subtract, vector, mean, out=vector, threads=threads)
         return vector
 
     def preconditioned(self, residual: Array, free_set: Cells) -> Array:
@@ -210,17 +223,18 @@ class Problem:
     def initial_iterate(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
         threads = self.influence.threads
-        if start is None or not passes.any_positive(start):
+        if start is None or not any_positive(start):
             pressure, displacement = np.ones(self.gap.shape), None
             if self.load is None:
                 pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)
         else:
             pressure = start
-            passes.cut_and_divide(pressure, self.unit, threads)
+            blockwise(np.maximum, pressure, 0.0, out=pressure, threads=threads)
+            blockwise(np.divide, pressure, self.unit, out=pressure, threads=threads)
         if self.present is not None:
             pressure = np.where(self.present, pressure, 0.0)
-        factor = 1.0 if self.load is None else self.load / passes.total(pressure.reshape(-1), threads)
-        passes.multiply(pressure, factor, threads)
+        factor = 1.0 if self.load is None else self.load / total(pressure.reshape(-1), threads)
+        blockwise(np.multiply, pressure, factor, out=pressure, threads=threads)
         if displacement is not None:
-            passes.multiply(displacement, factor / self.length, threads)
+            blockwise(np.multiply, displacement, factor / self.length, out=displacement, threads=threads)
         return pressure, displacement

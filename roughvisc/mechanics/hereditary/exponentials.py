@@ -20,9 +20,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields.passes import Cells, inner, weighted
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.threads import threads_of
+from roughvisc.mechanics.arrays import Cells, empty, inner, threads_of, weighted
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]

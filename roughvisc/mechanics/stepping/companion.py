@@ -12,20 +12,10 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
+from roughvisc.mechanics.arrays import cut_at_zero, empty, over_blocks, weighted
 from roughvisc.mechanics.hereditary.exponentials import Rule
-from roughvisc.mechanics.stepping.attempt import (
-    advanced,
-    displacement_after,
-    segment_number,
-    trial_step,
-    with_cost,
-    without_past,
-)
-from roughvisc.mechanics.stepping.control import rule_for
-from roughvisc.mechanics.stepping.domain import is_outgrown
+from roughvisc.mechanics.sparse import Sparse, Sum
+from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import (
     NO_CONTACT,
@@ -38,9 +28,18 @@ from roughvisc.mechanics.stepping.scene import (
     Through,
     Trajectory,
     Trial,
+    Uncertainty,
+)
+from roughvisc.mechanics.stepping.step import (
+    advanced,
+    displacement_after,
+    is_outgrown,
+    segment_number,
+    trial_step,
+    with_cost,
+    without_past,
 )
 from roughvisc.mechanics.stepping.tangential import tangential_force
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -100,10 +99,10 @@ def coarse_initial_guess(now: Instant, companion: Instant | None = None, togethe
     if companion is not None and together is not None:
         companion.contact.add_to(pressure, 1.0)
         together.contact.add_to(pressure, -1.0)
-        passes.cut(pressure, threads)
+        cut_at_zero(pressure, threads)
         if companion.unit_displacement is not None and together.unit_displacement is not None:
             displaced += [(1.0, companion.unit_displacement), (-1.0, together.unit_displacement)]
-    return pressure, passes.weighted(displaced, empty(pressure.shape), threads)
+    return pressure, weighted(displaced, empty(pressure.shape), threads)
 
 
 def difference(
@@ -223,7 +222,7 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[i
             outside &= present[part]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
 
-    found = passes.of_parts(work, scene.gap.size, scene.halfspace.threads)
+    found = over_blocks(work, scene.gap.size, scene.halfspace.threads)
     return sum(inside for inside, _ in found), sum(outside for _, outside in found)
 
 

@@ -18,10 +18,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.sparse import Sparse
+from roughvisc.mechanics.arrays import inner
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+from roughvisc.mechanics.sparse import Sparse
 
 Array = NDArray[np.float64]
 
@@ -121,8 +121,8 @@ def after_step(
     load or the approach is held.
     """
     cells, pressure = end[0].not_zero()
-    both = area * passes.inner(start, cells, pressure, end[0].threads)
-    last = area * passes.inner(end[1], cells, pressure, end[0].threads)
+    both = area * inner(start, cells, pressure, end[0].threads)
+    last = area * inner(end[1], cells, pressure, end[0].threads)
     glassy = 0.5 * memory.factor * memory.material.glassy
     if step == 0:
         stored = energy.stored + glassy * (last - energy.pressure)

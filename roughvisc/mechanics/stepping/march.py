@@ -1,8 +1,8 @@
 """The march through time: predict, solve, accept, yield.
 
 :func:`march` presses a profile on a half-space through a loading program and yields every accepted step. It reduces
-each step to an elastic contact problem by the memory. :mod:`~roughvisc.mechanics.stepping.control` chooses how long the
-steps are.
+each step to an elastic contact problem by the memory. :mod:`~roughvisc.mechanics.stepping.controller` chooses how long
+the steps are.
 
 All settings are a frozen :class:`Scene`, all that changes is a :class:`State`, a plain value: a rejected step costs
 no state, and a march goes on from any state that it yielded.
@@ -15,18 +15,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-from roughvisc.mechanics.stepping.apart import closing_time
-from roughvisc.mechanics.stepping.attempt import (
-    accept,
-    elastic_step,
-    initial_state,
-    restarted,
-    step_of,
-    trial_at_rest,
-    trial_step,
-    with_cost,
-    without_past,
-)
 from roughvisc.mechanics.stepping.companion import (
     adapt_tolerance_share,
     behind,
@@ -36,7 +24,7 @@ from roughvisc.mechanics.stepping.companion import (
     with_error_estimate,
     with_uncertainty,
 )
-from roughvisc.mechanics.stepping.control import (
+from roughvisc.mechanics.stepping.controller import (
     error_limit,
     estimate,
     growth,
@@ -46,11 +34,23 @@ from roughvisc.mechanics.stepping.control import (
     step_length,
     suggestion,
 )
-from roughvisc.mechanics.stepping.domain import enlarged, is_outgrown
-from roughvisc.mechanics.stepping.events import jump, next_event, start_segment
+from roughvisc.mechanics.stepping.events import closing_time, jump, next_event, start_segment
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
+from roughvisc.mechanics.stepping.step import (
+    accept,
+    elastic_step,
+    enlarged,
+    initial_state,
+    is_outgrown,
+    restarted,
+    step_of,
+    trial_at_rest,
+    trial_step,
+    with_cost,
+    without_past,
+)
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
 

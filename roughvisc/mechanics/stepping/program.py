@@ -7,19 +7,257 @@ known: see :meth:`Program.on_area`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.segment import PUSHING, UNITS, Control, Segment
-from roughvisc.mechanics.stepping.slide import Direction, Slide
-from roughvisc.mechanics.stepping.words import INSTEAD, TOLD, known_control, known_direction, told
 from roughvisc.notebook import table
-from roughvisc.units import said, stated_quantity
+from roughvisc.units import said, shown, stated_quantity
+
+#: In which the profile moves.
+Direction = Literal["x", "-x", "y", "-y"]
+
+
+#: in words
+DIRECTIONS = "'x', '-x', 'y' or '-y'"
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A stroke of the profile along the surface, at constant speed.
+
+    Parameters
+    ----------
+    distance : float
+        As asked for; what is slid is the nearest whole number of cells. [m]
+    direction : {"x", "-x", "y", "-y"}
+        In which the profile moves.
+    """
+
+    distance: float
+    direction: Direction = "x"
+
+    def __post_init__(self) -> None:
+        if not 0 < self.distance < math.inf:
+            raise InputError(f"distance of a slide is {self.distance!r}: expected a positive number [m]")
+        if self.direction not in get_args(Direction):
+            raise InputError(f"direction of a slide is {self.direction!r}: expected {DIRECTIONS}")
+
+    @property
+    def axis(self) -> int:
+        """Of the grid."""
+        return 0 if self.direction.endswith("x") else 1
+
+    @property
+    def sense(self) -> int:
+        """1 where the profile moves towards larger coordinates, else -1."""
+        return -1 if self.direction.startswith("-") else 1
+
+    def cells(self, spacing: tuple[float, float]) -> int:
+        """Whole number of cells that is slid, one a step.
+
+        Parameters
+        ----------
+        spacing : tuple of float
+            Cell sides. [m]
+
+        Raises
+        ------
+        InputError
+            If the distance is less than half a cell.
+        """
+        side = spacing[self.axis]
+        number = math.floor(self.distance / side * (1 + 1e-12) + 0.5)
+        if number < 1:
+            raise InputError(
+                f"a slide of {said(self.distance, 'm')} is less than half a cell of {said(side, 'm')}: the profile "
+                "moves by whole cells; expected a longer distance, or a finer grid"
+            )
+        return number
+
+
+@dataclass(frozen=True)
+class Slid:
+    """How far a profile has slid.
+
+    Attributes
+    ----------
+    distance : float
+        Along the path, whatever the direction. [m]
+    work : float
+        Work of the tangential force: what the body has taken up in slides, stored or dissipated, less the work of the
+        normal force. [J]
+    """
+
+    distance: float = 0.0
+    work: float = 0.0
+
+
+def instant(began: float, end: float, taken: int, cells: int) -> float:
+    """Time at which so many cells of a slide are behind. [s]
+
+    Parameters
+    ----------
+    began, end : float
+        Of the slide. [s]
+    taken, cells : int
+        Cells that are behind, and those of the whole slide.
+    """
+    return end if taken >= cells else began + (end - began) * (taken / cells)
+
+
+Control = Literal["load", "approach", "pressure"]
+
+
+#: what may be prescribed -> its unit
+UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
+
+
+#: what contact without adhesion cannot carry below zero
+PUSHING = ("load", "pressure")
+
+
+#: in words
+CONTROLS = "'load', 'approach' or 'pressure'"
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One piece of a program.
+
+    Parameters
+    ----------
+    control : {"load", "approach", "pressure"}
+        What is prescribed; the pressure is a nominal one.
+    duration : float
+        Length of the segment; zero is a jump. [s]
+    end : float or None
+        Value at the end, reached linearly; None keeps the value found at the start. [N, m or Pa]
+    amplitude, period : float
+        A sine wave about the value ``end``, which must also be the value at the start. [N, m or Pa], [s]
+    slide : Slide or None
+        How the profile moves along the surface meanwhile, while what is controlled keeps its value.
+    """
+
+    control: Control
+    duration: float
+    end: float | None = None
+    amplitude: float = 0.0
+    period: float = math.inf
+    slide: Slide | None = None
+
+    def __post_init__(self) -> None:
+        if self.control not in UNITS:
+            raise InputError(f"control: found {shown(self.control)}: expected {CONTROLS}")
+        if not (math.isfinite(self.duration) and self.duration >= 0):
+            raise InputError(f"duration of a {self.control} segment is {self.duration!r}: expected a number >= 0 [s]")
+        if self.end is not None and not math.isfinite(self.end):
+            raise InputError(f"{self.control} is {self.end!r}: expected a finite number [{UNITS[self.control]}]")
+        lowest = (self.end or 0.0) - abs(self.amplitude)
+        if self.control in PUSHING and lowest < 0:
+            reached = f"{self.control} reaches {lowest!r} {UNITS[self.control]}"
+            raise InputError(f"{reached}: expected no negative {self.control}, contact here has no adhesion")
+        if self.amplitude and not (self.period > 0 and math.isfinite(self.period)):
+            raise InputError(f"period of a cycle is {self.period!r}: expected a positive number [s]")
+        if self.slide is not None and (self.end is not None or self.amplitude or self.duration == 0):
+            raise InputError("a slide takes time and keeps what is controlled: expected no end, no wave, duration > 0")
+
+    def __str__(self) -> str:
+        """In words, such as ``load to 2 N over 50 ms``."""
+        lasting, unit = said(self.duration, "s"), UNITS[self.control]
+        named = "nominal pressure" if self.control == "pressure" else self.control
+        if self.amplitude:
+            wave = f"{said(self.end or 0.0, unit)} ± {said(self.amplitude, unit)}"
+            return f"{named} {wave} in {self.duration / self.period:g} cycles of {said(self.period, 's')}"
+        if self.slide is not None:
+            way = f"slide {said(self.slide.distance, 'm')} along {self.slide.direction}"
+            return f"{way} over {lasting} at {said(self.slide.distance / self.duration, 'm/s')}"
+        if self.end is None:
+            return f"hold {named} {lasting}"
+        reached = f"{named} to {said(self.end, unit)}"
+        return f"{reached} over {lasting}" if self.duration else f"{reached} at once"
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing moves: what is controlled keeps its value, and the profile its place."""
+        return self.end is None and not self.amplitude and self.slide is None
+
+    def value(self, elapsed: float, start: float) -> float:
+        """Prescribed value [N or m] a time [s] after the start of the segment, which began at ``start``."""
+        if self.amplitude:
+            mean = start if self.end is None else self.end
+            return mean + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
+        if self.end is None:
+            return start
+        if elapsed >= self.duration * (1 - 1e-12):  # times are sums of durations, rounded
+            return self.end
+        return start + (self.end - start) * (elapsed / self.duration)
+
+    def turns(self, after: float, before: float) -> Iterator[float]:
+        """Instants strictly between two others at which a cycle turns back, from the start of the segment. [s]"""
+        if not self.amplitude:
+            return
+        quarter = self.period / 4
+        number = 2 * max(math.floor((after / quarter - 1) / 2), 0) + 1
+        while number * quarter < before:
+            if number * quarter > after:
+                yield number * quarter
+            number += 2
+
+    def highest(self, start: float) -> float:
+        """The largest value prescribed anywhere in the segment, which began at ``start``. [N or m]"""
+        if self.amplitude:
+            return (start if self.end is None else self.end) + abs(self.amplitude)
+        return max(start, start if self.end is None else self.end)
+
+    def is_nothing(self, start: float) -> bool:
+        """Whether zero is prescribed throughout."""
+        return not self.amplitude and start == 0 and not self.end
+
+    def on_area(self, area: float) -> Segment:
+        """A segment of nominal pressure as one of load on an area [m2]; any other as it is."""
+        if self.control != "pressure":
+            return self
+        end = None if self.end is None else float(f"{self.end * area:.15g}")
+        return replace(self, control="load", end=end, amplitude=float(f"{self.amplitude * area:.15g}"))
+
+
+#: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
+INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
+
+
+#: Segments that a program tells one by one.
+TOLD = 8
+
+
+def known_control(control: Any, key: str) -> Any:
+    """What is controlled, if there is such a thing."""
+    if control not in get_args(Control):
+        raise InputError(f"{key}: found {shown(control)}: expected {CONTROLS}")
+    return control
+
+
+def known_direction(direction: Any, key: str) -> Any:
+    """A direction of sliding, if there is such a one."""
+    if direction not in get_args(Direction):
+        raise InputError(f"{key}: found {shown(direction)}: expected {DIRECTIONS}")
+    return direction
+
+
+def told(segments: Sequence[Segment]) -> list[str]:
+    """The first segments, one by one."""
+    first = segments[:TOLD]
+    words = [str(segment) for segment in first]
+    for number, (before, segment) in enumerate(pairwise(first), 1):
+        if segment.holds and segment.control == before.control:
+            words[number] = f"hold {said(segment.duration, 's')}"  # what else
+    return words
 
 
 @dataclass(frozen=True)

@@ -12,29 +12,166 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.arrays import cut_at_zero, empty, lowest, threads_of, weighted
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
-from roughvisc.mechanics.fields.threads import threads_of
 from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.energy import Energy
-from roughvisc.mechanics.stepping.pace import ControllerState
-from roughvisc.mechanics.stepping.program import Control, Program
-from roughvisc.mechanics.stepping.slide import Slid, Slide
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.stepping.program import Control, Program, Slid, Slide
+
+_EXCESS = ("stored_excess", "dissipated_excess")
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What the time steps leave unknown at an instant, by the companion that takes steps twice as long.
+
+    Attributes
+    ----------
+    pressure : float
+        Of the pressure, its absolute values summed. [N]
+    approach, force : float
+        [m], [N]
+    work, dissipated : float
+        [J]
+    friction : float
+        Of the tangential force, in a slide. [N]
+    inside, outside : float
+        Area in contact that may be none, and area out of contact that may be in it. [m2]
+    stored_excess, dissipated_excess : float
+        What steps of finite length add to these energies, to leading order. [J]
+    """
+
+    pressure: float = 0.0
+    approach: float = 0.0
+    force: float = 0.0
+    work: float = 0.0
+    dissipated: float = 0.0
+    friction: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+    stored_excess: float = 0.0
+    dissipated_excess: float = 0.0
+
+    def or_worse(self, other: Uncertainty, part: float) -> Uncertainty:
+        """The larger of both, part by part; what steps add to the energies lies a part of the way to the other's."""
+        worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
+        here, there = ({name: getattr(one, name) for name in _EXCESS} for one in (self, other))
+        return Uncertainty(**worse | {name: (1 - part) * here[name] + part * there[name] for name in _EXCESS})
+
+    def relative(self, force: float, approach: float) -> float:
+        """The largest of pressure, force and approach over what these have come to so far [N], [m]. [-]"""
+        if math.isnan(self.pressure):  # unknown, of surfaces at rest too
+            return math.nan
+        by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
+        return max(by_force, self.approach / approach if approach > 0 else 0.0)
+
+
+#: Of a march that has no companion.
+UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
+
+
+# A step that is tried again is shortened to meet what is allowed, of which it aims at the square of the first number,
+# and within the other two. The third is taken where there is no estimate.
+_AIM, _SHORTEST, _LONGEST = 0.7, 0.2, 0.5
+
+
+# A shorter step whose error is above this part of the longer one's was in vain: halving it gains a factor of two at
+# least, unless a cell enters, which makes the pressure jump however short the step is.
+_IN_VAIN = 0.93
+
+
+# Steps are shortened where what is stated exceeds the first part of the tolerance and has grown by more than a factor
+# since it was last told, and lengthened again where it is below the second part. Their share stays between two limits.
+_MOST_USED, _LEAST_USED = 0.7, 0.3
+
+
+_GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
+
+
+@dataclass(frozen=True)
+class ControllerState:
+    """What the choice of the next step remembers.
+
+    Attributes
+    ----------
+    suggestion : float
+        Length of the next step; zero after an event. [s]
+    sharpness : float
+        Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
+    blind : bool
+        Whether the next estimate leaves the pressure out, once.
+    rejected_error : float
+        Estimate of the last attempt at the present step, if it was rejected; else infinite. [-]
+    """
+
+    suggestion: float = 0.0
+    sharpness: float = 1.0
+    ignore_pressure_error: bool = False
+    rejected_error: float = math.inf
+
+    def shortening_failed(self, error: float) -> bool:
+        """Whether a shorter step was hardly better than the one that was rejected before."""
+        return error > _IN_VAIN * self.rejected_error
+
+    def rejected(self, length: float, error: float, allowed: float) -> ControllerState:
+        """After a step of some length [s] whose error, NaN where there is no estimate, is not allowed."""
+        if math.isnan(error):
+            return replace(self, suggestion=_SHORTEST * length, rejected_error=math.inf)
+        shrink = min(max(_AIM * math.sqrt(allowed / error), _SHORTEST), _LONGEST)
+        return replace(self, suggestion=shrink * length, rejected_error=error)
+
+    def accepted(self, suggestion: float, error: float, allowed: float, fresh: bool) -> ControllerState:
+        """After an accepted step; ``fresh``: it was the first after an event, and the second one judges it.
+
+        Where it was accepted since shortening was in vain, the pressure has jumped: the next estimate would see that
+        jump once more.
+        """
+        ignored = self.shortening_failed(error) and error > allowed
+        rejected_error = self.rejected_error if fresh else math.inf
+        return replace(self, suggestion=suggestion, ignore_pressure_error=ignored, rejected_error=rejected_error)
+
+    def with_pressure_error(self) -> ControllerState:
+        """After a step: the next estimate sees the pressure."""
+        return replace(self, ignore_pressure_error=False)
+
+    def after_event(self, suggestion: float = 0.0) -> ControllerState:
+        """Where nothing is extrapolated, with the length of the next step if it is known. [s]"""
+        return replace(self, suggestion=suggestion)
+
+    def sharpened(self, used: float, earlier: float) -> ControllerState:
+        """By what is stated, over the tolerance, now and when it was last told."""
+        if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
+            wanted = max(_MOST_USED / used, 0.5)
+        elif used < _LEAST_USED:
+            wanted = 1.5
+        else:
+            return self
+        # in steps of sqrt(2): what rounding does to small differences must not show in the length of steps
+        wanted = 2 ** (0.5 * round(2 * math.log2(wanted)))
+        return replace(self, sharpness=min(max(self.sharpness * wanted, _SHARPEST), _BLUNTEST))
+
 
 Array = NDArray[np.float64]
+
+
 Mask = NDArray[np.bool_]
+
 
 # A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
 # shows its pressure through one discarded short solve.
 _SOFT = 0.1
+
+
 #: A pressure near the one sought, and its displacement at unit compliance where that is known. [Pa], [Pa m]
 Guess = tuple[Array, Array | None]
+
+
 #: In place of a field that is not held.
 NO_FIELD = np.zeros((0, 0))
+
+
 NO_CONTACT = Sparse.whole(NO_FIELD)
 
 
@@ -85,7 +222,7 @@ class Scene:
 
     def lowest(self, field: Array) -> float:
         """Least value over the present cells."""
-        return passes.lowest(field, self.present, self.halfspace.threads)
+        return lowest(field, self.present, self.halfspace.threads)
 
     def compliance(self, t: float) -> float:
         """Contact compliance. [1/Pa]"""
@@ -222,7 +359,7 @@ class Trajectory:
         ratio = self._ratio(length)
         pressure = now.times(1 + ratio)
         before.contact.add_to(pressure, -ratio)
-        return pressure, passes.cut(pressure, now.threads)
+        return pressure, cut_at_zero(pressure, now.threads)
 
     def first_guess(self, length: float) -> Guess:
         """The extrapolated pressure and its unit displacement, in memory of their own.
@@ -235,12 +372,12 @@ class Trajectory:
             return pressure, None
         threads = threads_of(known.size)
         if before is None or length == 0:
-            return pressure, passes.times(known, 1.0, threads)
+            return pressure, weighted([(1.0, known)], empty(known.shape), threads)
         if before.unit_displacement is None:
             return pressure, None
         ratio = self._ratio(length)
         terms = [(1 + ratio, known), (-ratio, before.unit_displacement)]
-        return pressure, passes.weighted(terms, empty(known.shape), threads)
+        return pressure, weighted(terms, empty(known.shape), threads)
 
     def _ratio(self, length: float) -> float:
         """Of a step's length to that of the last one."""
@@ -410,5 +547,7 @@ class Trial:
 
 #: Steps through a part of a program, and the scene and the state in which they end.
 Through = Generator[Step, None, tuple[Scene, State]]
+
+
 #: The same, with None before the grid may grow: who holds a step back is to let it go.
 Held = Generator[Step | None, None, tuple[Scene, State]]

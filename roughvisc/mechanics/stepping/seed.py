@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.materials.models import Prony
-from roughvisc.mechanics.stepping.attempt import work_between
-from roughvisc.mechanics.stepping.domain import at_edge, edge_error
+from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.events import next_event
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
-from roughvisc.mechanics.stepping.uncertainty import UNKNOWN
+from roughvisc.mechanics.stepping.scene import UNKNOWN, Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.step import at_edge, edge_error, work_between
 
 Array = NDArray[np.float64]
 

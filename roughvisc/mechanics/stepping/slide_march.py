@@ -14,8 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.fields.sparse import Sparse
-from roughvisc.mechanics.stepping.attempt import accept, restarted, step_of, trial_step, with_cost
+from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.companion import (
     behind,
     coarse_initial_guess,
@@ -23,12 +22,11 @@ from roughvisc.mechanics.stepping.companion import (
     with_error_estimate,
     with_uncertainty,
 )
-from roughvisc.mechanics.stepping.control import rule_for
+from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.events import start_segment
-from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial
-from roughvisc.mechanics.stepping.slide import Slid, Slide, instant
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.stepping.program import Segment, Slid, Slide, instant
+from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial, Uncertainty
+from roughvisc.mechanics.stepping.step import accept, restarted, step_of, trial_step, with_cost
 
 # Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
 # friction is a small part of it.

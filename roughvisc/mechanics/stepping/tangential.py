@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.stepping.slide import Slide
+from roughvisc.mechanics.stepping.program import Slide
 
 Array = NDArray[np.float64]
 

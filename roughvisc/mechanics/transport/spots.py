@@ -26,8 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.love import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours

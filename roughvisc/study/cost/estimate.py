@@ -13,12 +13,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.footprint import PROCESS, march_bytes
-from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.loading import staircase_area
 from roughvisc.experiment.profile import GROWTH, MOST_CELLS, Profile
-from roughvisc.experiment.scene import build_scene
-from roughvisc.experiment.slides import check_slides
+from roughvisc.experiment.resources import PROCESS, march_bytes
+from roughvisc.experiment.scene import build_scene, check_slides, kept_times
 from roughvisc.experiment.stated import in_slide
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
@@ -26,11 +24,11 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
-from roughvisc.mechanics.stepping.domain import at_border
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.settings import Settings
 from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
 from roughvisc.study.cost.short_slides import shortened, slid_cells

@@ -15,13 +15,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.available import Available, memory_available
 from roughvisc.experiment.coarser import coarser
-from roughvisc.experiment.footprint import PROCESS
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.notes import body_note, left_out
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.refusal import PART, too_large
+from roughvisc.experiment.resources import PROCESS, Available, memory_available
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory

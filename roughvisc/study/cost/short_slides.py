@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.slide import Slide
+from roughvisc.mechanics.stepping.program import Program, Slide
 from roughvisc.topography.grid import spacing
 
 #: Cells of the coarse grid that a slide goes there at most.

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.experiment.available import Available, cores
 from roughvisc.experiment.refusal import PART, amount
+from roughvisc.experiment.resources import Available, cores
 from roughvisc.study.execution.side_by_side import processes_that_fit, threads_each
 
 

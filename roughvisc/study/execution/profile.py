@@ -17,7 +17,7 @@ from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding
-from roughvisc.mechanics.stepping import attempt
+from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.study.execution import run
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import CheckpointWriter

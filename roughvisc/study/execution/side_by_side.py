@@ -7,9 +7,8 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from roughvisc.experiment.available import cores, memory_available
-from roughvisc.experiment.footprint import PROCESS
 from roughvisc.experiment.refusal import PART, WORTH_ASKING
+from roughvisc.experiment.resources import PROCESS, cores, memory_available
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
 

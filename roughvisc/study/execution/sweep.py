@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
-from roughvisc.experiment.available import cores
+from roughvisc.experiment.resources import cores
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
 from roughvisc.study.execution.book import Monitor, SweepLog

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.segment import PUSHING, UNITS, Control
+from roughvisc.mechanics.stepping.program import PUSHING, UNITS, Control, Program
 from roughvisc.study.statement.sheets import as_wanted, read_sheet
 from roughvisc.units import bounded_quantity, is_quantity
 

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.closed_forms import (
     Cone,
     Indenter,

@@ -10,7 +10,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
-from roughvisc.experiment.grid_convergence import TWO_GRIDS, grid_uncertainty
+from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.study.trade.bench import NotRun, Run, TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, relative
 from roughvisc.study.trade.ladder import Setting

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.scene import kept_times
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.progress import reporting

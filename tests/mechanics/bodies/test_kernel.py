@@ -9,8 +9,8 @@ import pytest
 from support import direct
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
 from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol
-from roughvisc.mechanics.bodies.love import HALF_SPACE, Love, love_kernel
 
 
 def love_exact(x, y, dx, dy):

@@ -9,10 +9,10 @@ from strategies import boundaries, examples, seeds, shapes
 from support import direct
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics import arrays as threads_module
 from roughvisc.mechanics.bodies import operator
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields import threads as threads_module
-from roughvisc.mechanics.fields.sparse import Scattered
+from roughvisc.mechanics.sparse import Scattered
 
 GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
 

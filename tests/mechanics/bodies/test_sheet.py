@@ -9,8 +9,8 @@ import pytest
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies import sheet as sheet_module
+from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.bodies.kernel import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.bodies.love import love_kernel
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.bodies.sheet import Sheet, complement, reduction
 from roughvisc.mechanics.closed_forms import OnSheet, Paraboloid

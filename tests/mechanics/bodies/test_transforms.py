@@ -6,7 +6,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies import ducc, transforms
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window

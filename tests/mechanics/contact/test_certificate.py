@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.contact import full_contact, problem
-from roughvisc.mechanics.contact.certificate import Certificate, certify
-from roughvisc.mechanics.contact.error_estimate import Asked, estimated_error
+from roughvisc.mechanics.contact import certificate as full_contact
+from roughvisc.mechanics.contact import problem
+from roughvisc.mechanics.contact.certificate import Asked, Certificate, certify, estimated_error
 from roughvisc.mechanics.contact.problem import Problem
-from roughvisc.mechanics.fields import passes
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CORNER = np.ones(SHAPE, bool)
@@ -267,7 +267,7 @@ def test_certificate__is_the_same_by_parts(monkeypatch, known, absent):
     asked = case.problem, case.pressure, case.contact, case.displacement
     whole, separation = certify(*asked)
     np.testing.assert_array_equal(separation, case.separation.ravel())
-    monkeypatch.setattr(passes, "_PART", SHAPE[1])
+    monkeypatch.setattr(passes, "_BLOCK", SHAPE[1])
     monkeypatch.setattr(problem, "is_wide", lambda size: True)
     found, separation = certify(*asked)
     assert separation is None
@@ -280,7 +280,7 @@ def test_certificate__is_the_same_by_parts(monkeypatch, known, absent):
 @pytest.mark.parametrize("size", [10**6, 21])
 def test_certificate__asks_for_no_more_than_the_largest_separation_of_the_contact_is_rounded(monkeypatch, level, size):
     """All that carries is at one level, but for rounding; the cells of the second part carry next to nothing."""
-    monkeypatch.setattr(passes, "_PART", size)
+    monkeypatch.setattr(passes, "_BLOCK", size)
     case = Case(load=3.0, tolerance=0.0)
     separation = np.full(case.gap.size, level)
     separation[:21:2] *= 1 + 1e-15
@@ -304,7 +304,7 @@ def test_free_set__is_the_same_by_parts_and_knows_its_values(monkeypatch, absent
     level = float(np.median(case.separation))
     expected = (case.separation < level) & (True if present is None else present) | (case.pressure > 0)
     for size, known in itertools.product((10**6, SHAPE[1], 1), (None, case.separation.ravel())):
-        monkeypatch.setattr(passes, "_PART", size)
+        monkeypatch.setattr(passes, "_BLOCK", size)
         cells, apart, held = case.problem.free_set(case.pressure, case.displacement, level, known)
         np.testing.assert_array_equal(cells, np.flatnonzero(expected))
         np.testing.assert_array_equal(apart, case.separation.take(cells))

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support import rough_gap
 
+from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.contact import descent, iteration
-from roughvisc.mechanics.contact.descent import Step, Trial, admissible_fraction, minimum_along
-from roughvisc.mechanics.contact.iteration import Iterate, Search
+from roughvisc.mechanics.contact import solver as descent
+from roughvisc.mechanics.contact import solver as iteration
 from roughvisc.mechanics.contact.problem import Problem
-from roughvisc.mechanics.fields import passes
+from roughvisc.mechanics.contact.solver import Iterate, Search, Step, Trial, admissible_fraction, minimum_along
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CONTROLS = pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 0.9}], ids=["load", "approach"])
@@ -169,7 +169,7 @@ def test_minimum__is_that_of_the_parabola_and_not_too_far(slope, curvature, expe
 def test_step__goes_as_far_as_the_energy_falls_and_no_pressure_turns_to_tension(
     held, tried, minimum, expected, part, monkeypatch
 ):
-    monkeypatch.setattr(passes, "_PART", part)
+    monkeypatch.setattr(passes, "_BLOCK", part)
     held, tried = np.array(held), np.array(tried)
     trial = Trial(np.arange(held.size), held, tried, tried - held, -1.0)
     fraction, cut = admissible_fraction(trial, minimum, 1)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 

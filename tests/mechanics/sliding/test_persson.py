@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.persson import persson

@@ -9,7 +9,7 @@ from dense_sliding import PERIOD, TIME, dense, line_profiles, rubber, slid, stro
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.contact import solve_contact

@@ -13,12 +13,12 @@ from strategies import examples
 import roughvisc as rv
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping import apart
+from roughvisc.mechanics.stepping import events as apart
 from roughvisc.mechanics.stepping import march as marching
-from roughvisc.mechanics.stepping.apart import _first_crossing, closing_time
-from roughvisc.mechanics.stepping.attempt import initial_state
+from roughvisc.mechanics.stepping.events import _first_crossing, closing_time
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.step import initial_state
 
 MATERIAL = rv.zener(1.0, 1.0, 0.05)
 

@@ -8,14 +8,13 @@ import pytest
 import roughvisc as rv
 from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping import attempt, companion
+from roughvisc.mechanics.sparse import Sparse, Sum
+from roughvisc.mechanics.stepping import companion
+from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.pace import ControllerState
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step
-from roughvisc.mechanics.stepping.uncertainty import Uncertainty
+from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, State, Step, Uncertainty
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {

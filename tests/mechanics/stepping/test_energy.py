@@ -12,9 +12,9 @@ from scipy.integrate import quad
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
+from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 from support import scene
 
 import roughvisc as rv
-from roughvisc.mechanics.stepping import control
-from roughvisc.mechanics.stepping import fading as module
-from roughvisc.mechanics.stepping.fading import Fading
+from roughvisc.mechanics.stepping import controller as control
+from roughvisc.mechanics.stepping import controller as module
+from roughvisc.mechanics.stepping.controller import Fading
 from roughvisc.mechanics.stepping.march import march
 
 SERIES = {

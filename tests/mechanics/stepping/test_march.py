@@ -7,9 +7,8 @@ import pytest
 from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, scene
 
 import roughvisc as rv
-from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics import closed_forms, sparse
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.fields import sparse
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 

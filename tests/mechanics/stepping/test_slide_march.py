@@ -9,16 +9,16 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
-from roughvisc.mechanics.stepping.attempt import segment_number
 from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.program import Slide
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.mechanics.stepping.slide import Slide
+from roughvisc.mechanics.stepping.step import segment_number
 from roughvisc.mechanics.stepping.tangential import force_across, slope, tangential_force
 
 PERIOD, TIME, AMPLITUDE = 1e-3, 1e-3, 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import rough_gap
 
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.closed_forms import Sheet
 from roughvisc.mechanics.closed_forms.sheet import PunchOnSheet

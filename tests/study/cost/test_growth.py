@@ -11,8 +11,8 @@ from support import BALL, run_whole
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError
 from roughvisc.experiment import profile as profile_module
-from roughvisc.experiment.footprint import march_bytes
 from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.resources import march_bytes
 from roughvisc.experiment.scene import build_scene
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import choose_memory

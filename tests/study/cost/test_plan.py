@@ -14,8 +14,8 @@ from support import BALL, run_whole
 import roughvisc as rv
 from roughvisc.api import simulate
 from roughvisc.errors import InputError
-from roughvisc.experiment.available import Available
-from roughvisc.mechanics.bodies.love import HALF_SPACE
+from roughvisc.experiment.resources import Available
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost import plan as plan_module

@@ -23,11 +23,10 @@ from support import run_whole
 from roughvisc.errors import InUseError
 from roughvisc.experiment.loading import Loading, LoadingState
 from roughvisc.mechanics.bodies.transforms import transform_library
-from roughvisc.mechanics.fields.sparse import Sparse
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.stepping.pace import ControllerState
-from roughvisc.mechanics.stepping.scene import Instant, State
+from roughvisc.mechanics.sparse import Sparse
+from roughvisc.mechanics.stepping.scene import ControllerState, Instant, State
 from roughvisc.recorder import Checkpoint
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case

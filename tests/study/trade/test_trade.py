@@ -21,7 +21,7 @@ from support import (
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment import grid_convergence
+from roughvisc.experiment import grid_error as grid_convergence
 from roughvisc.study.statement.case import vary
 from roughvisc.study.trade.bench import TimedRuns
 from roughvisc.study.trade.exact import QUANTITIES, closed_form

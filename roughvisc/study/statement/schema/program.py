@@ -18,9 +18,7 @@ from pydantic import (
 )
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.segment import Control
-from roughvisc.mechanics.stepping.words import INSTEAD
+from roughvisc.mechanics.stepping.program import INSTEAD, Control, Program
 from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
 from roughvisc.study.statement.schema.entries import (

@@ -6,8 +6,8 @@ import threading
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.fields import reuse
-from roughvisc.mechanics.fields.reuse import empty, reused
+from roughvisc.mechanics import arrays as reuse
+from roughvisc.mechanics.arrays import empty, reused
 
 SHAPE = (33, 25)
 

@@ -1,6 +1,6 @@
 """Fields that take less memory than their cells: zero but at some cells, or a sum of others that are held anyway.
 
-What is made of them by parts never lies in memory as a whole.
+What is made of them by blocks never lies in memory as a whole.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.passes import Array, Cells, Mask
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.threads import threads_of
+from roughvisc.mechanics import arrays
+from roughvisc.mechanics.arrays import Array, Cells, Mask, empty, threads_of
 
 # Cells of a grid above which a field is held by some of them: on smaller ones that takes time and spares nothing.
 _ABOVE = 1 << 14
+
+
 # An index takes half as much as a value, so that a field is held whole above two thirds of its cells.
 _INDEX = np.dtype(np.int32)
+
+
 _FEW = 2 / 3
 
 
@@ -49,7 +51,7 @@ class Sparse:
         cells = _not_zero(field)
         if cells.size > _FEW * field.size:
             return cls.whole(field)
-        values = passes.gather(field, cells, threads_of(field.size))
+        values = arrays.gather(field, cells, threads_of(field.size))
         return cls(field.shape, cells.astype(_INDEX), values)
 
     @classmethod
@@ -75,8 +77,8 @@ class Sparse:
         """Some of it by flat indices, not to be changed."""
         if self.cells is None:
             return self.values.reshape(-1)[part]
-        few = passes.slice_of_sorted(part, self.cells)
-        return passes.part_of(self.values[few], self.cells[few], part)
+        few = arrays.slice_of_sorted(part, self.cells)
+        return arrays.part_of(self.values[few], self.cells[few], part)
 
     def positive(self) -> Mask:
         """Where it is more than zero."""
@@ -88,35 +90,41 @@ class Sparse:
 
     def total(self) -> float:
         """Sum over all cells."""
-        return sum(passes.of_parts(lambda part: passes.summed(self.part(part)), self.size, self.threads))
+        return sum(arrays.over_blocks(lambda part: arrays.summed(self.part(part)), self.size, self.threads))
 
     def times(self, factor: float) -> Array:
         """``factor`` times all of it, in memory of its own."""
         if self.cells is None:
-            return passes.times(self.values, factor, self.threads)
-        found = empty(self.shape)
-        passes.scatter_into_zeros(found, self.cells, factor * self.values, self.threads)
+            return arrays.weighted([(factor, self.values)], empty(self.shape), self.threads)
+        found, cells, values = empty(self.shape), self.cells, factor * self.values
+        flat = found.reshape(-1)
+
+        def fill(part: slice, few: slice) -> None:
+            flat[part].fill(0)
+            flat[cells[few]] = values[few]
+
+        arrays.over_cells(fill, self.size, cells, self.threads)
         return found
 
     def add_to(self, out: Array, factor: float) -> None:
         """``out += factor`` times it."""
         if self.cells is None:
-            passes.add_scaled(out, self.values, factor, self.threads)
+            arrays.add_scaled(out, self.values, factor, self.threads)
             return
         found, cells = out.reshape(-1), self.cells
 
         def work(part: slice) -> None:
             found[cells[part]] += factor * self.values[part]
 
-        passes.of_parts(work, cells.size, self.threads)
+        arrays.over_blocks(work, cells.size, self.threads)
 
     def apart_from(self, other: Sparse) -> float:
         """Sum of the magnitudes of the difference to another field."""
 
         def work(part: slice) -> float:
-            return passes.summed(np.abs(self.part(part) - other.part(part)))
+            return arrays.summed(np.abs(self.part(part) - other.part(part)))
 
-        return sum(passes.of_parts(work, self.size, self.threads))
+        return sum(arrays.over_blocks(work, self.size, self.threads))
 
     def not_zero(self) -> tuple[Cells, Array]:
         """The cells that are not zero, and what is there."""
@@ -155,7 +163,7 @@ class Scattered:
     @classmethod
     def over_largest(cls, shape: tuple[int, int], cells: Cells, values: Array) -> Scattered:
         """Values over their largest magnitude."""
-        return cls(shape, cells, values, passes.largest(values, threads_of(shape[0] * shape[1])) or 1.0)
+        return cls(shape, cells, values, _largest(values, threads_of(shape[0] * shape[1])) or 1.0)
 
     def rows(self, rows: slice) -> NDArray[np.float32]:
         """Some rows of it."""
@@ -176,8 +184,8 @@ class Scattered:
         if rows.stop - rows.start == self.shape[0]:
             return slice(0, self.cells.size), self.cells
         part = slice(rows.start * self.shape[1], rows.stop * self.shape[1])
-        few = passes.slice_of_sorted(part, self.cells)
-        return few, passes.local_index(part, self.cells[few])
+        few = arrays.slice_of_sorted(part, self.cells)
+        return few, arrays.local_index(part, self.cells[few])
 
 
 @dataclass(frozen=True)
@@ -204,7 +212,7 @@ class Sum:
     def field(self) -> Array:
         """All of it, not to be changed: where it is held whole, that is no copy."""
         first = self.terms[0][1]
-        return first if self.is_whole else passes.weighted(self.terms, empty(first.shape), threads_of(first.size))
+        return first if self.is_whole else arrays.weighted(self.terms, empty(first.shape), threads_of(first.size))
 
     def part(self, part: slice) -> Array:
         """Some of it by flat indices, not to be changed."""
@@ -219,4 +227,13 @@ class Sum:
 
 def _not_zero(field: Array) -> Cells:
     values = field.reshape(-1)
-    return passes.cells_where(lambda part: values[part] != 0, values.size, threads_of(values.size))
+    return arrays.cells_where(lambda part: values[part] != 0, values.size, threads_of(values.size))
+
+
+def _largest(vector: Array, threads: int) -> float:
+    """Largest magnitude in a vector; zero of none."""
+
+    def largest(values: Array) -> float:
+        return float(np.maximum.reduce(np.abs(values), initial=0.0))
+
+    return max(arrays.blockwise(largest, vector, threads=threads))

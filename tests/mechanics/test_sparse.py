@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from roughvisc.mechanics.fields import passes, sparse
-from roughvisc.mechanics.fields.sparse import Scattered, Sparse, Sum
+from roughvisc.mechanics import arrays as arrays_module
+from roughvisc.mechanics import sparse
+from roughvisc.mechanics.sparse import Scattered, Sparse, Sum
 
 SHAPE = (9, 11)
 FIELDS = arrays(float, SHAPE, elements=st.sampled_from([0.0, 0.0, 0.0, 1.5, -2.25, 1e-300]))
@@ -16,7 +17,7 @@ FIELDS = arrays(float, SHAPE, elements=st.sampled_from([0.0, 0.0, 0.0, 1.5, -2.2
 @pytest.fixture(autouse=True)
 def of_small_grids(monkeypatch):
     monkeypatch.setattr(sparse, "_ABOVE", 10)
-    monkeypatch.setattr(passes, "_PART", 13)
+    monkeypatch.setattr(arrays_module, "_BLOCK", 13)
 
 
 def some(part, seed=1):
@@ -104,10 +105,10 @@ def test_sum__is_added_up_where_it_is_asked_for():
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_cut__says_whether_anything_was_below_zero(threads):
+def test_cut_at_zero__says_whether_anything_was_below_zero(threads):
     field = some(1.0)
     cut = field.copy()
-    assert passes.cut(cut, threads)
+    assert arrays_module.cut_at_zero(cut, threads)
     np.testing.assert_array_equal(cut, np.maximum(field, 0))
-    assert not passes.cut(cut, threads)
+    assert not arrays_module.cut_at_zero(cut, threads)
     np.testing.assert_array_equal(cut, np.maximum(field, 0))

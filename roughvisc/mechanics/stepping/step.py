@@ -1,31 +1,36 @@
-"""One time step: its elastic contact problem, the state after it, and the row that is shown of it."""
+"""Growing domains: detects that the contact leaves the grid, and moves a state to a larger one."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
+from roughvisc.errors import EdgeContactError, InputError
+from roughvisc.mechanics.arrays import blockwise, empty
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.fields import passes
-from roughvisc.mechanics.fields.reuse import empty
-from roughvisc.mechanics.fields.sparse import Sparse, Sum
-from roughvisc.mechanics.hereditary.exponentials import Modes, Rule
+from roughvisc.mechanics.hereditary.exponentials import Modes, Rule, padded
+from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
 from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trajectory, Trial
 
 Array = NDArray[np.float64]
 
+
 # The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
 # as large in the median and 7 times as large in one of fifty (workflows/benchmarks/solver_error.py).
 _ALGEBRAIC = 0.03
+
+
 # Part of the tolerance that the solver's estimate of that error may take: it stops there, sooner or later.
 _SOLVED = 0.2
+
+
 _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure, in steps
 
 
@@ -62,7 +67,8 @@ def trial_step(
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
     carried = None if effective is None else field
     threads = scene.halfspace.threads
-    gap = passes.add(scene.gap, field, field if carried is None else empty(field.shape), threads)
+    gap = field if carried is None else empty(field.shape)
+    blockwise(np.add, scene.gap, field, out=gap, threads=threads)
     del field
     time = state.now.time + length
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
@@ -75,9 +81,9 @@ def trial_step(
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.halfspace.cell_area
     start, start_displacement = state.first_guess(length) if guess is None else guess
-    passes.multiply(start, alpha, threads)
+    blockwise(np.multiply, start, alpha, out=start, threads=threads)
     if start_displacement is not None:
-        passes.multiply(start_displacement, alpha, threads)
+        blockwise(np.multiply, start_displacement, alpha, out=start_displacement, threads=threads)
     contact = solve_contact(
         scene.halfspace,
         gap,
@@ -94,11 +100,11 @@ def trial_step(
     del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
     if carried is not None:
-        passes.add(carried, displacement, carried, threads)
+        blockwise(np.add, carried, displacement, out=carried, threads=threads)
     if effective is not None:
         effective += pressure
-    passes.divide(pressure, alpha, threads)
-    passes.divide(displacement, alpha, threads)
+    blockwise(np.divide, pressure, alpha, out=pressure, threads=threads)
+    blockwise(np.divide, displacement, alpha, out=displacement, threads=threads)
     instant = Instant(
         time,
         Sparse.of(pressure),
@@ -285,3 +291,66 @@ def restarted(scene: Scene, state: State, suggestion: float) -> State:
 def without_past(scene: Scene, state: Trajectory) -> dict[str, Any]:
     """What changes of a trajectory from which nothing is to be extrapolated."""
     return {"before": None, "memory": scene.memory.restart(state.memory)}
+
+
+# The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
+_BEYOND = 1.05
+
+
+def is_outgrown(scene: Scene, instant: Instant) -> bool:
+    """Whether the grid is too small: contact cannot be excluded beyond it, or has reached the domain's border."""
+    if scene.outside < math.inf:
+        return _BEYOND * instant.approach >= scene.outside
+    return at_edge(scene, instant.contact)
+
+
+def at_edge(scene: Scene, contact: Sparse) -> bool:
+    """Whether pressure at the border of a free-space domain acts as the edge of a punch that nobody asked for."""
+    return not scene.accept_edge and at_border(scene, contact)
+
+
+def at_border(scene: Scene, contact: Sparse) -> bool:
+    """Whether there is pressure at the border of a free-space domain."""
+    if scene.halfspace.boundary != "free":
+        return False
+    pressure = contact.field()
+    borders = (-1,) if scene.halfspace.mirrored else (0, -1)
+    return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
+
+
+def edge_error(scene: Scene, time: float) -> EdgeContactError:
+    """The error to raise where the grid cannot grow."""
+    nx, ny = scene.halfspace.surface_shape
+    return EdgeContactError(
+        f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
+        "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
+        "edge='accept' to press it as a punch of that outline"
+    )
+
+
+def enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
+    """Scene and state on a larger grid: nothing outside ever carried pressure."""
+    larger = scene.enlarge(scene) if scene.enlarge is not None else None
+    if larger is None:
+        raise edge_error(scene, time)
+    scene, offset = larger
+    return scene, state.with_each(partial(_on_larger, scene, offset))
+
+
+def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict[str, Any]:
+    """What changes of a trajectory on a larger grid, in which the present one begins at a cell."""
+    shape = scene.halfspace.shape
+    memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
+
+    def moved(instant: Instant) -> Instant:
+        if not instant.contact.size:  # of a companion
+            return instant
+        contact = Sparse.of(padded(instant.pressure, shape, offset))
+        return replace(instant, contact=contact, unit_displacement=None)
+
+    now, before = moved(state.now), None if state.before is None else moved(state.before)
+    glassy, _, carried = elastic_step(scene, memory, 0.0, "linear")
+    unit_displacement = scene.halfspace.displacement(now.pressure)
+    now = replace(now, unit_displacement=unit_displacement)
+    displacement = carried + glassy * unit_displacement
+    return {"now": now, "displacement": displacement, "before": before, "memory": memory}

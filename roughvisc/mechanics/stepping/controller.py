@@ -6,32 +6,133 @@ The estimate is the difference between a solution and the linear extrapolation i
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
-from roughvisc.mechanics.fields.passes import l1_distance
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.mechanics.arrays import l1_distance
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes, Rule
-from roughvisc.mechanics.stepping.fading import Fading, fading
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
+Array = NDArray[np.float64]
+
+
+# Ages at which the weight of a step is tabulated, over the shortest time of the material, and how many in a decade.
+_YOUNGEST, _PER_DECADE = 1e-4, 12
+
+
+# Part of what is allowed that the last step before a kept time may take by what it gets wrong of its own end.
+_LAST = 0.06
+
+
+class Fading:
+    """How the errors of steps fade.
+
+    Parameters
+    ----------
+    series : Prony
+        The material, with an instantaneous compliance.
+    duration : float
+        No age is longer. [s]
+    """
+
+    def __init__(self, series: Prony, duration: float) -> None:
+        times, weights = np.array(series.times), np.array(series.compliances)
+        rates = gains = 1 / times
+        if series.fluidity:
+            rates, gains = np.append(rates, 0.0), np.append(gains, 1.0)
+            weights = np.append(weights, series.fluidity)
+        driven = np.sqrt(gains * weights / series.glassy)
+        self._times, self._flows = times, bool(series.fluidity)
+        decays, basis = np.linalg.eigh(np.diag(rates) + np.outer(driven, driven))
+        self._decays = np.maximum(decays, 0.0)  # it is no less than that, to rounding
+        self._driven = driven @ basis
+        self._read = basis.T * np.sqrt(weights / (gains * series.glassy))
+        fastest = 1 / float(self._decays.max())
+        decades = max(np.log10(duration / (_YOUNGEST * fastest)), 1.0)
+        self._ages = np.geomspace(_YOUNGEST * min(fastest, duration), duration, int(_PER_DECADE * decades))
+        rate = np.maximum(np.exp(-np.outer(self._ages, self._decays)) @ self._driven**2, 0.0)
+        self._left, root = rate / float(self._driven @ self._driven), np.cbrt(rate)
+        past = np.cumsum(0.5 * (root[1:] + root[:-1]) * np.diff(self._ages))
+        weight = root**2 * np.append(0.0, past)
+        self._weights = np.maximum.accumulate(weight[::-1])[::-1]  # at this kept time or a later one
+
+    def remaining(self, left: float) -> float:
+        """Part of an error of the pressure that is left after a time. [s]"""
+        return float(np.interp(left, self._ages, self._left))
+
+    def weight(self, left: float, step: float) -> float:
+        """Largest part of the error of a step that is left at a kept time.
+
+        Parameters
+        ----------
+        left : float
+            From the start of the step to the next kept time. [s]
+        step : float
+            Its length. [s]
+
+        Notes
+        -----
+        The fewest steps that keep to what is allowed at a kept time err by what is left of that over
+        ``rho(theta)^(2/3) int_0^theta rho^(1/3)`` each, with the rate ``rho(t) = b exp(-S t) b`` at which an error
+        fades. What is left of it is not counted: it is taken as all. Steps that all use up what they may come to two
+        to four times as much, and those of a march stay well below that, since their lengths double at most. What a
+        step gets wrong of its own end does not follow from its mean error, and is asked for besides.
+        """
+        mean = float(np.interp(left, self._ages, self._weights))
+        x = step / self._times
+        small, large = np.minimum(x, 0.1), np.maximum(x, 0.1)
+        kick = np.where(x < 0.1, small / 6 * (1 - small / 2), ((large - 2) + (large + 2) * np.exp(-large)) / large**2)
+        if self._flows:
+            kick = np.append(kick, step / 6)
+        end = 6 * float(self._driven * np.exp(-self._decays * max(left - step, 0.0)) @ (self._read @ kick))
+        return max(mean, abs(end) / _LAST)
+
+
+@lru_cache(maxsize=8)
+def fading(series: Prony, duration: float) -> Fading:
+    """Of a material in a program; asked for at every step."""
+    return Fading(series, duration)
+
+
 # Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
 _SHARE = 0.5
+
+
 #: Shortest step, in lengths of the segment or of the way to the first kept time.
 SMALLEST_STEP = 1e-6
+
+
 # A cycle takes so many steps at least: what a sine loses in a cycle is then right within 2/3 (pi / n)^2, 2.6 %, and
 # ten times better without the leading part of that.
 _STEPS_A_CYCLE = 16
+
+
 # The two-step rule is stable while steps grow by no more than 1 + sqrt(2) (E. Hairer, S. P. Norsett, G. Wanner, Solving
 # Ordinary Differential Equations I, section III.5).
 _GROWTH = 2.4
+
+
 # The next step errs by curvature h^2 / 6 by the linear rule, and by curvature h (h + last) / 3 by the damped one. It
 # aims at 0.7 of what is allowed: hence 0.7 times 6, and 0.7 times 12 in the quadratic equation for the damped rule.
 _LINEAR, _DAMPED = 4.2, 8.4
+
+
 # Steps double at most, or grow so many times where the estimate is below this part of what is allowed.
 _FASTEST, _EASY = 4.0, 0.02
+
+
 # What can be wrong by less than this part of the tolerance is not looked at.
 _NOT_SEEN = 0.01
+
+
 # Of a step's error, what does not fade counts: what it adds to the work, less its leading part.
 _NOT_FADING = 0.35
+
+
 # Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
 _ROUNDING = 1e-11
 

@@ -1,0 +1,347 @@
+"""Memory of a march, counted in fields of its grid (8 bytes a cell) before there is any."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import multiprocessing
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.arrays import is_wide
+from roughvisc.mechanics.hereditary.direct import History, history_bytes
+from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
+from roughvisc.settings import Settings
+from roughvisc.variables.chunks import chunks
+
+_PROCESS, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
+
+
+#: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
+_FILES = {
+    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    "": ("memory.max", "memory.current", "inactive_file"),
+}
+
+
+@dataclass(frozen=True)
+class Available:
+    """Memory that may yet be taken.
+
+    Attributes
+    ----------
+    size : float
+        [byte]
+    words : str
+        Whose limit that is, as the end of a sentence that begins with the size.
+    """
+
+    size: float
+    words: str
+
+
+def memory_available() -> Available:
+    """Memory that this process may yet take, and what limits it."""
+    return min([*_machine(), *_groups(), *_own(), *_worker()], key=lambda one: one.size)
+
+
+def _machine() -> Iterator[Available]:
+    import psutil
+
+    yield Available(float(psutil.virtual_memory().available), "free in this machine")
+
+
+def _groups() -> Iterator[Available]:
+    """What the control groups of this process leave, of version 1 and 2, up to the outermost."""
+    try:
+        lines = (_PROCESS / "cgroup").read_text().split()
+    except OSError:  # no Linux
+        return
+    for line in lines:
+        _, kind, path = line.split(":", 2)
+        if kind not in _FILES:
+            continue
+        root = _GROUPS / kind
+        group = root / path.lstrip("/")
+        for folder in {root, group, *(place for place in group.parents if root in place.parents)}:
+            with suppress(OSError, ValueError):  # not to be seen from inside a container, or without a limit
+                limit, used, cache = _FILES[kind]
+                counts = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
+                taken = int((folder / used).read_text()) - int(counts.get(cache, 0))
+                yield Available(float(int((folder / limit).read_text()) - taken), "left of the container's limit")
+
+
+def _own() -> Iterator[Available]:
+    """What is left of the address space that the process may have."""
+    with suppress(ImportError):  # there is none on Windows
+        import resource
+
+        import psutil
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
+            yield Available(
+                float(limit - psutil.Process().memory_info().vms), "left of this process's limit (ulimit -v)"
+            )
+
+
+def _worker() -> Iterator[Available]:
+    worker = _dask_worker()
+    limit = getattr(getattr(worker, "memory_manager", None), "memory_limit", None)
+    if limit:
+        import psutil
+
+        taken = psutil.Process().memory_info().rss
+        yield Available(float(limit - taken), "left of the Dask worker's memory limit")
+
+
+def _dask_worker() -> Any:
+    """The worker whose task this is; None where it is none."""
+    distributed = sys.modules.get("distributed")
+    if distributed is not None:
+        with suppress(ValueError):
+            return distributed.get_worker()
+    return None
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    from dask.system import CPU_COUNT
+
+    return int(CPU_COUNT)
+
+
+def threads_for(asked: int | None) -> int:
+    """Threads of a case that is computed here.
+
+    Parameters
+    ----------
+    asked : int or None
+        None: as ``scipy.fft.set_workers`` has it; where nobody has set that, all cores for a case that is alone, in
+        the main thread of a process that no other has started, and else one.
+
+    Raises
+    ------
+    InputError
+        If it is no positive whole number.
+    """
+    if asked is not None:
+        if isinstance(asked, bool) or not isinstance(asked, int) or asked < 1:
+            raise InputError(f"threads is {asked!r}: expected a whole number of at least 1, or None")
+        return asked
+    stated = int(fft.get_workers())
+    alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return cores() if stated == 1 and alone else stated
+
+
+# Of the GNU C library: its own threshold does not rise beyond.
+_HIGHEST = 31 << 20
+
+
+# Its settings: from how many bytes arrays are mapped by themselves, and how much freed memory it keeps; of that, what
+# it keeps at most by itself, and the most that it can be told. [byte]
+_MMAP, _TRIM = -3, -1
+
+
+_BY_ITSELF, _MOST = 64 << 20, 2047 << 20
+
+
+# Fields from which a march keeps as much as it frees. [byte]
+_WIDE = 8 << 20
+
+
+@cache
+def keep_memory() -> bool:
+    """Have the C library keep freed memory for the next array, in the whole process; say whether that was possible.
+
+    As it comes it gives large arrays back at once, and the next ones are mapped and cleared anew: a run at 256 to 512
+    squared takes 10 to 15 % longer, and on Dask's workers, whose nannies set ``MALLOC_TRIM_THRESHOLD_``, a convolution
+    up to 1.8 times as long.
+    """
+    library = _library()
+    return library is not None and _told_to_keep(library)
+
+
+@contextmanager
+def retain_arena(size: int) -> Iterator[None]:
+    """Have the C library keep freed memory while arrays of so many bytes are computed with.
+
+    Of narrow grids it is only told what to expect. What an iteration on a wide one needs for the cells in contact, some
+    fields near full contact, is freed and had again: given back to the system and cleared anew it takes half of the
+    time (measured at 4096 squared, 95 % in contact: 1.7 times as long). In the end it is given back, and freed memory
+    is kept as the library does by itself.
+    """
+    library = _library()
+    if size < _WIDE or library is None:
+        expect_arrays(size)
+        yield
+        return
+    _told_to_keep(library)
+    try:
+        yield
+    finally:
+        if not keep_memory.cache_info().currsize:  # that is for all of the process
+            library.mallopt(_TRIM, _BY_ITSELF)
+        library.malloc_trim(0)
+
+
+def _told_to_keep(library: Any) -> bool:
+    """Whether it takes the settings."""
+    return bool(library.mallopt(_MMAP, 32 << 20) and library.mallopt(_TRIM, _MOST))
+
+
+@cache
+def _library() -> Any:
+    """The GNU C library; None where it is another one."""
+    if not sys.platform.startswith("linux"):
+        return None
+    try:
+        library = ctypes.CDLL("libc.so.6")
+        return library if library.mallopt and library.malloc_trim else None
+    except (OSError, AttributeError):
+        return None
+
+
+def expect_arrays(size: int) -> None:
+    """Have the C library keep a few freed arrays of so many bytes, without changing how it is set up.
+
+    The GNU library takes the largest array that was ever freed for a measure of what to keep: one that is never
+    touched costs nothing. Without this a quarter of a step at 512 squared may go into clearing memory anew.
+    """
+    np.empty(min(16 * size, _HIGHEST), np.uint8)
+
+
+#: What the interpreter and the libraries take, measured. [byte]
+PROCESS = 210e6
+
+
+#: Fields of the surface: heights and gaps, and the marks of present cells.
+_SURFACE = 2.1
+
+
+#: Fields of a march without a past, what a contact on all cells adds to them, and what a narrow grid adds: transforms
+#: of whole fields, and the separation.
+_ELASTIC, _IN_CONTACT, _NARROW = 7.0, 11.0, 1.5
+
+
+#: Spectrum, symbols and what a transform gives.
+_TRANSFORMS = {"periodic": 2.0, "free": 6.0}
+
+
+#: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
+#: and after a step, and in the checkpoint that may be asked for.
+_COMPANION, _EXPONENTIAL = 1.5, 5.2
+
+
+#: What a march adds whose window or grid follows the contact, since it may go back to the state before; and what moving
+#: a state to a larger one adds. Measured on balls at 770 x 460 to 1131 x 1096.
+_FOLLOWING, _MOVED = 13.0, 12.0
+
+
+#: What the direct history adds beside the companion: total displacements and effective pressures.
+_DIRECT = 6.5
+
+
+#: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
+_SHOWN = 3.0
+
+
+#: Fields of the state while the file is written, a frame as it was kept among them.
+_STATE = 4.5
+
+
+#: Rows wait for the disk until they take more. [byte]
+_WAITING = 8e6
+
+
+#: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
+_CURVE = 27.0
+
+
+#: Contact fraction below which a contact is sparse.
+SPARSE = 0.05
+
+
+def march_bytes(
+    settings: Settings,
+    cells: float,
+    memory: Memory,
+    *,
+    contact: float = SPARSE,
+    steps: float = 0.0,
+    rows: float = 1.0,
+    part: float = 1.0,
+    in_memory: bool = False,
+    grows: bool = False,
+) -> float:
+    """Memory of a march at its peak, without what the process takes in any case.
+
+    Parameters
+    ----------
+    settings : Settings
+        Of the solve.
+    cells : float
+        Of the surface.
+    memory : Memory
+        Of the material's past.
+    contact : float
+        Largest contact fraction.
+    steps, rows : float
+        Accepted steps, and kept ones.
+    part : float
+        Part of the cells that is solved on.
+    in_memory : bool
+        Whether the kept fields stay in memory, as those of :func:`roughvisc.simulate` do; else they go to a file.
+    grows : bool
+        Whether the window or the grid, which the cells are those of in the end, was smaller before.
+
+    Returns
+    -------
+    float
+        [byte]
+
+    Notes
+    -----
+    The larger one of the peaks while the contact is solved and while the file is written. Measured by
+    ``workflows/benchmarks/memory.py``.
+    """
+    field = 8.0 * cells
+    state, past = _STATE, 0.0
+    solved = _ELASTIC + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
+    if not is_wide(math.ceil(part * cells)):
+        solved += _NARROW
+    if isinstance(memory, Modes):
+        modes = len(memory.material.times) + bool(memory.material.fluidity)
+        if modes:
+            solved += _COMPANION + _EXPONENTIAL * modes
+            state += 3 * modes
+            if "bdf2" in memory.rules:
+                solved += _SHOWN + _EXPONENTIAL * modes
+            if memory.acts_on != "displacement":
+                solved += _FOLLOWING + (_EXPONENTIAL * modes if memory.acts_on == "both" else 0.0)
+                solved += _MOVED if grows else 0.0
+    elif isinstance(memory, History):
+        past = 1.5 * history_bytes(contact * cells, steps)
+        solved += _COMPANION + _DIRECT
+    frames = rows * len(settings.fields) * field
+    surface = _SURFACE * field + past
+    if in_memory:
+        return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
+    layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
+    waiting = min(max(rows - 1, 0) * len(settings.fields) * field, _WAITING)
+    return surface + max(part * solved * field + waiting, (part * state + layer) * field)
+
+
+def curve_bytes(settings: Settings, cells: float) -> float:
+    """Memory of a curve of friction at its peak, without what the process takes in any case. [byte]"""
+    return (_CURVE + len(settings.fields)) * 8.0 * cells
