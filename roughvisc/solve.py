@@ -94,8 +94,6 @@ def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
 
 
 log = logging.getLogger("roughvisc")
-
-
 Progress = Callable[[float, float], None]
 
 

@@ -23,8 +23,6 @@ from roughvisc.topography.indenters import grown
 from roughvisc.variables.axes import axis_of
 
 Array = NDArray[np.float64]
-
-
 #: Powers of the cell's side with which the error of a quantity vanishes: no lower one is believed, and no higher one
 #: expected. Measured: of the pressure's L1 norm; the mean gap follows the displacements, the counted area the cells at
 #: its edge; of the contact area the scatter of the count is left. Friction shows the power 2 or more; with 1.5 what is
@@ -39,8 +37,6 @@ ORDERS = {
     "friction": (1.0, 1.5),
     "sliding_area": (1.0, 1.0),
 }
-
-
 #: Roache's safety factors: with three grids, and with two.
 _THREE, TWO_GRIDS = 1.25, 3.0
 
@@ -82,22 +78,14 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -
 
 
 log = logging.getLogger("roughvisc")
-
-
 Mask = NDArray[np.bool_]
-
-
 #: Error of the pressure (L1) for each newton on cells at the edge of the contact, at most: where contact ends on the
 #: material (measured 0.2 in the median, 0.5 in 5 % of the cases), and where the material ends, with pressure infinite.
 #: With all of the force at the edge, nothing is known.
 _AT_EDGE, _AT_END = 0.45, 0.9
-
-
 #: Error of the counted cells over the square root of the number of faces at the contact's edge, as edges lie at random
 #: between the cells; what is mirrored doubles the same error.
 _COUNTING = 0.5
-
-
 #: Approaches that differ by less of the largest one were given.
 _GIVEN = 1e-12
 

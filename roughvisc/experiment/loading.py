@@ -74,11 +74,7 @@ def friction_row(step: Step) -> dict[str, float]:
 
 
 log = logging.getLogger("roughvisc")
-
-
 Array = NDArray[np.float64]
-
-
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 

@@ -1,4 +1,4 @@
-"""Notes of a result on its own limits: effects left out, rows beyond the tolerance, steep slopes."""
+"""Notes on what is beyond the model: steep slopes, borders that do not meet, wakes, bases, omitted effects."""
 
 from __future__ import annotations
 
@@ -23,14 +23,10 @@ from roughvisc.units import said
 from roughvisc.variables import FIELDS
 
 Array = NDArray[np.float64]
-
-
 #: Part of all creep that is still to recover after a period, from which on a result says so. Friction of a sphere on a
 #: period of 6 to 11 contact radii, with 1 and 9 times the instantaneous compliance retarded: 0.4 to 0.6 % off where
 #: 1e-6 of the creep is left, 5 to 6 % where 1 to 2 % are left, 26 % where 7 to 12 % are left.
 _LEFT = 0.01
-
-
 #: Part of the period over which nothing touches, in one piece along the motion, from which on a contact stands alone.
 _FREE = 0.25
 
@@ -106,14 +102,10 @@ NO_JUMP = (
     "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
     "comes into contact. The approach keeps the tolerance; of pressure, force and work each row states its own error."
 )
-
-
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
 #: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
 #: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
 LARGEST_SLOPE = 0.3
-
-
 #: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
 _AT_ONCE = 0.1
 

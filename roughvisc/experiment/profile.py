@@ -1,4 +1,4 @@
-"""The profile that is pressed: the labelled surface, and the part of it that is solved on."""
+"""The profile that is pressed: the labelled surface, its mirror images, and the part of it that is solved on."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from roughvisc.topography.grid import checked, nominal_area, spacing, taper_weig
 from roughvisc.topography.indenters import grown, highest
 
 Array = NDArray[np.float64]
-
-
 #: Rounding that two mirror images may differ by, relative to the largest height.
 _ROUNDING = 16 * float(np.finfo(float).eps)
 
@@ -59,8 +57,6 @@ def unfold(field: Array) -> None:
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
 GROWTH, MOST_CELLS = 1.5, 4096**2
-
-
 #: The window begins so many cells wide, on surfaces whose shorter side has so many.
 _FIRST_EXTENT, _WORTH_FOLLOWING = 32, 96
 

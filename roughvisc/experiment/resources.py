@@ -1,4 +1,4 @@
-"""Memory of a march, counted in fields of its grid (8 bytes a cell) before there is any."""
+"""What a solve takes and what there is: memory and cores, fields counted beforehand, and memory that is used again."""
 
 from __future__ import annotations
 
@@ -24,9 +24,7 @@ from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
 from roughvisc.settings import Settings
 from roughvisc.variables.chunks import chunks
 
-_PROCESS, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
-
-
+_PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
 #: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
 _FILES = {
     "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
@@ -64,7 +62,7 @@ def _machine() -> Iterator[Available]:
 def _groups() -> Iterator[Available]:
     """What the control groups of this process leave, of version 1 and 2, up to the outermost."""
     try:
-        lines = (_PROCESS / "cgroup").read_text().split()
+        lines = (_PROC_SELF / "cgroup").read_text().split()
     except OSError:  # no Linux
         return
     for line in lines:
@@ -146,16 +144,10 @@ def threads_for(asked: int | None) -> int:
 
 # Of the GNU C library: its own threshold does not rise beyond.
 _HIGHEST = 31 << 20
-
-
 # Its settings: from how many bytes arrays are mapped by themselves, and how much freed memory it keeps; of that, what
 # it keeps at most by itself, and the most that it can be told. [byte]
 _MMAP, _TRIM = -3, -1
-
-
 _BY_ITSELF, _MOST = 64 << 20, 2047 << 20
-
-
 # Fields from which a march keeps as much as it frees. [byte]
 _WIDE = 8 << 20
 
@@ -223,51 +215,29 @@ def expect_arrays(size: int) -> None:
 
 #: What the interpreter and the libraries take, measured. [byte]
 PROCESS = 210e6
-
-
 #: Fields of the surface: heights and gaps, and the marks of present cells.
 _SURFACE = 2.1
-
-
 #: Fields of a march without a past, what a contact on all cells adds to them, and what a narrow grid adds: transforms
 #: of whole fields, and the separation.
 _ELASTIC, _IN_CONTACT, _NARROW = 7.0, 11.0, 1.5
-
-
 #: Spectrum, symbols and what a transform gives.
 _TRANSFORMS = {"periodic": 2.0, "free": 6.0}
-
-
 #: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
 #: and after a step, and in the checkpoint that may be asked for.
 _COMPANION, _EXPONENTIAL = 1.5, 5.2
-
-
 #: What a march adds whose window or grid follows the contact, since it may go back to the state before; and what moving
 #: a state to a larger one adds. Measured on balls at 770 x 460 to 1131 x 1096.
 _FOLLOWING, _MOVED = 13.0, 12.0
-
-
 #: What the direct history adds beside the companion: total displacements and effective pressures.
 _DIRECT = 6.5
-
-
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
 _SHOWN = 3.0
-
-
 #: Fields of the state while the file is written, a frame as it was kept among them.
 _STATE = 4.5
-
-
 #: Rows wait for the disk until they take more. [byte]
 _WAITING = 8e6
-
-
 #: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
 _CURVE = 27.0
-
-
 #: Contact fraction below which a contact is sparse.
 SPARSE = 0.05
 

@@ -1,4 +1,7 @@
-"""From labelled to plain arrays: surface, material, program and settings become the scene of a march."""
+"""From labelled to plain arrays: surface, material, program and settings become the scene of a march.
+
+Refused here is what floating-point numbers cannot resolve, and slides that do not go with the grid.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +29,8 @@ from roughvisc.units import said
 
 #: Times that differ by less, in lengths of the program, are one.
 _ROUNDING = 1e-12
-
-
 #: In a hold the first of them lies no later than this part of it. [-]
 _FIRST = 1e-3
-
-
 Array = NDArray[np.float64]
 
 
@@ -124,12 +123,8 @@ def _apportioned(weights: Sequence[float], count: int) -> list[int]:
 #: A segment, or the period of a cycle, is as long as so many roundings of its end: a march may take steps of a
 #: millionth of it, and each must move the time.
 LEAST_ROUNDINGS = 4e6
-
-
 #: Times and loads whose squares and products stay far from overflow. [s], [N]
 LARGEST = 1e100
-
-
 #: Displacements of a periodic surface may exceed its heights by so much before their rounding exceeds a tenth of these.
 MOST_HEIGHTS = 1e15
 
@@ -191,8 +186,6 @@ def check_loads(
 
 
 Spacing = tuple[float, float]
-
-
 #: A slide's cells differ from what was asked for by more than this part of it where that is told.
 _TOLD = 1e-9
 

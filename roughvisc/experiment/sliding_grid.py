@@ -1,9 +1,4 @@
-"""Error of the grid in friction and contact area, from the same speeds on cells two and four times as long.
-
-The coarser copies have the same waves as far as their cells can hold them, so that a surface without waves that are
-shorter loses nothing but accuracy. No error of the area is stated below that of counting cells. Of friction, what
-pressure on slopes and dissipated power differ by would say little: at low speed it is the rest of two large forces.
-"""
+"""A surface as it slides: turned into the motion, on one grid and on coarser ones that show the error of the grid."""
 
 from __future__ import annotations
 
@@ -29,12 +24,8 @@ from roughvisc.topography.resampling import resample_periodic
 from roughvisc.topography.spectrum import without_last_octave
 
 Array = NDArray[np.float64]
-
-
 # A profile that changes across the motion by less than this part of its range does not change there.
 _ROUNDING = 1e-12
-
-
 #: Direction -> quarter turns of the grid, counter-clockwise, by which the profile comes to move along +x.
 _QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
 
@@ -160,14 +151,10 @@ def areas(contact: NDArray[np.bool_], spacing: tuple[float, float]) -> tuple[flo
 
 
 log = logging.getLogger("roughvisc")
-
-
 #: Stated over what counting leaves open of an area at rest. On 24 rough surfaces, at three pressures and three speeds,
 #: the stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the
 #: powers of an area at rest it was less than 0.8 in 15 of these 216.
 _COUNTING_CAUTION = 1.5
-
-
 _NOTHING = {"grid_error_friction": math.nan, "grid_error_area": math.nan}
 
 

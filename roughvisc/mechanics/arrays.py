@@ -29,7 +29,6 @@ Mask = NDArray[np.bool_]
 Cells = NDArray[np.int32] | NDArray[np.int64]
 Part = TypeVar("Part")
 Found = TypeVar("Found")
-
 # Cells of a block at most.
 _BLOCK = 1 << 17
 

@@ -16,12 +16,8 @@ from roughvisc.mechanics.arrays import Array, Cells, Mask, empty, threads_of
 
 # Cells of a grid above which a field is held by some of them: on smaller ones that takes time and spares nothing.
 _ABOVE = 1 << 14
-
-
 # An index takes half as much as a value, so that a field is held whole above two thirds of its cells.
 _INDEX = np.dtype(np.int32)
-
-
 _FEW = 2 / 3
 
 

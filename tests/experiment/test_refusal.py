@@ -160,7 +160,7 @@ def test_curve_of_friction__is_refused_where_it_cannot_fit(study, limited, tmp_p
 def test_control_groups__of_both_versions_and_all_levels_count(tmp_path, monkeypatch):
     groups, process = tmp_path / "groups", tmp_path / "self"
     monkeypatch.setattr(available, "_GROUPS", groups)
-    monkeypatch.setattr(available, "_PROCESS", process)
+    monkeypatch.setattr(available, "_PROC_SELF", process)
     process.mkdir()
 
     def group(folder, names, limit, used, cache, statistic):

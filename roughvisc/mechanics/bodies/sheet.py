@@ -19,24 +19,14 @@ from roughvisc.mechanics.bodies.half_space import love_kernel, rectangle_displac
 from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
 
 Array = NDArray[np.float64]
-
-
 # With this kappa the response to long waves is right to 1e-3 of 4/3 q^2 on cells of any length (measured).
 _KAPPA = 3.0
-
-
 # Distance at which erfc(kappa r) is below rounding, and Gauss points that integrate over as much to rounding.
 _SHORT_REACH, _GAUSS_POINTS = 6.2 / _KAPPA, 32
-
-
 # Wave number at which the second part of the kernel, 2/q erfc(q / 2 kappa), is below rounding.
 _LAST_WAVE = 12 * _KAPPA
-
-
 # Minus the second derivative, to fourth order in the spacing.
 _SECOND_DIFFERENCE = (-1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12)
-
-
 _MARGIN = len(_SECOND_DIFFERENCE) // 2
 
 
@@ -114,28 +104,16 @@ def _cell_waves(count: int, side: float, waves: Array, reach: float) -> Array:
 
 
 Base = Literal["bonded", "slipping"]
-
-
 # In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
 _REACH = 46.0
-
-
 # 1 - S(s) dies as s^2 exp(-2 s): below rounding from here.
 SHORTEST_WAVE = 24.0
-
-
 # The correction in the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
 _PIECE, _NODES = 0.15, 10
-
-
 # Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-
-
 # Cells of more thicknesses than the first are long: see the module on them. Beyond the second they are refused.
 _LONG, _LONGEST = 0.5, 50.0
-
-
 # Below this, sinh(2 x) - 2 x comes from its series.
 _SERIES_BELOW = 0.5
 

@@ -1,4 +1,8 @@
-"""Convergence certificate of the contact solver: the duality gap and the error bound that follows from it."""
+"""What is known of a pressure: its duality gap, the bound that follows from it, and an estimate of its error.
+
+Near full contact with periodic boundaries load and approach depend on each other: a uniform pressure displaces nothing,
+so that the energy does not see the load, and what matters is the mean gap, far smaller than the displacements.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +19,8 @@ from roughvisc.mechanics.contact.problem import Array, Cells, Problem
 # Under given approach and periodic boundaries the load is wrong by no more than this many times the tolerance.
 # Measured: below 98 % of contact the duality gap makes it less, so that no iteration is added.
 _LOAD_ERROR = 10.0
-
-
 # ... and by this in any case: what rounding of the gap leaves.
 ROUNDED = 1e-10
-
-
 # So near full contact, in parts of the approach, a load that leaves no gap at all is cut at once: measured at 64
 # squared, 7 iterations instead of 346.
 _NEARLY_FULL = 1e-3

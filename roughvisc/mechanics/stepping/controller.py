@@ -1,6 +1,6 @@
-"""Step length control: an error estimate that costs nothing, and steps that land on the kept times.
+"""How long a step is: an error estimate that costs nothing, what of it is left at the next kept time, and the events.
 
-The estimate is the difference between a solution and the linear extrapolation it was started from.
+Steps land on the kept times. What a step's error counts fades as the material relaxes until its pressure is shown.
 """
 
 from __future__ import annotations
@@ -18,12 +18,8 @@ from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
 Array = NDArray[np.float64]
-
-
 # Ages at which the weight of a step is tabulated, over the shortest time of the material, and how many in a decade.
 _YOUNGEST, _PER_DECADE = 1e-4, 12
-
-
 # Part of what is allowed that the last step before a kept time may take by what it gets wrong of its own end.
 _LAST = 0.06
 
@@ -100,39 +96,23 @@ def fading(series: Prony, duration: float) -> Fading:
 
 # Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
 _SHARE = 0.5
-
-
 #: Shortest step, in lengths of the segment or of the way to the first kept time.
 SMALLEST_STEP = 1e-6
-
-
 # A cycle takes so many steps at least: what a sine loses in a cycle is then right within 2/3 (pi / n)^2, 2.6 %, and
 # ten times better without the leading part of that.
 _STEPS_A_CYCLE = 16
-
-
 # The two-step rule is stable while steps grow by no more than 1 + sqrt(2) (E. Hairer, S. P. Norsett, G. Wanner, Solving
 # Ordinary Differential Equations I, section III.5).
 _GROWTH = 2.4
-
-
 # The next step errs by curvature h^2 / 6 by the linear rule, and by curvature h (h + last) / 3 by the damped one. It
 # aims at 0.7 of what is allowed: hence 0.7 times 6, and 0.7 times 12 in the quadratic equation for the damped rule.
 _LINEAR, _DAMPED = 4.2, 8.4
-
-
 # Steps double at most, or grow so many times where the estimate is below this part of what is allowed.
 _FASTEST, _EASY = 4.0, 0.02
-
-
 # What can be wrong by less than this part of the tolerance is not looked at.
 _NOT_SEEN = 0.01
-
-
 # Of a step's error, what does not fade counts: what it adds to the work, less its leading part.
 _NOT_FADING = 0.35
-
-
 # Of displacements, relative to what the mean pressure could cause, beside the 1e-16 of each transform.
 _ROUNDING = 1e-11
 

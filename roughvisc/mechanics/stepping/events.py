@@ -1,4 +1,4 @@
-"""Events: corners and jumps of the loading program, after which the march starts without extrapolation."""
+"""Events of a march: corners and jumps of the program, changes of control, and when surfaces that are open close."""
 
 from __future__ import annotations
 
@@ -24,8 +24,6 @@ from roughvisc.mechanics.stepping.step import (
 
 # Times are found to this part of the way to the next event.
 _RESOLVED = 1e-9
-
-
 # Surfaces that are apart for less than this part of the way touch at once.
 _AT_ONCE = 1e-6
 

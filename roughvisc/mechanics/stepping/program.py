@@ -22,8 +22,6 @@ from roughvisc.units import said, shown, stated_quantity
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
-
-
 #: in words
 DIRECTIONS = "'x', '-x', 'y' or '-y'"
 
@@ -113,16 +111,10 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
 
 
 Control = Literal["load", "approach", "pressure"]
-
-
 #: what may be prescribed -> its unit
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
-
-
 #: what contact without adhesion cannot carry below zero
 PUSHING = ("load", "pressure")
-
-
 #: in words
 CONTROLS = "'load', 'approach' or 'pressure'"
 
@@ -230,8 +222,6 @@ class Segment:
 
 #: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
-
-
 #: Segments that a program tells one by one.
 TOLD = 8
 

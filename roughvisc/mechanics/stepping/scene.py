@@ -1,4 +1,4 @@
-"""Frozen values of the march: the scene (what is prescribed), the state, an accepted step."""
+"""Frozen values of the march: the scene (what is prescribed), the state, the step length control's state, a step."""
 
 from __future__ import annotations
 
@@ -70,23 +70,15 @@ class Uncertainty:
 
 #: Of a march that has no companion.
 UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
-
-
 # A step that is tried again is shortened to meet what is allowed, of which it aims at the square of the first number,
 # and within the other two. The third is taken where there is no estimate.
 _AIM, _SHORTEST, _LONGEST = 0.7, 0.2, 0.5
-
-
 # A shorter step whose error is above this part of the longer one's was in vain: halving it gains a factor of two at
 # least, unless a cell enters, which makes the pressure jump however short the step is.
 _IN_VAIN = 0.93
-
-
 # Steps are shortened where what is stated exceeds the first part of the tolerance and has grown by more than a factor
 # since it was last told, and lengthened again where it is below the second part. Their share stays between two limits.
 _MOST_USED, _LEAST_USED = 0.7, 0.3
-
-
 _GROWING, _SHARPEST, _BLUNTEST = 1.03, 0.125, 1.0
 
 
@@ -154,24 +146,14 @@ class ControllerState:
 
 
 Array = NDArray[np.float64]
-
-
 Mask = NDArray[np.bool_]
-
-
 # A step where the instantaneous compliance is below this part of the step's creep starts by backward Euler, and
 # shows its pressure through one discarded short solve.
 _SOFT = 0.1
-
-
 #: A pressure near the one sought, and its displacement at unit compliance where that is known. [Pa], [Pa m]
 Guess = tuple[Array, Array | None]
-
-
 #: In place of a field that is not held.
 NO_FIELD = np.zeros((0, 0))
-
-
 NO_CONTACT = Sparse.whole(NO_FIELD)
 
 
@@ -547,7 +529,5 @@ class Trial:
 
 #: Steps through a part of a program, and the scene and the state in which they end.
 Through = Generator[Step, None, tuple[Scene, State]]
-
-
 #: The same, with None before the grid may grow: who holds a step back is to let it go.
 Held = Generator[Step | None, None, tuple[Scene, State]]

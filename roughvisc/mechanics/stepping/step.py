@@ -1,4 +1,4 @@
-"""Growing domains: detects that the contact leaves the grid, and moves a state to a larger one."""
+"""One time step: its elastic contact problem, the state after it, the row shown of it, and a grid it outgrows."""
 
 from __future__ import annotations
 
@@ -20,17 +20,11 @@ from roughvisc.mechanics.stepping.program import Control
 from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trajectory, Trial
 
 Array = NDArray[np.float64]
-
-
 # The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
 # as large in the median and 7 times as large in one of fifty (workflows/benchmarks/solver_error.py).
 _ALGEBRAIC = 0.03
-
-
 # Part of the tolerance that the solver's estimate of that error may take: it stops there, sooner or later.
 _SOLVED = 0.2
-
-
 _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure, in steps
 
 

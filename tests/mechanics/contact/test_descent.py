@@ -8,8 +8,7 @@ from support import rough_gap
 
 from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.contact import solver as descent
-from roughvisc.mechanics.contact import solver as iteration
+from roughvisc.mechanics.contact import solver
 from roughvisc.mechanics.contact.problem import Problem
 from roughvisc.mechanics.contact.solver import Iterate, Search, Step, Trial, admissible_fraction, minimum_along
 
@@ -47,7 +46,7 @@ def judged(problem, matrix, pressure):
 def trial_of(problem, pressure, separation, level, **options):
     """The preconditioned trial of a pressure of known separation."""
     free = problem.free_set(pressure, separation - problem.gap, level)
-    return descent.conjugate_gradient(problem, free, level, 1.0, **options)
+    return solver.conjugate_gradient(problem, free, level, 1.0, **options)
 
 
 def applied(trial, pressure):
@@ -117,7 +116,7 @@ def test_projected_gradient__is_the_nearest_admissible_point_down_the_slope(know
         pressure[~present] = 0
         pressure *= 1 if problem.load is None else problem.load / pressure.sum()
     separation, level = judged(problem, matrix, pressure)
-    trial = descent.projected_gradient(problem, pressure, separation - problem.gap, level)
+    trial = solver.projected_gradient(problem, pressure, separation - problem.gap, level)
     after = applied(trial, pressure)
     assert after.min() >= 0
     assert absent is False or not after[~present].any()
@@ -135,8 +134,8 @@ def test_projected_gradient__is_the_nearest_admissible_point_down_the_slope(know
 
 def test_simplex_projection__keeps_a_small_sum_beside_large_values():
     values = 1e9 + np.array([[0.0, 3.0], [1.0, 2.5]])
-    assert descent.onto_simplex(values, 1.0) == pytest.approx(np.array([[0, 0.75], [0, 0.25]]), abs=1e-6)
-    assert descent.onto_simplex(np.zeros((2, 3)), 6.0) == pytest.approx(np.ones((2, 3)))
+    assert solver.onto_simplex(values, 1.0) == pytest.approx(np.array([[0, 0.75], [0, 0.25]]), abs=1e-6)
+    assert solver.onto_simplex(np.zeros((2, 3)), 6.0) == pytest.approx(np.ones((2, 3)))
 
 
 @pytest.mark.parametrize(
@@ -192,7 +191,7 @@ def test_step__ends_where_the_energy_is_least_along_it(known, single, step_lengt
     before = energy(problem, matrix, pressure)
     iterate = Iterate(pressure.copy(), displacement.copy(), np.arange(pressure.size), False)
     search = Search(step_length, False, single, best=5.0, since=3)
-    stepped, after, taken = iteration._stepped(problem, iterate, search, trial)
+    stepped, after, taken = solver.take_step(problem, iterate, search, trial)
     exact = (matrix @ stepped.pressure.ravel()).reshape(SHAPE)
     precision = (1e-5 if single else 1e-11) * np.abs(displacement).max()
     assert stepped.displacement == pytest.approx(exact, abs=precision)
@@ -214,9 +213,9 @@ def test_safeguarding_step__is_one_and_is_not_conjugated_to():
     problem, matrix = scaled({"load": 3.0})
     pressure = some_pressure(problem)
     separation, level = judged(problem, matrix, pressure)
-    trial = descent.projected_gradient(problem, pressure, separation - problem.gap, level)
+    trial = solver.projected_gradient(problem, pressure, separation - problem.gap, level)
     iterate = Iterate(pressure, separation - problem.gap, np.arange(pressure.size), False)
-    _, after, taken = iteration._stepped(problem, iterate, Search(0.7, True, False, 5.0, 3), trial)
+    _, after, taken = solver.take_step(problem, iterate, Search(0.7, True, False, 5.0, 3), trial)
     assert taken is None
     assert after == Search(0.7, False, False, 5.0, 3)
 
@@ -239,21 +238,21 @@ def test_step_that_does_not_descend__forgets_rounding_then_history_then_the_prec
     contact = np.arange(pressure.size)
     off = Iterate(pressure, displacement * 1.01, contact, approximate=True)
     previous = Step(contact, pressure.ravel(), displacement, 1.0, 1.0)
-    exact, search = iteration._forgetting(problem, off, Search(0.7, False, True, 5.0, 3), previous)
+    exact, search = solver.forget(problem, off, Search(0.7, False, True, 5.0, 3), previous)
     assert exact.displacement == pytest.approx(displacement, rel=1e-12)
     assert not exact.approximate
     assert search == Search(0.7, False, False, 5.0, 3)
     first = problem.length / problem.unit  # the preconditioner is the inverse at this length
-    same, search = iteration._forgetting(problem, exact, Search(0.7, False, False, 5.0, 3), previous)
+    same, search = solver.forget(problem, exact, Search(0.7, False, False, 5.0, 3), previous)
     assert same is exact
     assert search == Search(pytest.approx(first), False, False, 5.0, 3)
-    assert iteration._forgetting(problem, exact, search, None)[1] == Search(pytest.approx(first), True, False, 5.0, 3)
+    assert solver.forget(problem, exact, search, None)[1] == Search(pytest.approx(first), True, False, 5.0, 3)
 
 
 def test_excess_load__is_cut_where_it_displaces_nothing():
     pressure = np.array([[2.0, 5.0], [3.0, 2.5]])
     displacement = np.ones((2, 2))
-    less = iteration._without_excess(Iterate(pressure, displacement, np.arange(4), False))
+    less = solver.without_excess(Iterate(pressure, displacement, np.arange(4), False))
     assert less.pressure.tolist() == [[0.0, 3.0], [1.0, 0.5]]
     assert less.contact.tolist() == [1, 2, 3]
     assert less.displacement is displacement
