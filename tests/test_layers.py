@@ -32,6 +32,7 @@ _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
     "units": {"errors"},
+    "tables": {"errors", "units"},
     "variables": {"errors", "units"},
     "labels": {"errors", "units", "variables"},
     "groups": {"errors", "variables"},
@@ -47,13 +48,13 @@ ALLOWED = {
     "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.bodies"},
     "mechanics.transport": {"errors", "mechanics.contact", "mechanics.bodies"},
     "mechanics.closed_forms": {*_BODY, "errors", "mechanics.stepping"},
-    "topography": _LABELS,
+    "topography": {*_LABELS, "tables"},
     "settings": {"errors", "mechanics.bodies", "units", "variables"},
     "problem": _PROBLEM,
     "recorder": {"mechanics.bodies"},
     "experiment": _EXPERIMENT,
     "solve": _SOLVE,
-    "study.statement": _STATEMENT,
+    "study.statement": {*_STATEMENT, "tables"},
     "study.storage": _STORAGE,
     "study.execution": _EXECUTION,
     "study.audit": _AUDIT,
@@ -111,6 +112,7 @@ ALLOWED = {
 #: libraries that a floor may not import at all
 FORBIDDEN = {
     "errors": {"numpy", "xarray", "dask", "distributed", "matplotlib"},
+    "tables": {"xarray", "dask", "distributed", "matplotlib"},
     "mechanics": {"xarray", "dask", "distributed", "matplotlib", "netCDF4", "pint", "pydantic"},
     "topography": {"dask", "distributed", "matplotlib"},
     "study": {"matplotlib"},

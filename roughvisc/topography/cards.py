@@ -16,8 +16,9 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.tables import regular
 from roughvisc.topography import conditioning
-from roughvisc.topography.readers import existing, read_file, regular, sha256
+from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.recipes import RECIPES, UNITS, make
 from roughvisc.units import quantity, shown
 

@@ -21,6 +21,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.tables import regular
 from roughvisc.topography import gridfiles, instruments
 from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
@@ -275,12 +276,6 @@ def existing(path: Any) -> Path:
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
     return path
-
-
-def regular(path: Path) -> None:
-    """Refuse what is there and is neither a file nor a folder: reading a device or a pipe need not end."""
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise InputError(f"{path}: is a device or a pipe: expected a file")
 
 
 def _is_grid(path: Path, format: str | None) -> bool:

@@ -10,7 +10,7 @@ from statistics import mode
 from typing import TextIO
 
 from roughvisc.errors import InputError
-from roughvisc.topography.text_numbers import decimal_mark, plain_number, read_text
+from roughvisc.tables import decimal_mark, plain_number, read_text
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 #: What separates -> a row of numbers with decimal points.

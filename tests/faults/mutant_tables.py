@@ -12,8 +12,7 @@ from outcome import Outcome, byte_change, compared, opened, text_change
 from stated_units import UnknownUnit, unit_said
 
 from roughvisc.study.statement.case import read_study
-from roughvisc.study.statement.columns import read_columns
-from roughvisc.study.statement.sheets import Wanted, read_sheet
+from roughvisc.tables import Wanted, read_table
 
 
 @dataclass(frozen=True)
@@ -113,10 +112,8 @@ def reader(table: Table, path, by_study=False) -> Callable:
         study = path.with_suffix(".toml")
         study.write_text(_SURFACE + text.format(path.name))
         return lambda: dict(zip(table.columns, columns(json.loads(read_study(study).to_json())), strict=True))
-    if not table.sheet:
-        return lambda: dict(zip(table.columns, read_columns(path, table.columns), strict=True))
     wanted = {name: Wanted(name, unit) for name, unit in table.columns.items()}
-    return lambda: {name: list(column) for name, column in read_sheet(path, wanted)[0].items()}
+    return lambda: {name: list(column) for name, column in read_table(path, wanted, exported=table.sheet)[0].items()}
 
 
 def examine(originals, folder, number, rng):

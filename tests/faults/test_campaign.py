@@ -12,11 +12,11 @@ from campaign import examined, in_processes, listed
 from mutant_studies import names_key
 from stated_units import UnknownUnit, quantity_said
 
+from roughvisc import tables
 from roughvisc.errors import InputError
-from roughvisc.study.statement import columns
 from roughvisc.study.statement.schema import entries
 from roughvisc.study.storage import results, store
-from roughvisc.topography import cards, text_numbers
+from roughvisc.topography import cards
 
 SEED = 1
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
@@ -65,7 +65,7 @@ def test_campaign__notices_a_traceback_and_a_hang(tmp_path, monkeypatch):
     def broken(*_):
         raise ValueError("shape mismatch")
 
-    found = planted("tables", range(12), tmp_path, lambda: monkeypatch.setattr(columns, "decimal_mark", broken))
+    found = planted("tables", range(12), tmp_path, lambda: monkeypatch.setattr(tables, "decimal_mark", broken))
     assert "a traceback: ValueError: shape mismatch" in found
     monkeypatch.setattr("outcome.PATIENCE", 0.05)
 
@@ -110,21 +110,23 @@ def test_campaign__notices_a_wrong_value_of_a_study(tmp_path, monkeypatch):
 
 
 def test_campaign__notices_a_wrong_value_of_a_table(tmp_path, monkeypatch):
-    def wrong(cell, mark):
-        return text_numbers.plain_number(cell.replace(",", ""), ".")
+    right = tables.plain_number
 
-    found = planted("tables", range(40), tmp_path, lambda: monkeypatch.setattr(columns, "plain_number", wrong))
+    def wrong(cell, mark):
+        return right(cell.replace(",", ""), ".")
+
+    found = planted("tables", range(40), tmp_path, lambda: monkeypatch.setattr(tables, "plain_number", wrong))
     assert any("a wrong value served" in one and "served, " in one for one in found)
 
 
 def test_campaign__notices_a_row_that_is_lost(tmp_path, monkeypatch):
-    right = columns.read_text
+    right = tables.read_text
 
     def wrong(path):
         lines = right(path).splitlines()[:-1]
         return "\n".join(lines)
 
-    found = planted("tables", range(40), tmp_path, lambda: monkeypatch.setattr(columns, "read_text", wrong))
+    found = planted("tables", range(40), tmp_path, lambda: monkeypatch.setattr(tables, "read_text", wrong))
     assert any("rows served" in one for one in found)
 
 

@@ -16,8 +16,7 @@ from support import BALL, ROUGH
 import roughvisc as rv
 from roughvisc.study.execution.run import compute
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.statement.columns import read_columns
-from roughvisc.study.statement.sheets import Wanted, read_sheet
+from roughvisc.tables import Wanted, read_table
 
 #: How many of each the small suite takes, and the large.
 STUDIES, SCANS, TABLES = (60, 2500), (60, 800), (60, 500)
@@ -130,8 +129,10 @@ def test_tables(tmp_path, count):
     whole = f"Time [s];Force (mN);n\n{rows}".encode()
     path = tmp_path / "table.csv"
     readers = (
-        lambda: read_columns(path, {"time": "s", "force": "N"}),
-        lambda: tuple(read_sheet(path, {"time": Wanted("time", "s"), "load": Wanted("force", "N")})[0].values()),
+        lambda: tuple(read_table(path, {"time": Wanted("time", "s"), "force": Wanted("force", "N")})[0].values()),
+        lambda: tuple(
+            read_table(path, {"time": Wanted("time", "s"), "load": Wanted("force", "N")}, exported=True)[0].values()
+        ),
     )
     for number in range(count):
         path.write_bytes(damaged_bytes(rng, whole))

@@ -21,8 +21,8 @@ from roughvisc.cli import group
 from roughvisc.errors import InputError, printable
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.tables import Wanted, read_table
 from roughvisc.views.figures.area_load import area_against_load
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -105,7 +105,7 @@ def test_open__devices_and_pipes_are_refused(tmp_path, kind):
     for read in (
         lambda: rv.open_scan(place, format="asc"),
         lambda: rv.open_scan(card),
-        lambda: read_columns(place, {"time": "s"}),
+        lambda: read_table(place, {"time": Wanted("time", "s")}),
         lambda: read_study(place),
     ):
         with pytest.raises(InputError, match=r"endless: is a device or a pipe: expected a file"):
@@ -116,7 +116,7 @@ def test_table__a_cell_without_end(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text('time,load\n0,"' + "1" * (csv.field_size_limit() + 9))
     with pytest.raises(InputError, match=r"t\.csv: cannot be read as a table: field larger than"):
-        read_columns(path, {"time": "s", "load": "N"})
+        read_table(path, {"time": Wanted("time", "s"), "load": Wanted("load", "N")})
 
 
 def test_study_and_card__a_byte_order_mark_is_passed_over(tmp_path, study):

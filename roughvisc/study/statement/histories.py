@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import PUSHING, UNITS, Control, Program
-from roughvisc.study.statement.sheets import as_wanted, read_sheet
+from roughvisc.tables import Wanted, read_table
 from roughvisc.units import bounded_quantity, is_quantity
 
 Array = NDArray[np.float64]
@@ -152,8 +152,11 @@ def read_history(
     """As :func:`read_program`, with quantities in SI, for one column of what is controlled."""
     if decimal not in (None, ".", ","):
         raise InputError(f"decimal: found {decimal!r}: expected '.' or ','")
-    wanted = {"time": as_wanted(time, "s"), control: as_wanted(column, UNITS[control])}
-    columns, lines = read_sheet(path, wanted, decimal)
+    for name in (time, column):
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"found {name!r}: expected the name of a column")
+    wanted = {"time": Wanted(time, "s"), control: Wanted(column, UNITS[control])}
+    columns, lines = read_table(path, wanted, exported=True, decimal=decimal)
     times, values = columns["time"], _less(columns[control], zero) * factor
     _check_times(path, times, lines)
     name, unit = Path(path).name, UNITS[control]

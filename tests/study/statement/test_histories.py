@@ -69,8 +69,12 @@ def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
             NAMES,
             "column 'F' tells no unit: expected one, such as load = 'F [N]'",
         ),
-        ("t [s],F [mm]\n0,0\n1,1", NAMES, "unit of column 'F [mm]' is '1 mm', which is in"),
-        ("t [s],F [N]\n0,0\n1,1", {"time": "t", "load": "F [mN]"}, "column 'F [N]' is in 'N', and load says 'mN'"),
+        ("t [s],F [mm]\n0,0\n1,1", NAMES, "unit of load (F [mm]) is '1 mm', which is in millimeter"),
+        (
+            "t [s],F [N]\n0,0\n1,1",
+            {"time": "t", "load": "F [mN]"},
+            "unit of load (F [N]): the heading says 'N' and load 'mN': expected one",
+        ),
         (
             "t [s],F [N],F [mN]\n0,0,0",
             NAMES,

@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.statement.columns import read_columns
+from roughvisc.tables import Wanted, read_table
 
 #: Numbers that show a lost mark, sign or row; as they are written with a decimal point.
 TIMES, VALUES = ("0", "0.5", "2.25", "10.125"), ("0", "1.5", "1200.75", "3.0625")
@@ -22,6 +22,7 @@ ENCODINGS = {
     "empty last line": lambda text: f"{text}\n\n".encode(),
     "no last line break": lambda text: text.rstrip("\n").encode(),
 }
+TIME, LOAD = {"time": Wanted("time", "s")}, {"load": Wanted("load", "N")}
 #: separator, decimal mark
 STYLES = [(",", "."), (";", "."), ("\t", "."), (" ", "."), (";", ","), ("\t", ","), (" ", ","), ('","', ",")]
 
@@ -51,13 +52,13 @@ READERS = {
     "columns by name": (
         "csv",
         table("time [s]", "load [N]"),
-        lambda path: np.array(read_columns(path, {"load": "N", "time": "s"})),
+        lambda path: np.array([*read_table(path, LOAD | TIME)[0].values()]),
         np.array([VALUES, TIMES], float),
     ),
     "columns in order": (
         "csv",
         table(),
-        lambda path: np.array(read_columns(path, {"time": "s", "load": "N"})),
+        lambda path: np.array([*read_table(path, TIME | LOAD)[0].values()]),
         np.array([TIMES, VALUES], float),
     ),
     "history of a machine": ("txt", table("t[s]", "F[N]"), of_program, np.array(VALUES[1:], float)),
@@ -127,19 +128,6 @@ def test_text__that_is_ambiguous_or_damaged_is_refused(reader, damage, tmp_path)
         read(path)
 
 
-@pytest.mark.parametrize("heading", ["time;load\n", "# made by hand\ntime;load", "time [ms],load [mN]\r\n\r\n"])
-def test_heading_without_rows__says_what_is_expected(heading, tmp_path):
-    path = tmp_path / "empty.csv"
-    path.write_text(heading)
-    with pytest.raises(
-        InputError, match=r"empty\.csv: holds no rows below the heading in line \d: expected time, load"
-    ):
-        read_columns(path, {"time": "s", "load": "N"})
-    path.write_text("# nothing but a comment\n")
-    with pytest.raises(InputError, match=r"empty\.csv: holds no rows: expected columns time, load"):
-        read_columns(path, {"time": "s", "load": "N"})
-
-
 STUDY = """
 [surface]
 generate = "sphere"
@@ -176,25 +164,6 @@ def test_heading_without_rows__is_refused_by_key_and_file(material, program, hea
         rv.read_study(tmp_path / "study.toml")
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("0,0\n1,5,2,5\n", "line 2: found 4 cells: expected 2"),
-        ("time,load\n0,0\n1,5,2,5\n", "line 3: found 4 cells: expected 2"),
-        ('"1,250","2,000"\n"3,125","1,500"\n', "holds '1,250', which may have a decimal comma or be thousands"),
-        ("0;1,5\n1;2.25\n", "holds '1,5' and '2.25': expected one decimal mark"),
-        ("0;1e999\n1;2\n", "line 1: found '1e999': expected a number for load"),
-    ],
-)
-def test_columns__that_could_be_other_numbers_are_refused(text, found, tmp_path):
-    path = tmp_path / "table.csv"
-    path.write_text(text)
-    with pytest.raises(InputError) as refused:
-        read_columns(path, {"time": "s", "load": "N"})
-    assert str(refused.value).startswith(f"{path}")
-    assert found in str(refused.value)
-
-
 @pytest.mark.parametrize("text", ['time [s];load [N];note\n0;0;a\n1;2;"b\n2;3;c\n3;4;d\n', '0;0\n1;"2\n2;3\n3;4\n'])
 def test_quotation_mark_that_is_not_closed__loses_no_rows(text, tmp_path):
     path = tmp_path / "table.csv"
@@ -202,7 +171,7 @@ def test_quotation_mark_that_is_not_closed__loses_no_rows(text, tmp_path):
     at = 3 if "note" in text else 2
     expected = rf"table\.csv, line {at}: found a quotation mark that is not closed there: expected a row a line"
     with pytest.raises(InputError, match=expected):
-        read_columns(path, {"time": "s", "load": "N"})
+        read_table(path, TIME | LOAD)
     if at == 3:
         with pytest.raises(InputError, match=expected):
             rv.read_program(path)
@@ -223,8 +192,8 @@ def test_heading_over_two_lines__is_one(tmp_path):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("t [s],F [N]\n0,0\n1,5,2,5\n", "line 3: found 4 cells under a heading of 2"),
-        ("Test t[s] F[N] Path\n0 0 7\n1 2 8\n", "found 3 cells under a heading of 4"),
+        ("t [s],F [N]\n0,0\n1,5,2,5\n", "line 3: found 4 cells: expected 2, one for each column"),
+        ("Test t[s] F[N] Path\n0 0 7\n1 2 8\n", "line 2: found 3 cells: expected 4, one for each column"),
         ("t [s];F [N]\n0;0\n1;1e999\n", "line 3: found '1e999': expected a number for load"),
     ],
 )

@@ -16,12 +16,12 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.temperature import shifted
-from roughvisc.study.statement.columns import FREQUENCY_UNITS, read_columns
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
 from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.study.statement.schema.temperature import shift_factor
 from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
+from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 
 MODULUS = measured("Pa", above=0)
 COMPLIANCE = measured("1/Pa", least=0)
@@ -249,16 +249,15 @@ def _with_columns(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         found = f"found {shown(data['frequency_unit'])}" if "frequency_unit" in data else "missing"
         raise refuse("frequency_unit", f"{found}: expected {' or '.join(map(repr, FREQUENCY_UNITS))}")
     try:
-        read = read_columns(
-            located(data["file"], info),
-            {column.name: column.unit or data["frequency_unit"] for column in columns.values()},
-            {column.name: data[column.unit_key] for column in columns.values() if column.unit_key in data},
-            [column.name for column in columns.values() if column.optional],
-        )
+        wanted = {
+            one.name: Wanted(one.name, one.unit or data["frequency_unit"], data.get(one.unit_key), one.optional)
+            for one in columns.values()
+        }
+        read, _ = read_table(located(data["file"], info), wanted)
     except InputError as error:
         raise refuse("file", str(error)) from error
     kept = {key: value for key, value in data.items() if key not in (*units, "file")}
-    return kept | {key: values for key, values in zip(columns, read, strict=True) if values}
+    return kept | {key: read[one.name].tolist() for key, one in columns.items() if one.name in read}
 
 
 def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, ValidationInfo], Any]:

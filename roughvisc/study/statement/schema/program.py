@@ -19,7 +19,6 @@ from pydantic import (
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import INSTEAD, Control, Program
-from roughvisc.study.statement.columns import read_columns
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
 from roughvisc.study.statement.schema.entries import (
     FilePath,
@@ -32,6 +31,7 @@ from roughvisc.study.statement.schema.entries import (
     shown,
 )
 from roughvisc.study.statement.schema.section import Section, close, of_file
+from roughvisc.tables import Wanted, read_table
 
 LOAD = measured("N", least=0, instead=INSTEAD["load"])
 APPROACH = measured("m", instead=INSTEAD["approach"])
@@ -241,7 +241,8 @@ def _rows(quantity: Control, unit: str) -> Any:
             return check(_recorded(value, quantity, info))
         if isinstance(value, str):
             path = located(value, info)
-            times, values = read_columns(path, {"time": "s", quantity: unit})
+            columns, _ = read_table(path, {"time": Wanted("time", "s"), quantity: Wanted(quantity, unit)})
+            times, values = columns["time"].tolist(), columns[quantity].tolist()
             try:
                 rows = check({"times": times, "values": values})
                 Program.table(times, values, quantity)

@@ -1,0 +1,133 @@
+"""Tables of numbers in text: written in any way they are read back as the same numbers, or refused by name."""
+
+import codecs
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roughvisc.errors import InputError
+from roughvisc.tables import Wanted, read_table
+
+TIME, LOAD = {"time": Wanted("time", "s")}, {"load": Wanted("load", "N")}
+PULL = {"time": Wanted("time", "s"), "züge": Wanted("Züge", "N")}
+ENCODINGS = {
+    "UTF-8": str.encode,
+    "UTF-8 with its mark": lambda text: text.encode("utf-8-sig"),
+    "UTF-16 little": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
+    "UTF-16 big": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
+    "Latin-1": lambda text: text.encode("latin-1"),
+}
+#: separator, what stands around each cell, decimal mark
+STYLES = [(",", "", "."), (",", '"', "."), (",", '"', ",")]
+STYLES += [(separator, quote, mark) for separator in (";", "\t") for quote in ("", '"') for mark in ".,"]
+BLANKS = [(" ", "", "."), ("   ", "", ",")]
+#: style -> heading of a column by name and unit, and the cell below that
+HEADINGS = {
+    "brackets": ("{}[{}]", ""),
+    "parentheses": ("{} ({})", ""),
+    "slash": ("{}/{}", ""),
+    "in": ("{} in {}", ""),
+    "underscore": ("{}_{}", ""),
+    "below": ("{}", "{}"),
+    "below in brackets": ("{}", "[{}]"),
+}
+OWN = ("brackets", "parentheses")
+SI = {"time": "s", "züge": "N"}
+UNITS = {"time": {"s": 1.0, "ms": 1e-3, "h": 3600.0}, "züge": {"N": 1.0, "mN": 1e-3, "kN": 1e3}}
+
+
+@st.composite
+def cells(draw, mark, grouping):
+    """A number as it is written, and its value. Three digits behind a mark might be thousands."""
+    value = draw(st.integers(-(10**14), 10**14)) / 10 ** draw(st.sampled_from([0, 1, 2, 4]))
+    form = draw(st.sampled_from([".9e", ".0f", ".1f", ",.2f", ",.4f"]))
+    text = f"{value:{form}}"
+    return text.translate({ord(","): grouping, ord("."): mark}), float(text.replace(",", ""))
+
+
+@st.composite
+def tables(draw):
+    """A table as text, whether another program has written it, and the numbers that are in it."""
+    exported = draw(st.booleans())
+    headed = exported or draw(st.booleans())
+    separator, quote, mark = draw(st.sampled_from(STYLES + BLANKS * exported))
+    other = "," if mark == "." else "."
+    groupings = ["", "'", "\N{NO-BREAK SPACE}", *([other] if quote or separator != other else [])]
+    number = cells(mark, draw(st.sampled_from([""] if " " in separator else groupings)))
+    rows = draw(st.lists(st.tuples(number, number), min_size=1, max_size=8))
+    lines = [{"time": time, "züge": pull, "n": "7"} for (time, _), (pull, _) in rows]
+    units = dict(SI)
+    if headed:
+        # blanks would part a name from its unit
+        styles = [one for one in HEADINGS if one not in ("in", "parentheses") or " " not in separator]
+        over, under = HEADINGS[draw(st.sampled_from(styles if exported else OWN))]
+        units = {key: draw(st.sampled_from([*known])) for key, known in UNITS.items()}
+        named = {key: over.format(key.title() if exported else key, unit) for key, unit in units.items()}
+        lines.insert(0, named | {"n": "n"})
+        if under:
+            lines.insert(1, {key: under.format(unit) for key, unit in units.items()} | {"n": "-"})
+    names = draw(st.permutations(["time", "züge", "n"])) if headed else ["time", "züge"]
+    text = [separator.join(f"{quote}{line[name]}{quote}" for name in names) for line in lines]
+    above = st.lists(st.sampled_from(["Prüfbericht", "", "# 5", "Rate;1,5", "a, b"]), max_size=3)
+    end = draw(st.sampled_from(["\n", "\r\n"]))
+    text = end.join([*(draw(above) if exported else []), *text, *[""] * draw(st.integers(0, 2))])
+    values = {key: [row[at][1] * UNITS[key][units[key]] for row in rows] for at, key in enumerate(SI)}
+    return text, exported, values
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return tmp_path_factory.mktemp("tables") / "table.csv"
+
+
+@given(table=tables(), encoding=st.sampled_from([*ENCODINGS]))
+def test_table__written_in_any_way_is_read_back(path, table, encoding):
+    text, exported, values = table
+    path.write_bytes(ENCODINGS[encoding](text))
+    read, lines = read_table(path, PULL, exported=exported)
+    assert {*read} == {*values}
+    for key, column in values.items():
+        np.testing.assert_allclose(read[key], column, rtol=1e-14, err_msg=f"{key} of {text!r}")
+    last = max(number for number, line in enumerate(text.splitlines(), 1) if line)
+    assert lines == [*range(last + 1 - len(lines), last + 1)]
+
+
+@pytest.mark.parametrize("heading", ["time;load\n", "# made by hand\ntime;load", "time [ms],load [mN]\r\n\r\n"])
+def test_heading_without_rows__says_what_is_expected(heading, tmp_path):
+    path = tmp_path / "empty.csv"
+    path.write_text(heading)
+    with pytest.raises(
+        InputError, match=r"empty\.csv: holds no rows below the heading in line \d: expected time, load"
+    ):
+        read_table(path, TIME | LOAD)
+    path.write_text("# nothing but a comment\n")
+    with pytest.raises(InputError, match=r"empty\.csv: holds no rows: expected columns time, load"):
+        read_table(path, TIME | LOAD)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("0,0\n1,5,2,5\n", "line 2: found 4 cells: expected 2"),
+        ("time,load\n0,0\n1,5,2,5\n", "line 3: found 4 cells: expected 2"),
+        ('"1,250","2,000"\n"3,125","1,500"\n', "holds '1,250', which may have a decimal comma or be thousands"),
+        ("0;1,5\n1;2.25\n", "holds '1,5' and '2.25': expected one decimal mark"),
+        ("0;1e999\n1;2\n", "line 1: found '1e999': expected a number for load"),
+    ],
+)
+def test_columns__that_could_be_other_numbers_are_refused(text, found, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        read_table(path, TIME | LOAD)
+    assert str(refused.value).startswith(f"{path}")
+    assert found in str(refused.value)
+
+
+def test_frequencies__are_not_converted_to_angular_ones(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("frequency [rad/s]\n1\n")
+    with pytest.raises(InputError, match=r"unit of frequency: found 'rad/s': expected 'Hz'"):
+        read_table(path, {"frequency": Wanted("frequency", "Hz")})
