@@ -215,7 +215,7 @@ made = loading.friction_row
 loading.friction_row = lambda step: made(step) | {"largest_pressure": float(step.shown.pressure.max())}
 
 import roughvisc as rv
-from roughvisc.study.storage.encoding import may_be_missing
+from roughvisc.study.storage.store import may_be_missing
 
 assert may_be_missing("largest_pressure")
 ds = rv.run(sys.argv[1], sys.argv[2], progress=False)

@@ -48,7 +48,7 @@ def _complain(message: str, results: Path | None) -> None:
     text = f"roughvisc: {printable(message)}"
     log = None
     if len(text) > ON_SCREEN and results is not None:
-        from roughvisc.study.storage.sweep_log import append
+        from roughvisc.study.storage.failures import append
 
         log = append(results, message)
     click.echo(shortened(text, ON_SCREEN, str(log or "")), err=True)

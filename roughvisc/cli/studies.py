@@ -88,7 +88,7 @@ def _run_one(
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.execution.side_by_side import threads_each
     from roughvisc.study.storage.store import is_writable, require_writable, result_path, whole_result
-    from roughvisc.study.storage.versions import upgrade_note
+    from roughvisc.study.storage.upkeep import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key), same_bits):
@@ -144,10 +144,10 @@ def _run_all(
     from contextlib import ExitStack
 
     from roughvisc.study.execution.cluster import connect
+    from roughvisc.study.execution.monitor import watcher
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.execution.task import REFUSED
-    from roughvisc.study.execution.watch import watcher
-    from roughvisc.study.storage.sweep_log import LOG
+    from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.table import CASES
     from roughvisc.views.console.tables import sweep_table
 

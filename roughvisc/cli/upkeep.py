@@ -23,8 +23,8 @@ def verify(results: Path) -> None:
     Example:
       roughvisc verify results/ground_steel-study
     """
-    from roughvisc.study.storage.trust import UNSEALED
-    from roughvisc.study.storage.verify import verify as verified
+    from roughvisc.study.storage.checksum import UNSEALED
+    from roughvisc.study.storage.upkeep import verify as verified
 
     found = verified(results)
     bad = [one for one in found if one.flaw]
@@ -55,7 +55,7 @@ def clean(results: Path, everything: bool, superseded: bool) -> None:
     Example:
       roughvisc clean results/ground_steel-study
     """
-    from roughvisc.study.storage.tidy import clean_folder, kept_of_other_versions
+    from roughvisc.study.storage.upkeep import clean_folder, kept_of_other_versions
 
     removed = clean_folder(results, everything=everything, outdated=True, superseded=superseded)
     for path in removed:

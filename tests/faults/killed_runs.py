@@ -18,13 +18,12 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.cli import main as command
 from roughvisc.errors import InputError
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import result_files, whole_result
-from roughvisc.study.storage.tidy import clean_folder
-from roughvisc.study.storage.verify import verify
+from roughvisc.study.storage.upkeep import clean_folder, verify
 
 _ONE = BALL.replace("[24, 21]", "[12, 9]")
 _TWO = _ONE + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'

@@ -13,13 +13,13 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases
+from roughvisc.study.storage.checksum import _SEAL
 from roughvisc.study.storage.index import INDEX, LATEST
-from roughvisc.study.storage.seal import _SEAL
 from roughvisc.study.storage.store import whole_result
-from roughvisc.study.storage.verify import verify
+from roughvisc.study.storage.upkeep import verify
 
 _TEXT = BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 #: How a damaged folder is looked at; what has "before" in its name was opened before the damage was done.

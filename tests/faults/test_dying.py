@@ -15,13 +15,13 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import whole_result
-from roughvisc.study.storage.tidy import clean_folder
+from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'

@@ -19,7 +19,8 @@ import xarray as xr
 from big_scans import resident
 
 import roughvisc as rv
-from roughvisc.study.storage import encoding, store
+from roughvisc.study.storage import store
+from roughvisc.study.storage import store as encoding
 from roughvisc.views.report.page import report
 
 #: Chunks over (time, x, y) that are compared.

@@ -17,8 +17,8 @@ from dask.system import CPU_COUNT
 
 from roughvisc import solve as driver
 from roughvisc.study.execution import run
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage import records
 

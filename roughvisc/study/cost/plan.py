@@ -59,7 +59,7 @@ from roughvisc.study.cost.totals import totals
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.parameters import labels_of, parameters_of
-from roughvisc.study.storage.versions import upgrade_note
+from roughvisc.study.storage.upkeep import upgrade_note
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 

@@ -24,10 +24,9 @@ from roughvisc import errors
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
-from roughvisc.study.execution.book import SweepLog
 from roughvisc.study.execution.cluster import SOURCE, VERSION
+from roughvisc.study.execution.monitor import NullMonitor, SweepLog, watcher
 from roughvisc.study.execution.task import Outcome, Progress, Report, stop_sweep
-from roughvisc.study.execution.watch import NullMonitor, watcher
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import program_version
 

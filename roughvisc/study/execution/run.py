@@ -28,6 +28,7 @@ from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import CheckpointWriter
+from roughvisc.study.storage.checksum import warn_once
 from roughvisc.study.storage.lock import held, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import (
@@ -39,7 +40,6 @@ from roughvisc.study.storage.store import (
     result_path,
     write_result,
 )
-from roughvisc.study.storage.trust import warn_once
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, axis_of
 

@@ -12,7 +12,7 @@ from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.store import open_result, require_writable, result_path
-from roughvisc.study.storage.versions import upgrade_note
+from roughvisc.study.storage.upkeep import upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr

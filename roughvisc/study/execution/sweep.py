@@ -13,22 +13,19 @@ from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
-from roughvisc.study.execution.book import Monitor, SweepLog
-from roughvisc.study.execution.cluster import default_client, local_client
+from roughvisc.study.execution.cluster import default_client, local_client, refuse_unguarded_script
+from roughvisc.study.execution.monitor import Monitor, SweepLog
 from roughvisc.study.execution.run import other_transforms, result_folder, set_aside_damaged
-from roughvisc.study.execution.script import refuse_unguarded_script
 from roughvisc.study.execution.side_by_side import side_by_side, threads_each
 from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.storage.failures import forget_failure, recorded_failure
+from roughvisc.study.storage.checksum import UNSEALED
+from roughvisc.study.storage.failures import LOG, forget_failure, log_file, recorded_failure
 from roughvisc.study.storage.index import Index, index_of, warn_of
 from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import is_writable, require_writable
-from roughvisc.study.storage.sweep_log import LOG, log_file
-from roughvisc.study.storage.tidy import clean_folder
-from roughvisc.study.storage.trust import UNSEALED
-from roughvisc.study.storage.versions import upgrade_note
+from roughvisc.study.storage.upkeep import clean_folder, upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +96,7 @@ def sweep(
     folder = result_folder(cases[0], out, to_write=False).absolute()
     if client is None and workers is None:
         client = default_client()
-    from roughvisc.study.execution.watch import watcher
+    from roughvisc.study.execution.monitor import watcher
 
     outcomes = run_cases(
         cases,

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import errno
 import logging
+import signal
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
+from distributed.core import Status
 
 from roughvisc.errors import DiskFullError, InUseError, RoughviscError, TransientError
 from roughvisc.mechanics.bodies.transforms import transform_library
@@ -20,10 +22,36 @@ from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
 
+if TYPE_CHECKING:
+    from distributed import Worker
+
+
+_LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
+
+
+def is_leaving(worker: Worker) -> bool:
+    """Whether a worker was told to leave: by a signal, or since its lifetime is over."""
+    return worker.status in _LEAVING
+
+
+def close_on_sigterm(worker: Worker) -> None:
+    """Have a worker close in order at SIGTERM; called by its task, from whatever thread.
+
+    Batch systems send SIGTERM to every process of a job. Dask's nanny knows what to do; its worker would end there and
+    then. No plugin of the cluster: a worker without roughvisc could not load it.
+    """
+    worker.loop.add_callback(_take_signals, worker)
+
+
+def _take_signals(worker: Worker) -> None:
+    if threading.current_thread() is not threading.main_thread():  # a thread of the user's own process
+        return
+    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:  # else the process of the sweep answers for it
+        signal.signal(signal.SIGTERM, lambda *_: worker.loop.add_callback(worker.close, nanny=False, reason="SIGTERM"))
+
+
 log = logging.getLogger("roughvisc")
-
 Progress = Callable[[float, float], None]
-
 #: How a case ended. ``hindered``: something outside the case was in the way (a full disk, too little memory, a process
 #: that was killed), so the same command goes on from its checkpoint; ``held``: another run is at work on it; ``failed``
 #: is what would fail again.
@@ -34,7 +62,6 @@ IN_WORDS: dict[Kind, str] = {kind: kind for kind in get_args(Kind)} | {"held": "
 REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 #: Seconds between two reports of one case.
 _REPORT_EVERY = 0.5
-
 #: Sweeps whose cases are to stop, in this process.
 _stopped: set[str] = set()
 #: netCDF-4 does not stand two threads, so a process brings one case at a time whatever its number of threads.
@@ -162,7 +189,7 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
     """
     from distributed import get_worker
 
-    from roughvisc.study.execution.worker import close_on_sigterm, is_leaving
+    from roughvisc.study.execution.task import close_on_sigterm, is_leaving
 
     worker = get_worker()
     close_on_sigterm(worker)

@@ -1,18 +1,21 @@
-"""Records of failed cases."""
+"""What went wrong in a folder: records of cases that failed, and the log of its sweeps."""
 
 from __future__ import annotations
 
 import json
 import logging
-from contextlib import suppress
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from roughvisc.errors import InputError
+from roughvisc.errors import FolderError, InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.storage.links import open_unlinked
 from roughvisc.study.storage.store import atomic_write
 
 log = logging.getLogger("roughvisc")
@@ -77,3 +80,69 @@ def forget_failure(folder: Path, key: str) -> None:
 
 def _version() -> dict[str, Any]:
     return {"source": f"roughvisc {metadata.version('roughvisc')}", "numerics": NUMERICS_REVISION}
+
+
+LOG = "sweep.log"
+
+
+def append(folder: Path, message: str) -> Path | None:
+    """Write a message to the log of a folder; the log's path, None if there is no such folder or it cannot be written.
+
+    Parameters
+    ----------
+    folder : Path
+        Of results; not made.
+    message : str
+        What is logged as an error.
+    """
+    path = folder / LOG
+    if not folder.is_dir():
+        return None
+    record = logging.LogRecord("roughvisc", logging.ERROR, "", 0, message, None, None)
+    try:
+        with os.fdopen(
+            _opened(str(path), os.O_WRONLY | os.O_APPEND), "a", encoding="utf-8", errors="backslashreplace"
+        ) as stream:
+            stream.write(f"{_formatter().format(record)}\n")
+    except (OSError, FolderError):
+        return None
+    return path
+
+
+def _formatter() -> logging.Formatter:
+    return logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s")
+
+
+def _opened(path: str, flags: int) -> int:
+    return open_unlinked(path, flags, "the log of a sweep")
+
+
+@contextmanager
+def log_file(folder: Path) -> Iterator[None]:
+    """Everything that roughvisc logs, appended to a file beside the results."""
+    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
+    handler.setFormatter(_formatter())
+    level = log.level
+    log.addHandler(handler)
+    log.setLevel(min(level or logging.INFO, logging.INFO))
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+        log.removeHandler(handler)
+        with suppress(OSError):
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that stops nothing where it cannot be written, and follows no link."""
+
+    def _open(self) -> TextIO:
+        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=_opened)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError, FolderError):  # it cannot be opened
+            super().emit(record)
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass

@@ -23,10 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.study.storage.checksum import UNSEALED, append_checksum, unsealed, verify_checksum, warn_once
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
-from roughvisc.study.storage.seal import append_checksum, unsealed
 from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
-from roughvisc.study.storage.trust import UNSEALED, verify_checksum, warn_once
 from roughvisc.variables import RESULT_FORMAT, of_step
 from roughvisc.variables.axes import AXES, axis_of
 

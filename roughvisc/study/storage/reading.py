@@ -19,7 +19,7 @@ from xarray.core import indexing
 
 from roughvisc.errors import InputError
 from roughvisc.groups import carrying
-from roughvisc.study.storage.trust import verify_checksum
+from roughvisc.study.storage.checksum import verify_checksum
 
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:

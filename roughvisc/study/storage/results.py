@@ -14,12 +14,12 @@ from roughvisc.errors import InputError
 from roughvisc.groups import root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.checksum import warn_once
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
 from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
 from roughvisc.study.storage.reading import read_variable
 from roughvisc.study.storage.store import no_results
-from roughvisc.study.storage.trust import warn_once
-from roughvisc.study.storage.versions import counted_versions, version_of
+from roughvisc.study.storage.upkeep import counted_versions, version_of
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES
 

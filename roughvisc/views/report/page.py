@@ -19,8 +19,8 @@ from roughvisc.errors import InputError
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
+from roughvisc.study.storage.checksum import verify_checksum
 from roughvisc.study.storage.store import atomic_write, no_results, result_files, whole_result
-from roughvisc.study.storage.trust import verify_checksum
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables.axes import axis_of

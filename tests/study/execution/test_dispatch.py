@@ -21,9 +21,9 @@ from roughvisc.groups import whole_of
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, has_other_versions
+from roughvisc.study.execution.monitor import LiveMonitor, NullMonitor
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.task import Outcome
-from roughvisc.study.execution.watch import LiveMonitor, NullMonitor
 from roughvisc.study.statement.case import vary
 from roughvisc.study.statement.identity import program_version
 from roughvisc.study.storage.failures import record_path

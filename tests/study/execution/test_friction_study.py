@@ -10,9 +10,9 @@ from support import BALL, assert_same, friction_whole, numbers, run_whole
 
 import roughvisc as rv
 from roughvisc.study.execution.cluster import connect
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import whole_result

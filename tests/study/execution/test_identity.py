@@ -12,9 +12,9 @@ from roughvisc.errors import ChangedError, InputError, RoughviscError
 from roughvisc.groups import whole_of
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.baggage import serialize_with_inputs
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.single import run
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import Case, read_cases, read_study
 from roughvisc.study.storage.failures import record_path
 from roughvisc.topography import readers

@@ -9,7 +9,7 @@ import pytest
 import roughvisc as rv
 
 WORKFLOWS = Path(__file__).parents[3] / "workflows"
-CHECK = "from roughvisc.study.execution.script import refuse_unguarded_script as check\n"
+CHECK = "from roughvisc.study.execution.cluster import refuse_unguarded_script as check\n"
 
 
 def run(folder, text):

@@ -25,10 +25,10 @@ from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.baggage import serialize_with_inputs
 from roughvisc.study.execution.cluster import connect
+from roughvisc.study.execution.monitor import LiveMonitor, NullMonitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.execution.watch import LiveMonitor, NullMonitor
 from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.storage import sweep_log
+from roughvisc.study.storage import failures as sweep_log
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result

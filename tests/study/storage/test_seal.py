@@ -16,10 +16,10 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.storage import trust
-from roughvisc.study.storage.seal import checksum_error, is_sealed, unsealed
+from roughvisc.study.storage import checksum as trust
+from roughvisc.study.storage.checksum import checksum_error, is_sealed, unsealed
 from roughvisc.study.storage.store import whole_result, write_result
-from roughvisc.study.storage.verify import verify
+from roughvisc.study.storage.upkeep import verify
 
 TWO_LOADS = BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 

@@ -13,8 +13,7 @@ from xarray.core.indexing import LazilyIndexedArray
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.storage import records, store
-from roughvisc.study.storage.encoding import may_be_missing
-from roughvisc.study.storage.store import atomic_write, whole_result, write_result
+from roughvisc.study.storage.store import atomic_write, may_be_missing, whole_result, write_result
 
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
 MISSING = {

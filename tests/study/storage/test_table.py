@@ -9,8 +9,8 @@ from support import BALL, run_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.study.execution.monitor import NullMonitor
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.execution.watch import NullMonitor
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.table import CASES

@@ -13,7 +13,7 @@ from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.lock import STALE, held
 from roughvisc.study.storage.store import write_result
-from roughvisc.study.storage.tidy import clean_folder
+from roughvisc.study.storage.upkeep import clean_folder
 
 KEYS = [f"{i:016x}" for i in range(4)]
 

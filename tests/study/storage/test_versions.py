@@ -13,9 +13,10 @@ from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement import identity
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
-from roughvisc.study.storage import checkpoint, versions
+from roughvisc.study.storage import checkpoint
+from roughvisc.study.storage import upkeep as versions
 from roughvisc.study.storage.lock import held, lock_path
-from roughvisc.study.storage.tidy import clean_folder
+from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'

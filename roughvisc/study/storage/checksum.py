@@ -1,17 +1,16 @@
-"""Seals: length and checksum of a file's content, behind its last byte.
-
-Readers of HDF5 and of zip files take no notice of what follows their content. So a seal needs no other file, travels
-with every copy, and covers all bytes: values, attributes, and the structures by which a library finds them.
-"""
+"""Checksums: length and checksum of a file's content, behind its last byte; and who is told where one does not fit."""
 
 from __future__ import annotations
 
+import logging
 import os
 import struct
 import zlib
 from functools import lru_cache
 from pathlib import Path
 from typing import IO
+
+from roughvisc.errors import InputError
 
 # At 256 x 256 x 50 frames, two fields, 59 MB: written in 75 ms, sealed in 15 ms, looked at in 15 ms. SHA-256 would take
 # 37 ms each. A checksum a chunk (fletcher32) would take 30 ms each, and leave out attributes, small variables and the
@@ -103,3 +102,55 @@ def _checksum(stream: IO[bytes], length: int) -> int:
         checksum = zlib.crc32(part, checksum)
         length -= len(part)
     return checksum
+
+
+log = logging.getLogger("roughvisc")
+#: What is wrong with a result that has no checksum.
+UNSEALED = (
+    "has no checksum: another program has changed it, or an early version of roughvisc has written it; "
+    "whether its values are those that were computed cannot be said"
+)
+#: Files, as they were, and messages that were logged of them.
+_warned: set[tuple[Path, tuple[int, ...], str]] = set()
+
+
+def verify_checksum(path: Path) -> bool:
+    """Refuse a result whose bytes are not those that were written; warn of one that nothing can be said of.
+
+    Every read asks this, since a file may be damaged after it was opened. Once a process has looked at a file, and as
+    long as the system says that nobody has written to it, that costs next to nothing.
+
+    Returns
+    -------
+    bool
+        Whether the result has a checksum, which it then matches.
+    """
+    try:
+        found, sealed = checksum_error(path), is_sealed(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a result") from error
+    if found:
+        raise InputError(
+            f"{path}: is damaged: {found}: the run that it is the result of sets it aside and computes it anew"
+        )
+    if not sealed:
+        warn_once(path, f"{path}: {UNSEALED}")
+    return sealed
+
+
+def warn_once(path: Path, message: str) -> None:
+    """Log a warning about a file, once as long as the file is as it is."""
+    if is_news(path, message):
+        log.warning("%s", message)
+
+
+def is_news(path: Path, message: str) -> bool:
+    """Whether nothing has said this of the file as it is now; from now on something has."""
+    try:
+        found = path.stat()
+        stamp = (found.st_ino, found.st_size, found.st_mtime_ns)
+    except OSError:
+        stamp = ()
+    before = len(_warned)
+    _warned.add((path.absolute(), stamp, message))
+    return len(_warned) > before
