@@ -102,7 +102,7 @@ class Recorder(Protocol):
     latest: Checkpoint
     in_memory: bool
 
-    def passed(self, reached: Checkpoint) -> None:
+    def update(self, reached: Checkpoint) -> None:
         """Take note of how far the solve has come; it may be stopped here."""
         ...
 
@@ -116,5 +116,5 @@ class MemoryRecorder:
         self.rows: RowStore = RowsInMemory()
         self.latest = Checkpoint()
 
-    def passed(self, reached: Checkpoint) -> None:
+    def update(self, reached: Checkpoint) -> None:
         """Nothing: the state of a step is not needed while the next one is computed."""

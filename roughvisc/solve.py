@@ -180,7 +180,7 @@ def _solve_once(
                     recorder.rows.append({"row": values, "kept": row.kept, "facts": row.facts}, row.fields)
                 report(row.done, rows.end)
                 if row.state is not None:
-                    recorder.passed(reached)
+                    recorder.update(reached)
                 reached = replace(reached, state=None)  # the recorder holds it if it is needed
                 del row  # its fields are not needed while the next one is computed
         if not rows.order(recorder.rows):

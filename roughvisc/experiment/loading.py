@@ -20,7 +20,7 @@ from roughvisc.experiment.notes import (
     contact_stands_alone,
     creep_left,
     edge_note,
-    left_out,
+    omitted_effects,
     slope_note,
     surface_stands_alone,
     wake_note,
@@ -389,7 +389,7 @@ class LoadingRows(Rows):
             "slide_note": slide_note(scene.program, profile.spacing),
             "accuracy_note": accuracy_note(scene, dataset),
             "edge": "accept" if settings.edge == "accept" else "",
-            "left_out": left_out(choice, settings, self._followed, profile.mirrored),
+            "left_out": omitted_effects(choice, settings, self._followed, profile.mirrored),
             **warnings,
             # of what was pressed, a series or not
             "compliance_at_once": scene.compliance(0.0),

@@ -110,7 +110,7 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def left_out(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
+def omitted_effects(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
     """What costs nothing, and why: what nothing asks for is not modelled, computed or kept."""
     out = []
     if choice.note.startswith("no memory"):

@@ -288,7 +288,7 @@ def parallel_map(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
     try:
         take_on()
     finally:
-        begun = [task for task in tasks if not task.taken()]  # what nobody has begun is not needed any more
+        begun = [task for task in tasks if not task.claim()]  # what nobody has begun is not needed any more
         for task in begun:
             task.result()
     return found
@@ -299,7 +299,7 @@ def submit(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
     if threads == 1:
         return work
     task = _begun(work, threads)
-    return lambda: work() if task.taken() else task.result()
+    return lambda: work() if task.claim() else task.result()
 
 
 def blocks(length: int, size: int) -> Iterator[slice]:
@@ -332,13 +332,13 @@ class _Task(Generic[Found]):
         self._work, self._free = work, Lock()
         self._done: SimpleQueue[tuple[Any, BaseException | None]] = SimpleQueue()
 
-    def taken(self) -> bool:
+    def claim(self) -> bool:
         """Whether it is the caller's from here on: nobody else has taken it."""
         return self._free.acquire(blocking=False)
 
     def do(self) -> None:
         """Do it, unless another thread has taken it."""
-        if not self.taken():
+        if not self.claim():
             return
         try:
             self._done.put((self._work(), None))

@@ -168,7 +168,7 @@ class Scattered:
         found.reshape(-1)[cells] = (self.values[few] / self.size).astype(np.float32)
         return found
 
-    def taken(self, out: Array, rows: slice, found: NDArray[np.float32]) -> None:
+    def gather_rows(self, out: Array, rows: slice, found: NDArray[np.float32]) -> None:
         """Into a vector over its cells goes what was found on some rows, times the size."""
         few, cells = self._of(rows)
         here = out[few]

@@ -16,7 +16,7 @@ from roughvisc.study.execution.cluster import default_client, has_other_versions
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.index import index_of, save_index
-from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.store import require_writable, result_path, whole_result, write_result
 from roughvisc.study.storage.table import write_table
 from roughvisc.views.observables.tables import asked
@@ -96,7 +96,7 @@ def _add(case: Case, path: Path) -> bool:
             found, compat="equals", join="exact"
         )
         whole.attrs = result.attrs | told
-        with held(path.with_name(f".{case.key}.lock")):
+        with lock_case(path.with_name(f".{case.key}.lock")):
             write_result(whole, path, precision=case.settings.keep.precision)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True

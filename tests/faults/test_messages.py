@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError, shortened
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.lock import held, lock_path
+from roughvisc.study.storage.lock import lock_case, lock_path
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -133,7 +133,7 @@ def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke)
     out.mkdir()
     first, _ = read_cases(path)
     holder = f"process {os.getpid()} on {socket.gethostname()}"
-    with held(lock_path(out, first.key)):
+    with lock_case(lock_path(out, first.key)):
         status, said, err = invoke("run", path, "--out", out, "--workers", "0")
         assert status == 1
         assert err.startswith(f"roughvisc: case 1 of 2: {lock_path(out, first.key)}: {holder} is at work on this case")

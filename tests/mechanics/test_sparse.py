@@ -73,7 +73,7 @@ def test_scattered_values__are_rows_of_a_field_over_its_largest_value_and_back(p
         single = found.rows(rows)
         np.testing.assert_array_equal(single, (field[rows] / found.size).astype(np.float32))
         assert single.dtype == np.float32
-        found.taken(back, rows, single)
+        found.gather_rows(back, rows, single)
     np.testing.assert_allclose(back, field.reshape(-1)[cells], rtol=1e-7)
 
 

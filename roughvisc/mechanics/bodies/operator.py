@@ -319,12 +319,12 @@ class HalfSpace:
         def keep(rows: slice, come_back: Callable[[NDArray[Any]], None]) -> None:
             here = np.empty((rows.stop - rows.start, self.shape[1]), np.float32)
             come_back(here)
-            displacement.taken(found, rows, here)
+            displacement.gather_rows(found, rows, here)
 
         if self._goes_by_blocks:
             self._by_blocks(displacement, self._inverse_symbol, self.shape, keep)
         else:
-            displacement.taken(found, slice(0, self.shape[0]), self._whole(displacement, self._inverse_symbol))
+            displacement.gather_rows(found, slice(0, self.shape[0]), self._whole(displacement, self._inverse_symbol))
         return found
 
     @cached_property

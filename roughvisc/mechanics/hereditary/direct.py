@@ -107,7 +107,7 @@ class History:
         """The same state: no step reaches behind the present instant by a rule of its own."""
         return state
 
-    def moved(self, state: HistoryState, cells: int, axis: int) -> HistoryState:
+    def roll(self, state: HistoryState, cells: int, axis: int) -> HistoryState:
         """State of a periodic body seen from a profile that has moved by so many cells along an axis."""
 
         def rolled(block: Block) -> Block:

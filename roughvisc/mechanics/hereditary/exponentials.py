@@ -64,7 +64,7 @@ class Memory(Protocol):
         """State in which no step reaches behind the present instant: after a jump or a corner."""
         ...
 
-    def moved(self, state: Any, cells: int, axis: int) -> Any:
+    def roll(self, state: Any, cells: int, axis: int) -> Any:
         """State of a periodic body seen from a profile that has moved by so many cells along an axis."""
         ...
 
@@ -156,7 +156,7 @@ class Modes:
         """State whose next step does not reach behind the present instant."""
         return ModesState(state.modes, state.field)
 
-    def moved(self, state: ModesState, cells: int, axis: int) -> ModesState:
+    def roll(self, state: ModesState, cells: int, axis: int) -> ModesState:
         """State of a periodic body seen from a profile that has moved by so many cells along an axis."""
         modes, field = (np.roll(fields, -cells, axis - 2) for fields in (state.modes, state.field))
         earlier = None if state.earlier is None else np.roll(state.earlier, -cells, axis - 2)

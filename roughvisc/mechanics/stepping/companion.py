@@ -175,7 +175,7 @@ def adapt_tolerance_share(scene: Scene, before: State, state: State, ahead: floa
     used, earlier = (
         max(left * _used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before)
     )
-    return replace(state, pace=state.pace.sharpened(used, earlier))
+    return replace(state, pace=state.pace.adapt_sharpness(used, earlier))
 
 
 def _used(scene: Scene, state: State) -> float:

@@ -208,7 +208,7 @@ def _too_long(scene: Scene, state: State, segment: Segment, trial: Trial, error:
 
 def _seems_to_open(state: State, segment: Segment, trial: Trial) -> bool:
     """Where the approach is given, a step that is too long may undershoot and seem to open the contact."""
-    return segment.control == "approach" and trial.apart and state.now.force > 0
+    return segment.control == "approach" and trial.is_open and state.now.force > 0
 
 
 def _shortened(

@@ -240,7 +240,7 @@ def known_direction(direction: Any, key: str) -> Any:
     return direction
 
 
-def told(segments: Sequence[Segment]) -> list[str]:
+def in_words(segments: Sequence[Segment]) -> list[str]:
     """The first segments, one by one."""
     first = segments[:TOLD]
     words = [str(segment) for segment in first]
@@ -280,14 +280,14 @@ class Program:
 
     def __repr__(self) -> str:
         """In words; of a long table its first segments."""
-        words, more = told(self.segments), len(self.segments) - TOLD
+        words, more = in_words(self.segments), len(self.segments) - TOLD
         words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
         return f"Program: {', '.join(words or ['nothing'])}"
 
     def _repr_html_(self) -> str:
         rows = [
             (str(number), words, f"until {said(end, 's')}" if end else "")
-            for number, (words, end) in enumerate(zip(told(self.segments), self.corners[1:], strict=False))
+            for number, (words, end) in enumerate(zip(in_words(self.segments), self.corners[1:], strict=False))
         ]
         more = len(self.segments) - TOLD
         rows += [("...", f"{more} more segments", f"until {said(self.duration, 's')}")] if more > 0 else []

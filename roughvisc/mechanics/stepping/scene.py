@@ -132,7 +132,7 @@ class ControllerState:
         """Where nothing is extrapolated, with the length of the next step if it is known. [s]"""
         return replace(self, suggestion=suggestion)
 
-    def sharpened(self, used: float, earlier: float) -> ControllerState:
+    def adapt_sharpness(self, used: float, earlier: float) -> ControllerState:
         """By what is stated, over the tolerance, now and when it was last told."""
         if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
             wanted = max(_MOST_USED / used, 0.5)
@@ -522,7 +522,7 @@ class Trial:
     slides: bool = False
 
     @property
-    def apart(self) -> bool:
+    def is_open(self) -> bool:
         """Whether the surfaces are apart."""
         return self.instant.force == 0
 

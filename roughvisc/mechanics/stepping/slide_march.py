@@ -143,7 +143,7 @@ def _moved(scene: Scene, state: Moved, slide: Slide, cells: int) -> Moved:
         state,
         now=moved(state.now),
         displacement=_rolled(state.displacement, slide, cells),
-        memory=scene.memory.moved(state.memory, slide.sense * cells, slide.axis),
+        memory=scene.memory.roll(state.memory, slide.sense * cells, slide.axis),
     )
 
 

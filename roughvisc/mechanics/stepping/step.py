@@ -236,7 +236,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
     shown, converged, moved = trial, trial.converged, displacement_after(scene, state, trial)
     contact, level = state.now.contact, state.now.approach
-    kept = trial.length > 0 and not trial.apart and scene.keeps(state.now.time)
+    kept = trial.length > 0 and not trial.is_open and scene.keeps(state.now.time)
     if kept and scene.lacks_instantaneous_compliance(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).

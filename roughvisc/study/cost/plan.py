@@ -17,7 +17,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.notes import body_note, left_out
+from roughvisc.experiment.notes import body_note, omitted_effects
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.refusal import PART, too_large
 from roughvisc.experiment.resources import PROCESS, Available, memory_available
@@ -268,7 +268,7 @@ def _row(
     except InputError as error:
         return row | {"refusal": str(error)}
     exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
-    omitted = left_out(choice, settings, window, mirrored)
+    omitted = omitted_effects(choice, settings, window, mirrored)
     row |= {"memory_model": choice.note, "exponentials": exponentials, "left_out": omitted}
     row |= _pressures(case, surface, choice, found.force if found and marched else np.nan)
     if found is None or problem:

@@ -40,9 +40,9 @@ class NullMonitor:
     def ended(self, outcome: Outcome) -> None: ...
     def tick(self) -> None: ...
 
-    def told(self, message: str) -> None:
+    def message(self, text: str) -> None:
         """Something the user should know at once."""
-        print(shortened(f"roughvisc: {printable(message)}", ON_SCREEN), file=sys.stderr)
+        print(shortened(f"roughvisc: {printable(text)}", ON_SCREEN), file=sys.stderr)
 
     def stopping(self) -> None: ...
     def close(self) -> None: ...
@@ -99,9 +99,9 @@ class LiveMonitor:
         """Show what has changed."""
         self._display.tick()
 
-    def told(self, message: str) -> None:
+    def message(self, text: str) -> None:
         """Something the user should know at once."""
-        self._display.say(message)
+        self._display.say(text)
 
     def stopping(self) -> None:
         """The sweep is interrupted and waits for the running cases to stop."""
@@ -170,7 +170,7 @@ class Monitor(Protocol):
     def tick(self) -> None:
         """Called several times a second."""
 
-    def told(self, message: str) -> None:
+    def message(self, text: str) -> None:
         """Something the user should know at once."""
 
     def stopping(self) -> None:
@@ -240,7 +240,7 @@ class SweepLog:
     def tell(self, message: str) -> None:
         """Say what the user should know at once, and log it."""
         log.warning("%s", message)
-        self.watch.told(message)
+        self.watch.message(message)
 
     def save(self) -> None:
         """Write the index and the table of the folder, unless it may not be written to."""

@@ -29,7 +29,7 @@ from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.checksum import warn_once
-from roughvisc.study.storage.lock import held, lock_path
+from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import (
     is_writable,
@@ -216,7 +216,7 @@ def run_case(
     keep_memory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with held(lock_path(folder, case.key)) as lock:
+        with lock_case(lock_path(folder, case.key)) as lock:
             for torn in partial_files(path):
                 torn.unlink()
             keeper = CheckpointWriter(
@@ -255,7 +255,7 @@ def run_case(
 def set_aside_damaged(case: Case, folder: Path) -> str:
     """Set the file of a case aside if it is not its result, unless a run is at work on it; why, empty if it was not."""
     path = result_path(folder, case.key)
-    with suppress(InUseError, OSError), held(lock_path(folder, case.key), patience=0.0):
+    with suppress(InUseError, OSError), lock_case(lock_path(folder, case.key), patience=0.0):
         if path.exists() and (problem := _problem(case, path)):
             quarantine(path, problem)
             return f"{problem}; it is set aside as {path.name}.damaged"

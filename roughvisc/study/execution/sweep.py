@@ -215,7 +215,7 @@ def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], wri
     problems = dict(index.problems)
     for key in index.problems.keys() & todo.keys():
         if told := set_aside_damaged(todo[key], book.folder):
-            book.watch.told(f"{told}, and computed anew")
+            book.watch.message(f"{told}, and computed anew")
             del problems[key]
     warn_of(book.folder, problems)
 

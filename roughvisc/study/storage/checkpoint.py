@@ -191,7 +191,7 @@ class CheckpointWriter:
             path.unlink(missing_ok=True)
         self.rows.keep_first(0)
 
-    def passed(self, reached: Checkpoint) -> None:
+    def update(self, reached: Checkpoint) -> None:
         """Take note of an accepted step; write a checkpoint if it is time to.
 
         Raises

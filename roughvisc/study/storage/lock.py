@@ -90,7 +90,7 @@ class Lock:
 
 
 @contextmanager
-def held(path: Path, patience: float = _PATIENCE) -> Iterator[Lock]:
+def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[Lock]:
     """Hold a lock.
 
     Parameters

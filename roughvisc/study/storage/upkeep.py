@@ -18,7 +18,7 @@ from roughvisc.study.statement.identity import NUMERICS_REVISION, program_versio
 from roughvisc.study.storage.checkpoint import checkpoint_version
 from roughvisc.study.storage.checksum import checksum_error, is_sealed
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.lock import held, lock_path
+from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import NETCDF, no_results, result_files, result_path
 from roughvisc.variables import RESULT_FORMAT
 
@@ -256,7 +256,7 @@ def clean_folder(
 
 def _result_of(folder: Path, key: str) -> Path | None:
     """Remove the result of a case, unless a run is at work on it; its path if it is gone."""
-    with suppress(InUseError, OSError), held(lock_path(folder, key), patience=0.0):
+    with suppress(InUseError, OSError), lock_case(lock_path(folder, key), patience=0.0):
         path = result_path(folder, key)
         return path if _removed(path) else None
     return None
@@ -308,7 +308,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdat
     ]
     if needed == paths:
         return []
-    with suppress(InUseError, OSError), held(lock, patience=0.0):
+    with suppress(InUseError, OSError), lock_case(lock, patience=0.0):
         return [path for path in paths if path not in needed and _removed(path)]
     return []
 

@@ -66,14 +66,14 @@ def test_event__forgets_the_length_and_keeps_the_sharpness():
 def test_sharpness__stays_between_an_eighth_and_one_in_steps_of_the_root_of_two(told):
     pace, earlier = ControllerState(), 0.0
     for used in told:
-        pace, earlier = pace.sharpened(used, earlier), used
+        pace, earlier = pace.adapt_sharpness(used, earlier), used
         assert 0.125 <= pace.sharpness <= 1
         assert 2 * math.log2(pace.sharpness) == pytest.approx(round(2 * math.log2(pace.sharpness)))
 
 
 def test_sharpness__follows_what_is_stated_and_leaves_alone_what_no_step_can_mend():
-    assert ControllerState().sharpened(1.4, 1.0).sharpness == 0.5
-    assert ControllerState().sharpened(1.4, 1.39).sharpness == 1.0  # it has been so before
-    assert ControllerState().sharpened(0.5, 0.1).sharpness == 1.0  # there is room
-    assert ControllerState(sharpness=0.25).sharpened(0.1, 0.1).sharpness == pytest.approx(0.25 * math.sqrt(2))
-    assert ControllerState().sharpened(0.1, 0.1).sharpness == 1.0  # never more than the usual share
+    assert ControllerState().adapt_sharpness(1.4, 1.0).sharpness == 0.5
+    assert ControllerState().adapt_sharpness(1.4, 1.39).sharpness == 1.0  # it has been so before
+    assert ControllerState().adapt_sharpness(0.5, 0.1).sharpness == 1.0  # there is room
+    assert ControllerState(sharpness=0.25).adapt_sharpness(0.1, 0.1).sharpness == pytest.approx(0.25 * math.sqrt(2))
+    assert ControllerState().adapt_sharpness(0.1, 0.1).sharpness == 1.0  # never more than the usual share

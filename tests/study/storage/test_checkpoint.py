@@ -35,7 +35,7 @@ from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage import records
 from roughvisc.study.storage.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
-from roughvisc.study.storage.lock import held
+from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import whole_result
 
@@ -285,7 +285,7 @@ def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
     keeper = CheckpointWriter(tmp_path / "run", "key", lambda: None, seconds=1e9, steps=3)
     saved = []
     for reached in after_steps(7):
-        keeper.passed(reached)
+        keeper.update(reached)
         saved.append(last_saved(tmp_path / "run"))
     keeper.close()
     assert saved == [0, 0, 3, 3, 3, 6, 6]
@@ -305,7 +305,7 @@ def test_keeper__takes_no_more_than_a_twentieth_of_the_time(tmp_path, monkeypatc
     saved = []
     for reached in after_steps(20):
         clock[0] += 10.0
-        keeper.passed(reached)
+        keeper.update(reached)
         saved.append(last_saved(tmp_path / "run"))
     keeper.close()
     assert sorted(set(saved)) == [0, 3, 11, 19]
@@ -578,7 +578,7 @@ def test_lock_of_another_machine__counts_while_it_is_touched(whole, tmp_path):
 def test_lock__is_touched_while_it_is_held(tmp_path, monkeypatch):
     monkeypatch.setattr(lock_module, "BEAT", 0.01)
     path = tmp_path / "lock"
-    with held(path):
+    with lock_case(path):
         os.utime(path, (0, 0))
         while path.stat().st_mtime == 0:
             time.sleep(0.01)
@@ -651,7 +651,7 @@ def test_lock__of_a_process_that_is_being_cleared_away_is_waited_for(tmp_path):
     with open(path, "w") as dying:
         fcntl.flock(dying, fcntl.LOCK_EX)
         threading.Timer(0.3, fcntl.flock, (dying, fcntl.LOCK_UN)).start()
-        with held(path) as lock:
+        with lock_case(path) as lock:
             lock.check()
     assert not path.exists()
 

@@ -11,7 +11,7 @@ from support import BALL
 from roughvisc.errors import InputError, InUseError
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.lock import STALE, held
+from roughvisc.study.storage.lock import STALE, lock_case
 from roughvisc.study.storage.store import write_result
 from roughvisc.study.storage.upkeep import clean_folder
 
@@ -60,7 +60,7 @@ def test_clean__removes_all_but_results_if_asked_to(folder, invoke):
 
 def test_tidy__leaves_a_case_alone_that_is_being_computed(folder):
     before = {path.name for path in folder.glob(f".{KEYS[0]}.*")}
-    with held(folder / f".{KEYS[0]}.lock"):
+    with lock_case(folder / f".{KEYS[0]}.lock"):
         clean_folder(folder, everything=True)
         assert {path.name for path in folder.glob(f".{KEYS[0]}.*")} == before
     clean_folder(folder)
@@ -83,7 +83,7 @@ def test_lock__does_not_follow_a_link(tmp_path):
     target.write_text("mine")
     lock = tmp_path / f".{KEYS[0]}.lock"
     lock.symlink_to(target)
-    with pytest.raises(InputError, match=r"\.lock: is a link: expected the lock of a run"), held(lock):
+    with pytest.raises(InputError, match=r"\.lock: is a link: expected the lock of a run"), lock_case(lock):
         pass
     assert target.read_text() == "mine"
     assert clean_folder(tmp_path) == [lock]
@@ -94,9 +94,9 @@ def test_lock__does_not_follow_a_link(tmp_path):
 def test_lock__of_yesterday_or_tomorrow_is_not_believed(tmp_path, age):
     lock = tmp_path / "lock"
     lock.write_text(json.dumps({"host": "elsewhere", "pid": 1, "token": ""}))
-    with pytest.raises(InUseError, match="process 1 on elsewhere"), held(lock):
+    with pytest.raises(InUseError, match="process 1 on elsewhere"), lock_case(lock):
         pass
     os.utime(lock, (time.time() - age,) * 2)
-    with held(lock) as mine:
+    with lock_case(lock) as mine:
         mine.check()
     assert not lock.exists()

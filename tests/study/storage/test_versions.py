@@ -15,7 +15,7 @@ from roughvisc.study.statement import identity
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage import checkpoint
 from roughvisc.study.storage import upkeep as versions
-from roughvisc.study.storage.lock import held, lock_path
+from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -141,7 +141,7 @@ def test_clean__removes_the_checkpoints_of_earlier_versions(tmp_path, invoke, ve
     assert status == 0
     assert f"the checkpoints of 2 unfinished runs are of numerics {TODAY - 1}, {TODAY + 1}: nothing goes on" in err
     earlier = read_key(left[TODAY - 1])
-    with held(lock_path(out, earlier)):  # a run of the earlier version goes on
+    with lock_case(lock_path(out, earlier)):  # a run of the earlier version goes on
         assert invoke("clean", out)[0] == 0
         assert all(place.is_dir() for place in left.values())
     status, said, err = invoke("clean", out)
@@ -177,7 +177,7 @@ def test_clean__removes_superseded_results_if_asked_to(tmp_path, invoke, version
     assert "kept 1 result (1 by roughvisc 0.0.7" in said
     assert "MB: computed again by this version; --superseded removes them" in said
     assert all(one.exists() for one in (*old, new))
-    with held(lock_path(out, read_key_of(old[0]))):
+    with lock_case(lock_path(out, read_key_of(old[0]))):
         invoke("clean", out, "--superseded")
         assert old[0].exists()
     assert f"removed {old[0].name}\n" in invoke("clean", out, "--superseded")[1]
