@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,8 +54,8 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
                 raise InputError(f"program.{number}: {error}") from None
 
 
-def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spacing) -> tuple[float, ...] | None:
-    """Kept times, those within a slide brought to the nearest whole cell. [s]
+def snap_to_cells(program: Program, times: Sequence[float] | None, *spacings: Spacing) -> tuple[float, ...] | None:
+    """Kept times, those within a slide brought to the nearest instant at which whole cells of each grid are behind. [s]
 
     Parameters
     ----------
@@ -62,8 +63,8 @@ def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spac
         The loading program.
     times : sequence of float or None
         Ascending; None for every accepted step. [s]
-    spacing : tuple of float
-        Cell sides. [m]
+    *spacings : tuple of float
+        Cell sides of each grid. [m]
     """
     if times is None or not program.slides:
         return None if times is None else tuple(times)
@@ -72,7 +73,7 @@ def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spac
     for segment, began, end in zip(program.segments, corners, corners[1:], strict=False):
         if segment.slide is None:
             continue
-        cells = segment.slide.cells(spacing)
+        cells = math.gcd(*(segment.slide.cells(spacing) for spacing in spacings))
         for place in np.flatnonzero((found > began) & (found < end)):
             taken = round((found[place] - began) / (end - began) * cells)
             found[place] = instant(began, end, taken, cells)

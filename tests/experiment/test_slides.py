@@ -185,8 +185,3 @@ def test_plan__counts_the_cells(study):
     assert found.rows.item() == 9
     refused = rv.plan([vary(read_study(study), {"program.2.slide": 1e-5})]).refusal.item()
     assert "program.2: a slide of 10 µm is less than half a cell" in refused
-
-
-def test_trade__is_refused(study):
-    with pytest.raises(InputError, match="the program slides"):
-        rv.trade(read_study(study))
