@@ -39,11 +39,6 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
             f"method is {settings.method!r}, which knows no motion along the surface, and the program slides: expected "
             "method = 'fast'"
         )
-    if settings.grid_error:
-        raise InputError(
-            "grid_error compares the same instants on coarser grids, where a slide comes to other ones: expected "
-            "grid_error = false, and a run on a resampled surface beside this one"
-        )
     if program.segments[0].slide is not None:
         raise InputError("program.0 slides and nothing is pressed yet: expected load, pressure or approach before it")
     for number, segment in enumerate(program.segments):
