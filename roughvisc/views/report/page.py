@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
@@ -144,7 +145,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
     if isinstance(source, xr.Dataset):
         require(source, axis_of(source), "x", "y")
-        yield source
+        yield whole_of(source)
     else:
         with whole_result(source) as dataset:
             yield dataset
