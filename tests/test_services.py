@@ -1,5 +1,7 @@
 """Every service for every kind of experiment: none refuses a kind, unless physics does."""
 
+import json
+import re
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -198,6 +200,11 @@ def test_report__tells_what_was_done(kind, done, tmp_path, coarse_pictures):
     ):
         assert words in page, words
     assert f"<th>{done.case.experiment().table}</th>" in page
+    assert f"Contact over {kind.axis}</h2>" in page
+    (view,) = json.loads(re.search(r"const views = (.*);\n", page)[1])
+    assert len(view["frames"]) == ROWS
+    assert len({frame["maps"][0] for frame in view["frames"]}) == ROWS, "each row has a map of its own"
+    assert ("Friction coefficient" in {chart["label"] for chart in view["charts"]}) == kind.moves
     whole = whole_of(done.result)
     numbers = {name: f"{float(whole[name].max()):.2g}" for name in ("stated_error", "time_error") if name in whole}
     for number in ("10 kPa", str(int(whole.convolutions.sum())), *numbers.values()):
