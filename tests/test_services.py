@@ -73,7 +73,7 @@ KINDS = {
 }
 ROWS = 3
 #: Of what takes seconds, the plain load is drawn, told and traded by many tests.
-moving_first = pytest.mark.parametrize(
+plain_load_is_thorough = pytest.mark.parametrize(
     "kind", [pytest.param("load", marks=pytest.mark.thorough), "slide", "friction"], indirect=True, scope="module"
 )
 
@@ -175,7 +175,7 @@ def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
     assert table["contact_area [m^2]"].iloc[0] == float(done.result.contact_area[row])
 
 
-@moving_first
+@plain_load_is_thorough
 def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pictures):
     drawn = rv.plot.save_figures(done.result, tmp_path, "one")
     names = {path.stem.rpartition("-")[2] for path in drawn}
@@ -187,7 +187,7 @@ def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pict
             assert np.ptp(np.asarray(picture.convert("L"))) > 100, path
 
 
-@moving_first
+@plain_load_is_thorough
 def test_report__tells_what_was_done(kind, done, tmp_path, coarse_pictures):
     page = rv.report(done.result, tmp_path / "page.html").read_text()
     for words in (
@@ -264,7 +264,7 @@ def test_grid_error__is_stated_in_every_row(kind, done):
     assert (abs(one.values - other.values) <= own * unit).all()
 
 
-@moving_first
+@plain_load_is_thorough
 def test_trade__measures_each_setting(kind, done):
     ds = rv.trade(done.case, [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=1.5)], progress=False)
     assert not any(ds.note.values)
