@@ -232,8 +232,9 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
     """Measure what accuracy costs, and say which setting to take.
 
-    The case is computed under a ladder of settings: tolerances, grids, fixed steps, memories, the seed paper's
-    algorithm. Each is timed and held against a closed form where the case has one, else against its own finest run.
+    The case is computed under a ladder of settings: tolerances and grids; of a program also fixed steps, memories, the
+    seed paper's algorithm. Each is timed and held against a closed form where the case has one, else against its own
+    finest run.
     A NetCDF and a figure are written; --apply sets the keys of STUDY, whose comments and layout stay.
 
     \b
@@ -250,6 +251,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
+    from roughvisc.study.trade.exact import quantities_of
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.plot import trade as figure
@@ -257,11 +259,11 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
-    quantity = recommend.known_quantity(quantity, "--quantity")
+    quantity = recommend.known_quantity(quantity, quantities_of(case), "--quantity")
     if target is not None:
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)
-    with reporting(True, console=console) as report, fft.set_workers(CPU_COUNT):
+    with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
         dataset = measured(case, budget=time, progress=report)
     console.print(trade_table(dataset))
     say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))

@@ -29,7 +29,7 @@ from roughvisc.experiment.profile import Profile, quarter, unfold, uses_window
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.refusal import least_rows, require_memory
 from roughvisc.experiment.resources import march_bytes
-from roughvisc.experiment.scene import build_scene, memory_options, slide_note
+from roughvisc.experiment.scene import build_scene, kept_times, memory_options, slide_note, snap_to_cells
 from roughvisc.experiment.stated import area_columns, error_columns, is_end_value, meets_tolerance
 from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
@@ -75,6 +75,9 @@ def friction_row(step: Step) -> dict[str, float]:
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
+
+#: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
+_FEW = 9
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
 _SINGLE = 1e-4
 
@@ -154,6 +157,14 @@ class Loading(Experiment):
         """The same with loads in place of nominal pressures."""
         return Loading(self.program.on_area(area))
 
+    def with_common_rows(self, settings: Settings, spacings: Sequence[tuple[float, float]]) -> Settings:
+        """Those with kept times that are a few where all steps were kept, and lie at whole cells of all grids. [s]"""
+        settings = replace(settings, times=settings.times or _FEW)
+        if not self.program.slides:
+            return settings
+        times = kept_times(self.program, settings.times)
+        return self.with_rows_at(settings, snap_to_cells(self.program, times, *spacings) or ())
+
     def with_rows_at(self, settings: Settings, places: Sequence[float]) -> Settings:
         """Those with these kept times. [s]"""
         return replace(settings, times=places)
@@ -178,11 +189,15 @@ class Loading(Experiment):
         unit = unit_for(end, "s")
         return f"t = {unit(done):.3g} of {unit.text(end)}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float) -> float:
-        """Memory of the march, its contact sparse. [byte]"""
+    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
+        """Memory of the march, its contact sparse unless it is known. [byte]"""
         options = memory_options(self.program.on_area(area), settings)
         memory = choose_memory(complete(body.material), **options).memory
-        return march_bytes(settings, cells, memory, rows=least_rows(settings, self.program))
+        counts = {"rows": least_rows(settings, self.program)} | counts
+        if settings.method == "fast":
+            return march_bytes(settings, cells, memory, **counts)
+        pressures = 8.0 * cells * counts.get("steps", 0.0)  # the seed paper's algorithm keeps all of them, and whole
+        return march_bytes(settings, cells, memory, **counts | {"part": 1.0}) + pressures
 
 
 class LoadingRows(Rows):

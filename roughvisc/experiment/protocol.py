@@ -165,6 +165,10 @@ class Experiment(Protocol):
         """The same with loads in place of nominal pressures, which refer to an area. [m2]"""
         return self
 
+    def with_common_rows(self, settings: Settings, spacings: Sequence[tuple[float, float]]) -> Settings:
+        """Settings with which its rows lie at the same places on grids of all these cell sides [m], with any steps."""
+        return settings
+
     def with_rows_at(self, settings: Settings, places: Sequence[float]) -> Settings:
         """Settings with which it has the rows of an earlier solve again, at these places of its axis."""
         return settings
@@ -173,8 +177,19 @@ class Experiment(Protocol):
         """How far it has come, as one reads it."""
         return f"{done:.0f} of {end:.0f}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float) -> float:
-        """Memory of a solve at its peak, fields in a file, without what the process takes in any case. [byte]"""
+    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
+        """Memory of a solve at its peak, fields in a file, without what the process takes in any case. [byte]
+
+        Parameters
+        ----------
+        settings, body
+            Of the solve.
+        cells, area : float
+            Of the surface. [m2]
+        **counts
+            Of a solve that is known: ``steps``, ``rows``, largest ``contact`` fraction, and ``part`` of the cells that
+            is solved on.
+        """
         return 8.0 * cells * _FIELDS
 
     def creep_time(self, size: float) -> float:

@@ -210,11 +210,6 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
             f"method is {settings.method!r}, which knows no motion along the surface, and the program slides: expected "
             "method = 'fast'"
         )
-    if settings.grid_error:
-        raise InputError(
-            "grid_error compares the same instants on coarser grids, where a slide comes to other ones: expected "
-            "grid_error = false, and a run on a resampled surface beside this one"
-        )
     if program.segments[0].slide is not None:
         raise InputError("program.0 slides and nothing is pressed yet: expected load, pressure or approach before it")
     for number, segment in enumerate(program.segments):
@@ -225,8 +220,8 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
                 raise InputError(f"program.{number}: {error}") from None
 
 
-def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spacing) -> tuple[float, ...] | None:
-    """Kept times, those within a slide brought to the nearest whole cell. [s]
+def snap_to_cells(program: Program, times: Sequence[float] | None, *spacings: Spacing) -> tuple[float, ...] | None:
+    """Kept times, those within a slide brought to the nearest instant at which whole cells of each grid are behind. [s]
 
     Parameters
     ----------
@@ -234,8 +229,8 @@ def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spac
         The loading program.
     times : sequence of float or None
         Ascending; None for every accepted step. [s]
-    spacing : tuple of float
-        Cell sides. [m]
+    *spacings : tuple of float
+        Cell sides of each grid. [m]
     """
     if times is None or not program.slides:
         return None if times is None else tuple(times)
@@ -244,7 +239,7 @@ def snap_to_cells(program: Program, times: Sequence[float] | None, spacing: Spac
     for segment, began, end in zip(program.segments, corners, corners[1:], strict=False):
         if segment.slide is None:
             continue
-        cells = segment.slide.cells(spacing)
+        cells = math.gcd(*(segment.slide.cells(spacing) for spacing in spacings))
         for place in np.flatnonzero((found > began) & (found < end)):
             taken = round((found[place] - began) / (end - began) * cells)
             found[place] = instant(began, end, taken, cells)

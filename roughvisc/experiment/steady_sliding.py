@@ -135,7 +135,7 @@ class SteadySliding(Experiment):
         """The number of speeds that are found."""
         return f"speed {done:.0f} of {end:.0f}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float) -> float:
+    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
         """Memory of one speed. [byte]"""
         return curve_bytes(settings, cells)
 

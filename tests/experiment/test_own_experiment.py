@@ -17,6 +17,7 @@ from roughvisc.solve import solve
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement import schema
 from roughvisc.study.statement.case import read_cases, read_study
+from roughvisc.study.trade.ladder import Setting
 from roughvisc.variables import axes
 
 STUDY = """
@@ -157,6 +158,17 @@ def test_observables__are_derived_of_every_row(study, tmp_path):
     assert spots.dims == ("load",)
     assert (np.diff(spots) > 0).all()
     assert rv.observables.clusters(ds).cluster_count.dims == ("load",)
+
+
+def test_trade__measures_tolerances_and_grids(study):
+    settings = [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=2.0), Setting(0.1, memory="direct")]
+    ds = rv.trade(read_study(study), settings, progress=False)
+    assert ds.note[:3].values.tolist() == [""] * 3
+    assert "a stack of loads has none" in ds.note[3].item()
+    wrong = ds.error.sel(quantity="approach").values
+    assert wrong[1] < min(wrong[0], wrong[2])
+    assert ds.attrs["rows"] == "loads"
+    assert "for 1 % on contact area" in ds.attrs["recommendation"]
 
 
 def test_study__refuses_what_has_no_meaning(study):

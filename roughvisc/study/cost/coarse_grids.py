@@ -9,9 +9,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.experiment.coarser import on_fewer_cells
+from roughvisc.experiment.loading import Loading
 from roughvisc.problem import Problem
 from roughvisc.solve import solve
-from roughvisc.study.cost.estimate import Copies, CostEstimate, coarse
+from roughvisc.study.cost.estimate import Copies, CostEstimate, coarse, march_of
 from roughvisc.study.cost.press import Pressed
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
@@ -22,14 +23,35 @@ _COARSE, _GROWS = (24, 48), (1.0, 1.5)
 _AGAIN = 1.4
 
 
-def on_coarse_grids(case: Case, height: xr.DataArray, _: Copies | None = None) -> CostEstimate:
+def foretold(case: Case, height: xr.DataArray, copies: Copies | None = None) -> CostEstimate:
+    """What a case takes: of one that marches by its steps on coarse grids, of any other by some of its rows there.
+
+    Parameters
+    ----------
+    case : Case
+        Any.
+    height : xarray.DataArray
+        Its surface. [m]
+    copies : Copies, optional
+        Of the surface, if there are some already.
+
+    Raises
+    ------
+    InputError
+        If the case is impossible.
+    """
+    if isinstance(case.experiment(), Loading):
+        return march_of(case, height, copies)
+    return on_coarse_grids(case, height)
+
+
+def on_coarse_grids(case: Case, height: xr.DataArray) -> CostEstimate:
     """Rows as steps, and convolutions, from coarse grids.
 
     Parameters
     ----------
     case : Case
-        Any; one that marches through time is foretold more closely by
-        :func:`~roughvisc.study.cost.estimate.march_of`.
+        Any.
     height : xarray.DataArray
         Its surface. [m]
 

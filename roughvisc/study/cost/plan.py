@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,7 @@ from roughvisc.study.audit.audit import evaluate
 from roughvisc.study.audit.evidence import of_case
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.texture import Texture, texture_of
-from roughvisc.study.cost.coarse_grids import on_coarse_grids
+from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.columns import COLUMNS, attributes
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,
@@ -40,7 +40,6 @@ from roughvisc.study.cost.estimate import (
     CostEstimate,
     bytes_needed,
     disk,
-    march_of,
     over,
     solved_on,
     wall_time,
@@ -136,11 +135,9 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     for number, case in enumerate(cases):
         like = _nearest_case(number, list(marches), parameters)
         surface = surfaces.get(_surface_name(cases[number], stated[number]))
-        kind = _kind(case)
+        row = _row if isinstance(case.experiment(), Loading) else _general_row
         rows.append(
-            kind.row(
-                case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch, there
-            )
+            row(case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch, there)
         )
     columns = {name: ("case", np.array([row[name] for row in rows]), attributes(name)) for name in COLUMNS}
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
@@ -176,7 +173,7 @@ def _marches(
             problems[number] = surfaces[name].problem
         elif time.perf_counter() < until or not marches:
             try:
-                marches[number] = _kind(cases[number]).march(cases[number], height, surfaces[name].copies)
+                marches[number] = foretold(cases[number], height, surfaces[name].copies)
             except InputError as error:
                 problems[number] = str(error)
     return marches, surfaces, problems
@@ -410,19 +407,3 @@ def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
     damped = f", the two-step rule (BDF2) in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     slid = f", {found.slid:.0f} of one cell in slides" if found.slid else ""
     return f"piecewise-linear pressure{damped}, steps {steps}{slid}"
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """How the cost of an experiment is foretold: from coarse grids, and as a row."""
-
-    march: Callable[[Case, xr.DataArray, Copies | None], CostEstimate]
-    row: Callable[..., dict[str, Any]]
-
-
-#: What marches is foretold step by step, with its windows and its memory; anything else by some of its rows.
-_MARCH, _ANY = _Kind(march_of, _row), _Kind(on_coarse_grids, _general_row)
-
-
-def _kind(case: Case) -> _Kind:
-    return _MARCH if isinstance(case.experiment(), Loading) else _ANY

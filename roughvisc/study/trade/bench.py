@@ -12,14 +12,15 @@ import xarray as xr
 
 from roughvisc.errors import RoughviscError
 from roughvisc.experiment.profile import Profile, uses_window
-from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.study.cost.estimate import ConvolutionTimer, CostEstimate, bytes_needed, march_of, solved_on, work
+from roughvisc.experiment.resources import PROCESS
+from roughvisc.study.cost.coarse_grids import foretold
+from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, work
 from roughvisc.study.cost.stages import stages_of
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
-from roughvisc.study.trade.ladder import Setting, changed, shape_of
+from roughvisc.study.trade.exact import quantities_of
+from roughvisc.study.trade.ladder import Setting, changed, duration_of, has_steps, shape_of
 from roughvisc.topography.grid import nominal_area
 
 Report = Callable[[str, float, float], None]
@@ -32,6 +33,8 @@ _TELLING = 0.2
 _ONCE, _STEP = 0.02, 1e-3
 #: Tolerance of the coarse marches from which the first times are told.
 _MARCHED = 1e-2
+#: What a row takes more of convolutions for a tolerance ten times sharper, where no steps follow the tolerance.
+_DECADE = 0.25
 #: Convolutions a step of the seed paper's solver takes, over those of the preconditioned one; measured: 8 to 15.
 _SEED_SOLVE = 12.0
 
@@ -55,7 +58,7 @@ class Run:
     seconds : float
         Wall time of computing and writing it, the fastest of its repetitions. [s]
     steps : int
-        Accepted time steps.
+        Accepted time steps, or rows of what has none.
     peak_memory, disk_size : float
         Counted from its arrays, and of its file. [byte]
     """
@@ -81,20 +84,25 @@ class TimedRuns:
     budget : float
         Wall time of all runs together. [s]
     report : callable
-        Called with a setting's name, the time reached and the program's length.
+        Called with a setting's name, how far it is, and of how much.
+
+    Attributes
+    ----------
+    quantities : tuple of str
+        What is compared of the results.
     """
 
     def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
+        self.quantities = quantities_of(case)
         self._absent = height.attrs.get("missing") == "absent"
         self._path, self._report = result_path(folder, "run"), report
         self._until = time.perf_counter() + budget
-        self._found = march_of(changed(case, self.shape, Setting(_MARCHED)), height)
+        self._found = foretold(changed(case, self.shape, Setting(_MARCHED)), height)
         settings = replace(case.solving(), method="fast", missing="absent")
         self._convolution = ConvolutionTimer().seconds(height, settings.boundary, case.body().kernel)
-        profile = Profile(
-            height, settings.missing, follow=uses_window(settings), mirror=True, kernel=case.body().kernel
-        )
+        options = {"follow": uses_window(settings), "mirror": case.experiment().largest_speed == 0}
+        profile = Profile(height, settings.missing, kernel=case.body().kernel, **options)
         self._part = solved_on(stages_of(profile, grows=False), self._found).part  # of the cells
         self._calibration = 1.0
 
@@ -110,10 +118,13 @@ class TimedRuns:
     def expected(self, setting: Setting) -> float:
         """Wall time that a setting is expected to take; runs that took a while correct it. [s]"""
         cells, size = 1 / setting.coarsening**2, math.prod(self.shape)
-        steps = self._found.steps * math.sqrt(_MARCHED / setting.tolerance)
+        steps, each = self._found.steps, self._found.convolutions / max(self._found.steps, 1.0)
         if setting.time_step is not None:
-            steps = self.case.program().duration / setting.time_step
-        each = self._found.convolutions / max(self._found.steps, 1.0)
+            steps = duration_of(self.case) / setting.time_step
+        elif has_steps(self.case):
+            steps *= math.sqrt(_MARCHED / setting.tolerance)
+        else:
+            each *= max(1.0 + _DECADE * math.log10(_MARCHED / setting.tolerance), _DECADE)
         if setting.method == "seed":
             convolutions = steps**2 / 2 + steps * each * _SEED_SOLVE
         else:
@@ -167,10 +178,12 @@ class TimedRuns:
 
     def _memory(self, case: Case, dataset: xr.Dataset, steps: int) -> float:
         """As a plan counts it, with the steps that were taken. [byte]"""
-        settings, cells = case.solving(), dataset.sizes["x"] * dataset.sizes["y"]
-        contact, rows = float(dataset["contact_area_counted"].max()) / nominal_area(dataset), dataset.sizes["time"]
-        choice = choose_memory(case.material(), **memory_options(case.program(), settings))
-        found = CostEstimate(steps, rows, float(dataset["convolutions"].sum()), 0.0, contact, True)
-        increments = 8.0 * cells * steps if settings.method == "seed" else 0.0
-        part = 1.0 if settings.method == "seed" else self._part
-        return bytes_needed(settings, cells, found, choice, part) + increments
+        experiment, area = case.experiment(), nominal_area(dataset)
+        counts = {
+            "steps": float(steps),
+            "rows": float(dataset.sizes[experiment.axis]),
+            "contact": float(dataset["contact_area_counted"].max()) / area,
+            "part": self._part,
+        }
+        cells = dataset.sizes["x"] * dataset.sizes["y"]
+        return PROCESS + experiment.bytes_needed(case.solving(), case.body(), cells, area, **counts)

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.scene import kept_times
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.closed_forms import (
     Cone,
@@ -27,12 +28,14 @@ from roughvisc.mechanics.stepping.program import Program
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import is_data
 from roughvisc.topography.grid import spacing
+from roughvisc.variables.axes import AXES
 
 Array = NDArray[np.float64]
 Pressure = Callable[[Array, float], Array]
 
-#: What is compared, in the order of the results.
+#: What is compared, in the order of the results; and where something slides.
 QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
+SLIDING_QUANTITIES = ("friction_coefficient",)
 #: A cell whose centre has no finite pressure is averaged over so many points each way.
 _POINTS = 32
 
@@ -116,14 +119,23 @@ class ClosedForm:
         return np.array(means)
 
 
+def quantities_of(case: Case) -> tuple[str, ...]:
+    """What can be compared in the results of a case."""
+    experiment = case.experiment()
+    names = QUANTITIES + (SLIDING_QUANTITIES if experiment.largest_speed > 0 else ())
+    return tuple(name for name in names if name in AXES[experiment.axis].variables)
+
+
 def relative(difference: Array, values: Array) -> float:
     """Largest difference over the largest value; missing where all values are zero."""
-    largest = float(np.max(np.abs(values), initial=0.0))
+    largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
     return float(np.max(np.abs(difference))) / largest if largest else np.nan
 
 
-def closed_form(case: Case, times: Array) -> ClosedForm | None:
-    """The closed form of a case at some times, the one that knows most; None where there is none.
+def closed_form(case: Case, times: Array | None = None) -> ClosedForm | None:
+    """The closed form of a case at some times [s], the one that knows most; None where there is none.
+
+    Without times it is that at those which the case keeps.
 
     Spheres, cones and flat punches in free space have one, under loads that grow, have one maximum, or any history;
     the last is a reduction to independent elements, accurate to some millionths.
@@ -131,7 +143,8 @@ def closed_form(case: Case, times: Array) -> ClosedForm | None:
     surface = case.settings.surface
     recipe = getattr(surface, "generate", "")
     if (
-        case.body().kernel != HALF_SPACE
+        case.settings.program is None
+        or case.body().kernel != HALF_SPACE
         or case.settings.solve.boundary != "free"
         or is_data(case)
         or getattr(surface, "exact", False)
@@ -139,6 +152,8 @@ def closed_form(case: Case, times: Array) -> ClosedForm | None:
         return None
     centre = (surface.size[0] / 2, surface.size[1] / 2)
     material, program = case.material(), case.program().on_area(math.prod(surface.size))
+    if times is None:
+        times = np.array(kept_times(program, case.solving().times))
     if recipe == "flat_punch":
         return _punch(surface.radius, centre, material, program, times)
     if recipe not in ("sphere", "cone"):

@@ -8,7 +8,7 @@ from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.settings import Memory, Method, Settings
+from roughvisc.settings import ENTRIES, Memory, Method, Settings
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.surface import FileSurface
 
@@ -174,6 +174,16 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float, absent: b
     return f"surface.{'resample' if ends else 'band_limit'}", [max(2, n // mirrored) for n in cells]
 
 
+def has_steps(case: Case) -> bool:
+    """Whether what the case does takes steps in time, with a memory of those before."""
+    return ENTRIES["time_step"].only_over in ("", case.experiment().axis)
+
+
+def duration_of(case: Case) -> float:
+    """Time that steps divide; zero where there are none. [s]"""
+    return case.experiment().creep_time(0.0) if has_steps(case) else 0.0
+
+
 def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
     """The settings that a trade measures unless it is told others.
 
@@ -184,7 +194,7 @@ def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
     shape : tuple of int
         Cells of its grid.
     """
-    duration = case.program().duration
+    duration = duration_of(case)
     rungs = [Setting(tolerance) for tolerance in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)]
     for coarsening, tolerance in ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)):
         if min(shape) / coarsening >= _FEWEST:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.trade.exact import QUANTITIES
 from roughvisc.study.trade.ladder import step_text
 from roughvisc.units import quantity as quantity_in
 from roughvisc.variables import VARIABLES, current_name
@@ -20,7 +20,8 @@ TARGETS = (1e-2, 1e-3)
 _ALIKE = 1.1
 #: What quantities are called in words.
 WORDS = {
-    name: VARIABLES[name].short for name in ("contact_area", "pressure", "approach", "contact_area_counted", "mean_gap")
+    name: VARIABLES[name].short
+    for name in ("friction_coefficient", "contact_area", "pressure", "approach", "contact_area_counted", "mean_gap")
 }
 
 
@@ -85,31 +86,36 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     return int(np.flatnonzero(spent <= _ALIKE * np.min(spent))[0])
 
 
-def known_quantity(quantity: str, name: str = "quantity") -> str:
-    """The quantity, if there is one of that name, or was before."""
+def known_quantity(quantity: str, known: Sequence[str], name: str = "quantity") -> str:
+    """The quantity, if it is one of those that are known by that name, or were before."""
     quantity = current_name(quantity)
-    if quantity not in QUANTITIES:
-        raise InputError(f"{name}: found {quantity!r}: expected one of {', '.join(QUANTITIES)}")
+    if quantity not in known:
+        raise InputError(f"{name}: found {quantity!r}: expected one of {', '.join(known)}")
     return quantity
+
+
+def main_quantities(dataset: xr.Dataset) -> list[str]:
+    """The quantities of a trade, what matters most first."""
+    return [name for name in WORDS if name in dataset["quantity"]]
 
 
 def recommendation(dataset: xr.Dataset) -> str:
     """Advice in words, a line for each quantity that something is known of."""
-    advised = [name for name in WORDS if name != "contact_area_counted"]
+    advised = [name for name in main_quantities(dataset) if name != "contact_area_counted"]
     known = [name for name in advised if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     lines = [_advice(dataset, name) for name in known]
     return "\n".join(lines + ([_of_the_scan(dataset)] if dataset.attrs.get("grid_is_data") else []))
 
 
 def _of_the_scan(dataset: xr.Dataset) -> str:
-    """What the spacing of the points makes of the contact area, which no setting mends."""
-    name = "contact_area"
+    """What the spacing of the points makes of the quantity that matters most, which no setting mends."""
+    name = main_quantities(dataset)[0]
     found = dict(zip(dataset["coarsening"].values, dataset["coarsening_error"].sel(quantity=name).values, strict=True))
     parts = [f"{percent(found[k])} on cells {k:g} times as long" for k in sorted(found) if k > 1 and found[k] > 0]
     unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=name))
     text = "the grid is data, and no setting"
     if parts:
-        text += f": the contact area changes by {' and '.join(parts)}"
+        text += f": the {WORDS[name]} changes by {' and '.join(parts)}"
     if np.isfinite(unsure):
         text += f"; the spacing of the points leaves about {percent(unsure)} of it unknown"
     return text

@@ -13,20 +13,19 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.scene import kept_times
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.progress import reporting
+from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
-from roughvisc.study.trade.exact import QUANTITIES, ClosedForm, closed_form
-from roughvisc.study.trade.finest import ReferenceRun
+from roughvisc.study.trade.exact import ClosedForm, closed_form
+from roughvisc.study.trade.finest import ReferenceRun, all_grids
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
+from roughvisc.topography.grid import spacing
 from roughvisc.variables import RESULT_FORMAT
-
-#: Kept times where a study keeps all accepted steps, which differ from setting to setting.
-_INSTANTS = 9
+from roughvisc.variables.axes import AXES
 
 
 def trade(
@@ -45,14 +44,16 @@ def trade(
         A case, or the study file that states one.
     settings : sequence of Setting, optional
         What to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
-        rounded to the precision of a float32, the direct history, fixed steps, and the seed paper's algorithm.
+        rounded to the precision of a float32; of a program also the direct history, fixed steps, and the seed paper's
+        algorithm.
     budget : float
         Wall time of all runs together. A setting that would take longer than what is left is not run, and says
         so. [s]
     reference : {"auto", "run"}
         Measure against a closed form where the case has one, or against its own finest run in any case.
     progress : bool or callable
-        A progress bar, or a function called with a setting's name, the time reached and the program's length [s].
+        A progress bar, or a function called with a setting's name, the time reached and the program's length [s], or
+        with the speeds of a curve that are done and their number.
 
     Returns
     -------
@@ -65,14 +66,15 @@ def trade(
     Raises
     ------
     InputError
-        If the study is wrong, holds a sweep or asks for friction, or its reference would take longer than half the
-        budget.
+        If the study is wrong or holds a sweep, or its reference would take longer than half the budget.
 
     Notes
     -----
     The finest run is as fine as the finest grid of the settings, with a fifth of their sharpest tolerance. How far
     it may be off itself follows from runs with that tolerance, on grids two and four times coarser, by Richardson
     extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells.
+    In a slide the profile moves by whole cells: kept times there are those at which whole cells of every grid are
+    behind, at least its beginning and its end.
     """
     if not isinstance(case, Case):
         case = read_study(case)
@@ -80,44 +82,45 @@ def trade(
         raise InputError(f"budget is {budget!r}: expected a positive number of seconds")
     if reference not in ("auto", "run"):
         raise InputError(f"reference is {reference!r}: expected 'auto' or 'run'")
-    if case.program().slides:  # a curve of friction has no program
-        raise InputError(
-            "the program slides, by whole cells: on other grids it comes to other instants, where nothing can be "
-            "compared; expected a program without slides"
-        )
-    case = _comparable(case)
     height = case.height()
     shape = (height.sizes["x"], height.sizes["y"])
     rungs = list(ladder(case, shape) if settings is None else settings)
     if not rungs:
         raise InputError("settings is empty: expected at least one Setting")
-    program = case.program()
-    times = np.array(kept_times(program, case.solving().times))
-    exact = closed_form(case, times) if reference == "auto" else None
-    with tempfile.TemporaryDirectory() as folder, reporting(progress) as report:
+    case = _comparable(case, height, rungs)
+    exact = closed_form(case) if reference == "auto" else None
+    with tempfile.TemporaryDirectory() as folder, reporting(progress, at=case.at) as report:
         bench = TimedRuns(case, height, Path(folder), budget, report)
         known = exact.quantities if exact else ()
-        finest = None if set(QUANTITIES) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
+        finest = None if set(bench.quantities) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
         rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
     order = [rungs.index(row["rung"]) for row in rows]
     rows = [rows[i] for i in np.argsort(order, kind="stable")]
-    return _labelled(case, rows, exact, finest)
+    return _labelled(bench, rows, exact, finest)
 
 
-def _comparable(case: Case) -> Case:
-    """The case with times that all settings have in common, and with the pressures that are compared."""
-    keep = case.settings.keep
+def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting]) -> Case:
+    """The case with rows that all settings have in common, and with the pressures that are compared."""
+    keep, settings, experiment = case.settings.keep, case.solving(), case.experiment()
     changes: dict[str, Any] = {"solve.grid_error": False}
-    changes["keep.fields"] = [*dict.fromkeys([*keep.fields, "pressure"])]
-    if keep.times == "all":
-        changes["keep.times"] = _INSTANTS
+    if "pressure" in AXES[experiment.axis].variables:
+        changes["keep.fields"] = [*dict.fromkeys([*keep.fields, "pressure"])]
+    shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
+    shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]
+    cells = [(sides[0] * shape[0] / nx, sides[1] * shape[1] / ny) for nx, ny in shapes]
+    common = experiment.with_common_rows(settings, cells)
+    changes |= {
+        f"{one.table}.{name}": value
+        for name, one in ENTRIES.items()
+        if (value := getattr(common, name)) != getattr(settings, name)
+    }
     return vary(case, changes)
 
 
 def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: ReferenceRun | None) -> dict[str, Any]:
     """What a setting cost and how wrong it was, or why that is not known."""
     shape = shape_of(bench.case, bench.shape, setting.coarsening)
-    missing = dict.fromkeys(QUANTITIES, math.nan)
+    missing = dict.fromkeys(bench.quantities, math.nan)
     row: dict[str, Any] = {
         "rung": setting,
         "setting": bench.label(setting),
@@ -139,13 +142,14 @@ def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: R
         if finest and not is_data(bench.case):
             finest.check(setting)
         run = bench.run(setting)
+        against_finest = finest.errors(run.dataset) if finest else {}
     except NotRun as error:
         return row | costs | {"note": str(error)}
-    row["error"] = (finest.errors(run.dataset) if finest else {}) | (exact.errors(run.dataset) if exact else {})
+    row["error"] = missing | against_finest | (exact.errors(run.dataset) if exact else {})
     if finest:
         alone = finest.of_coarsening(setting.coarsening)
         row["coarsening_error"] = missing | {
-            name: alone[name] for name in QUANTITIES if not (exact and name in exact.quantities)
+            name: alone[name] for name in bench.quantities if not (exact and name in exact.quantities)
         }
     return row | {
         "run_time": run.seconds,
@@ -161,24 +165,25 @@ _COORDS = ("setting", "family", "method", "memory", "tolerance", "time_step", "c
 
 
 def _labelled(
-    case: Case, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: ReferenceRun | None
+    bench: TimedRuns, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: ReferenceRun | None
 ) -> xr.Dataset:
+    case, quantities = bench.case, bench.quantities
     names = [name for name in rows[0] if name != "rung"]
     columns: dict[str, Any] = {}
     for name in names:
         values = [row[name] for row in rows]
         if name in ("error", "coarsening_error"):
-            columns[name] = (("setting", "quantity"), np.array([[v[q] for q in QUANTITIES] for v in values], float))
+            columns[name] = (("setting", "quantity"), np.array([[v[q] for q in quantities] for v in values], float))
         else:
             columns[name] = ("setting", np.array(values, dtype=str if name in _TEXTS else float))
     closed = dict.fromkeys(exact.quantities, exact.name) if exact else {}
     run = finest.name if finest else ""
-    columns["reference"] = ("quantity", np.array([closed.get(name, run) for name in QUANTITIES], dtype=str))
+    columns["reference"] = ("quantity", np.array([closed.get(name, run) for name in quantities], dtype=str))
     for part in ("time", "grid"):
-        unsure = [0.0 if name in closed or not finest else getattr(finest, part)[name] for name in QUANTITIES]
+        unsure = [0.0 if name in closed or not finest else getattr(finest, part)[name] for name in quantities]
         columns[f"reference_{part}_uncertainty"] = ("quantity", np.array(unsure))
     coords = {name: columns.pop(name) for name in (*_COORDS, "cells_x", "cells_y")}
-    dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(QUANTITIES)}))
+    dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(quantities)}))
     dataset.attrs = {
         "Conventions": "CF-1.11",
         "result_format": RESULT_FORMAT,
@@ -188,6 +193,7 @@ def _labelled(
         "states it (JSON, SI units).",
         "case": case.to_json(),
         "grid_is_data": int(is_data(case)),
+        "rows": AXES[case.experiment().axis].rows,
         "transforms": transform_library(),
     }
     dataset.attrs["recommendation"] = recommendation(dataset)

@@ -9,11 +9,18 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.errors import printable
-from roughvisc.study.trade.recommend import duration, pareto_front
+from roughvisc.study.trade.recommend import WORDS, duration, main_quantities, pareto_front
 from roughvisc.views.console.tables import size
 
-#: Errors that are shown, and their headings.
-_ERRORS = {"pressure": "pressure", "approach": "approach", "contact_area": "area", "mean_gap": "gap"}
+#: Errors that are shown, and their headings; so many of them, the first, have room in 80 characters.
+_ERRORS = {
+    "friction_coefficient": "friction",
+    "pressure": "pressure",
+    "approach": "approach",
+    "contact_area": "area",
+    "mean_gap": "gap",
+}
+_COLUMNS = 4
 
 
 def trade_table(dataset: xr.Dataset) -> Group:
@@ -24,22 +31,25 @@ def trade_table(dataset: xr.Dataset) -> Group:
     dataset : xarray.Dataset
         Of :func:`roughvisc.trade`.
     """
+    shown = dict([one for one in _ERRORS.items() if one[0] in dataset["quantity"]][:_COLUMNS])
+    counts = main_quantities(dataset)[0]
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column()
     table.add_column("setting", min_width=18)
-    for heading in ("time", "transf.", "memory", *_ERRORS.values()):
+    for heading in ("time", "transf.", "memory", *shown.values()):
         table.add_column(heading, justify="right", no_wrap=True)
-    best = pareto_front(dataset, "contact_area")
+    best = pareto_front(dataset, counts)
     for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
         if not np.isfinite(row["run_time"]):
             continue
-        errors = [_percent(float(row["error"].sel(quantity=name))) for name in _ERRORS]
+        errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
         spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
     parts = [Text(printable(dataset.attrs.get("title") or "untitled"), style="bold"), table]
-    text = "Errors in %, the worst over the kept times; * nothing is both faster and nearer in contact area."
+    rows = dataset.attrs.get("rows", "kept times")
+    text = f"Errors in %, the worst over the {rows}; * nothing is both faster and nearer in {WORDS[counts]}."
     parts += [Text(text, style="italic"), Text()]
     parts += [
         Text(f"Not run: {name}: {why}")

@@ -15,7 +15,7 @@ from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.trade.ladder import format_tolerance, step_text
-from roughvisc.study.trade.recommend import WORDS, pareto_front, uncertainty
+from roughvisc.study.trade.recommend import WORDS, main_quantities, pareto_front, uncertainty
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.views.figures.axes import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, letter_panels, new_figure, styled
 
@@ -47,7 +47,7 @@ _PLACES = (
 
 
 @styled
-def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area", "pressure")) -> Figure:
+def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figure:
     """Wall time against error of every setting, with the Pareto front: what no other setting beats in both.
 
     Errors that the reference cannot tell from zero lie in the grey band below; a setting whose error is exactly zero
@@ -57,8 +57,10 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area", "pre
     ----------
     dataset : xarray.Dataset
         Of :func:`roughvisc.trade`.
-    quantities : sequence of str
-        One panel for each: ``pressure``, ``approach``, ``contact_area``, ``contact_area_counted``, ``mean_gap``.
+    quantities : sequence of str, optional
+        One panel for each: ``friction_coefficient``, ``pressure``, ``approach``, ``contact_area``,
+        ``contact_area_counted``, ``mean_gap``. Default: contact area and pressure, where something slides friction
+        coefficient and contact area.
 
     Returns
     -------
@@ -71,10 +73,11 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] = ("contact_area", "pre
     """
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
-    quantities = [current_name(name) for name in quantities]
+    known = main_quantities(dataset)
+    quantities = known[:2] if quantities is None else [current_name(name) for name in quantities]
     for name in quantities:
-        if name not in WORDS:
-            raise InputError(f"quantities holds {name!r}: expected some of {', '.join(WORDS)}")
+        if name not in known:
+            raise InputError(f"quantities holds {name!r}: expected some of {', '.join(known)}")
     shown = [name for name in quantities if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")

@@ -16,8 +16,9 @@ from PIL import Image
 
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import RowAxis, Unit, fullest_frame, spread_frames, unit_for
+from roughvisc.views.figures.axes import RowAxis, Unit, at_rows, fullest_frame, rows_of, spread_frames, unit_for
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
 from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, value_scale
 from roughvisc.views.figures.sections import cut_position, deformed_line
@@ -28,8 +29,8 @@ _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64)
 #: Colours of a map, besides those of absent cells and of cells in or out of contact.
 _LEVELS = 62
 _ABSENT, _MARKED = 0, 1
-#: What is stated of accuracy, then its parts.
-_ERRORS = {"stated_error": "stated", "time_error": "time steps", "residual": "solver (estimate)"}
+#: What is stated of accuracy, then its parts but for the solver's, whose name the axis tells.
+_ERRORS = {"stated_error": "stated", "time_error": "time steps"}
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
 #: The chart of errors, and kept times up to which they are marked in it.
@@ -77,7 +78,7 @@ def colour_bar(name: str) -> str:
 
 
 def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
-    """Everything that a page shows of one case over time.
+    """Everything that a page shows of the rows of one case, in the order of their axis.
 
     Parameters
     ----------
@@ -91,13 +92,16 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
     dict
         Of texts and numbers, ready for JSON.
     """
-    whole, dataset = dataset, measured_part(dataset)
+    over = axis_of(dataset.dims)
+    whole = dataset if over == "time" else dataset.sortby(over)
+    dataset = measured_part(whole)
+    axis = RowAxis.of(rows_of(dataset))
     fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
     scales, maps, chosen, block = [], [], [], 1
     fullest, every = fullest_frame(dataset), stride(dataset)
     trial = [_scale(dataset, name, [fullest]) for name in fields]
     for count, side in _LADDER:
-        chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
+        chosen = [int(frame) for frame in spread_frames(rows_of(dataset), count)]
         block = max(1, -(-max(dataset.sizes["x"], dataset.sizes["y"]) // (side * every)))
         one = sum(len(_map(dataset, scale, fullest, block)) for scale in trial)
         if one * len(chosen) > 1.1 * budget and (count, side) != _LADDER[-1]:
@@ -107,7 +111,10 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
         if sum(len(uri) for row in maps for uri in row) <= budget:
             break
     return {
-        "kept": dataset.sizes["time"],
+        "over": over,
+        "label": axis.label,
+        "rows": AXES[over].rows,
+        "kept": dataset.sizes[over],
         "block": block * every,
         "extremes": every > 1,
         "ratio": plane_ratio(dataset),
@@ -200,7 +207,7 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
     surfaces = [deformed_line(dataset, frame, "y", index) for frame in chosen]
-    on_line = [contact(dataset.isel(time=frame, y=index)).values for frame in chosen]
+    on_line = [contact(at_rows(dataset, frame).isel(y=index)).values for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
     if not known.size:
@@ -247,28 +254,35 @@ def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
     The tolerance is asked of the error that is stated at kept times, and is drawn beside that alone: a step between
     them may be less accurate.
     """
-    charts, steps = [], history(dataset)
-    axis = RowAxis.of(steps["time"])
-    across, ticks = _across(axis, steps["time"].values)
-    time = {"time": axis.unit.label("Time"), "xticks": ticks}
-    places = np.searchsorted(steps["time"].values, dataset["time"].values[chosen], side="right") - 1
-    for name in ("force", "approach", "contact_area"):
+    over = axis_of(dataset.dims)
+    charts, steps = [], history(dataset) if over == "time" else dataset
+    places_of_steps, kept = rows_of(steps).values, rows_of(dataset).values
+    axis = RowAxis.of(rows_of(steps))
+    across, ticks = _across(axis, places_of_steps)
+    along = {"time": axis.unit.label(axis.label), "xticks": ticks}
+    places = np.searchsorted(places_of_steps, kept[chosen], side="right") - 1
+    for name in ("friction_coefficient", "force", "approach", "contact_area"):
         if name in steps:
             label = VARIABLES[name].label
             values = steps[name].values.astype(float)
             unit = unit_for(values, VARIABLES[name].units)
-            x = across(steps["time"].values)
-            charts.append(time | _chart(x, unit.label(label), {label: unit(values)}, places.tolist()))
+            x = across(places_of_steps)
+            charts.append(along | _chart(x, unit.label(label), {label: unit(values)}, places.tolist()))
     errors = {
         label: dataset[name].values.astype(float)
-        for name, label in _ERRORS.items()
+        for name, label in _errors(over).items()
         if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
     }
     if errors:
-        x, tolerance = across(dataset["time"].values), dataset.attrs.get("tolerance")
+        x, tolerance = across(kept), dataset.attrs.get("tolerance")
         chart = _chart(x, _ERROR_CHART, errors, chosen, tolerance)
-        charts.append(chart | {"time": axis.unit.label("Kept time"), "xticks": ticks})
+        charts.append(chart | along | ({"time": axis.unit.label("Kept time")} if over == "time" else {}))
     return charts
+
+
+def _errors(over: str) -> dict[str, str]:
+    """What is stated of accuracy over an axis."""
+    return {**_ERRORS, AXES[over].residual: _ERRORS.get(AXES[over].residual, "solver (estimate)")}
 
 
 def _chart(
@@ -352,11 +366,12 @@ def _up(values: np.ndarray, logarithmic: bool):
 
 
 def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
-    """Time of a frame, and its numbers in words."""
-    one = dataset.isel(time=frame)
-    time = float(one["time"])
+    """Place of a frame, and its numbers in words."""
+    over = axis_of(dataset.dims)
+    known, one = AXES[over].variables, at_rows(dataset, frame)
+    place = float(one[over])
     rows = [
-        (VARIABLES[name].label, unit_for(dataset[name], VARIABLES[name].units).text(float(one[name]), 4))
+        (known[name].label, unit_for(dataset[name], known[name].units).text(float(one[name]), 4))
         for name in (
             "force",
             "nominal_pressure",
@@ -370,13 +385,13 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
             "leak_rate",
             *CONDUCTANCES,
         )
-        if name in dataset
+        if name in dataset and name in known
     ]
     if "contact_fraction" in dataset:
         rows.append(("Of nominal", f"{100 * float(one['contact_fraction']):.3g} %"))
-    for name, label in _ERRORS.items():
+    for name, label in _errors(over).items():
         if name in dataset:
             rows.append((f"Error, {label}", f"{float(one[name]):.2g}" if np.isfinite(one[name]) else "not known"))
     if "status" in dataset:
         rows.append(("Status", STATUS_MEANINGS[int(one["status"])].replace("_", " ")))
-    return {"time": unit_for([time], "s").text(time, 4), "numbers": rows}
+    return {"time": unit_for([place], known[over].units).text(place, 4), "numbers": rows}

@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.groups import whole_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
@@ -144,7 +145,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
     if isinstance(source, xr.Dataset):
         require(source, axis_of(source), "x", "y")
-        yield source
+        yield whole_of(source)
     else:
         with whole_result(source) as dataset:
             yield dataset
@@ -160,7 +161,6 @@ def _swept(folder: Path) -> list[dict[str, str]]:
 def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
-    curves: list[dict[str, Any]] = []  # studies over another axis, which have no time to pick
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
     rows, views, figures, surfaces, studies, everything = [], [], [], {}, [], {}
     names: set[str] = set()
@@ -175,13 +175,10 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
                 everything[row["name"]] = _histories(dataset)
             if number not in pictured:
                 continue
-            if "time" in dataset.dims:
-                row["view"] = len(views)
-                told = {"number": number + 1, "title": row["name"], "key": row["key"]}
-                views.append({**told, **frames_of(dataset, budget)})
-                studies.append(row["study"])
-            elif len(curves) < _DRAWN:
-                curves.append(row["study"])
+            row["view"] = len(views)
+            told = {"number": number + 1, "title": row["name"], "key": row["key"]}
+            views.append({**told, **frames_of(dataset, budget)})
+            studies.append(row["study"])
             if len(sources) <= _DRAWN:
                 figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
             what = row["surface"]
@@ -200,10 +197,10 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         varied=names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
         views=views,
-        studies=[*studies, *curves],
+        studies=studies,
         headings=list(dict.fromkeys(row["rows"] for row in rows)) or ["Times"],
         rubbed=any(row["friction"] for row in rows),
-        audited=any(study["audit"] for study in (*studies, *curves)),
+        audited=any(study["audit"] for study in studies),
         bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
         figures=figures,
         surfaces=list(surfaces.values()),

@@ -192,11 +192,6 @@ def test_plan__expects_about_the_work_that_is_done(case, tmp_path):
     assert 0.5 * done < float(rv.plan([case()]).convolutions[0]) < 2 * done
 
 
-def test_trade__refuses_friction(case):
-    with pytest.raises(rv.InputError, match="friction: found steady sliding, which has no program"):
-        rv.trade(case(), progress=False)
-
-
 def test_command__runs_plots_and_reports(invoke, tmp_path, coarse_pictures):
     (tmp_path / "slide.toml").write_text(with_beside())
     status, out, err = invoke("run", "slide.toml")
@@ -213,5 +208,3 @@ def test_command__runs_plots_and_reports(invoke, tmp_path, coarse_pictures):
     for words in ("Largest<br>friction", "4 speeds, 2 mm/s to 2 m/s, pressure 20 kPa, along x", "Pressure maps"):
         assert words in page
     assert invoke("verify", "results/slide")[0] == 0
-    status, _, err = invoke("trade", "slide.toml")
-    assert (status, "friction: found steady sliding" in err) == (2, True)

@@ -1,0 +1,313 @@
+"""Every service for every kind of experiment: none refuses a kind, unless physics does."""
+
+import json
+import re
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from PIL import Image
+from scipy import fft
+from support import assert_same, numbers
+
+import roughvisc as rv
+from roughvisc.groups import whole_of
+from roughvisc.mechanics.bodies.half_space import love_kernel
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.study.trade.ladder import Setting
+
+HEAD = """
+title = "Every service"
+[surface]
+generate = "self_affine"
+size = ["1 mm", "0.9 mm"]
+shape = [23, 19]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.5 mm"
+shortcut = "0.2 mm"
+seed = 3
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.5 MPa"
+kelvin_viscosity = "1 kPa s"
+[solve]
+boundary = "periodic"
+tolerance = 1e-2
+"""
+TIMES = '[keep]\ntimes = [0, "3 ms", "8 ms"]\n'
+LOAD = '[[program]]\npressure = "10 kPa"\nover = "2 ms"\n'
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of experiment: its part of a study, its axis, and what of it is doubled where a load is to be larger."""
+
+    text: str
+    axis: str
+    pressed: str
+    curve: str  # what tells most of it
+    moves: bool = True
+
+
+KINDS = {
+    "load": Kind(LOAD + '[[program]]\nhold = "6 ms"\n' + TIMES, "time", "program.0.pressure", "approach", moves=False),
+    "slide": Kind(
+        LOAD + '[[program]]\nslide = "0.4 mm"\nover = "6 ms"\n' + TIMES,
+        "time",
+        "program.0.pressure",
+        "friction_coefficient",
+    ),
+    "friction": Kind(
+        '[friction]\npressure = "10 kPa"\nspeeds = ["10 mm/s", "0.1 m/s", "1 m/s"]\n',
+        "speed",
+        "friction.pressure",
+        "friction_coefficient",
+    ),
+}
+ROWS = 3
+#: Of what takes seconds, the plain load is drawn, told and traded by many tests.
+plain_load_is_thorough = pytest.mark.parametrize(
+    "kind", [pytest.param("load", marks=pytest.mark.thorough), "slide", "friction"], indirect=True, scope="module"
+)
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def kind(request):
+    return KINDS[request.param]
+
+
+@pytest.fixture(scope="module")
+def done(kind, tmp_path_factory):
+    """A study of this kind, its case, and its result in a folder."""
+    folder = tmp_path_factory.mktemp("services")
+    study = folder / "study.toml"
+    study.write_text(HEAD + kind.text)
+    result = rv.run(study, folder / "out", progress=False)
+    return SimpleNamespace(study=study, case=read_study(study), out=folder / "out", result=result)
+
+
+def over_the_rows(variable, kind):
+    """Its values, finite, one for each row."""
+    assert variable.dims == (kind.axis,)
+    values = variable.values
+    assert len(values) == ROWS
+    assert np.isfinite(values).all()
+    return values
+
+
+def computed(case, body=None, **settings):
+    """What the function gives that does the same as a study."""
+    solving = case.solving()
+    shared = {"tolerance": solving.tolerance, "fields": solving.fields, "progress": False} | settings
+    body = case.body() if body is None else body
+    asked = case.settings.friction
+    if asked is not None:
+        return whole_of(rv.friction(case.height(), body, speeds=asked.speeds, pressure=asked.pressure, **shared))
+    return whole_of(
+        rv.simulate(case.height(), body, case.program(), boundary="periodic", times=solving.times, **shared)
+    )
+
+
+def test_run__gives_rows_over_the_axis(kind, done):
+    ds = done.result
+    assert dict(ds.sizes) == {kind.axis: ROWS, "x": 23, "y": 19}
+    assert (ds.status == 0).sum() >= ROWS - 1, "nothing is pressed at the beginning of a program"
+    pressed = over_the_rows(ds.nominal_pressure, kind)
+    np.testing.assert_allclose(ds.pressure.mean(("x", "y")), pressed, atol=1e-9)
+    assert pressed[-1] == pytest.approx(1e4)
+    cell = 1e-3 * 0.9e-3 / (23 * 19)
+    np.testing.assert_allclose((ds.pressure > 0).sum(("x", "y")) * cell, ds.contact_area_counted)
+    found = ds[kind.curve].where(ds.force > 0, 0.0)  # nothing rubs before anything is pressed
+    assert over_the_rows(found, kind).max() > 0
+    assert ("friction_coefficient" in ds) == kind.moves
+
+
+def test_plan__foresees_rows_and_work(kind, done):
+    planned = rv.plan([done.case]).isel(case=0)
+    assert str(planned.refusal.values) == ""
+    assert int(planned.rows) == ROWS
+    work = int(done.result.roughvisc.cost.convolutions.sum())
+    assert 0.4 * work < float(planned.convolutions) < 2.5 * work
+    largest = float(done.result.contact_fraction.max())
+    assert 0.7 * largest < float(planned.contact_fraction) < 2 * largest, "of a press, beneath which nothing moves"
+    assert float(planned.memory) > 1e8
+    assert float(planned.wall_time) > 0
+
+
+def test_resume__ends_with_the_same_bits(kind, done, tmp_path):
+    asked, seen = [], []
+
+    def stop():
+        asked.append(1)
+        return len(asked) == 2
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(done.case, tmp_path, stop=stop)
+    assert not list(tmp_path.glob("*.nc"))
+    run_case(done.case, tmp_path, progress=lambda now, end: seen.append(now / end))
+    whole = []
+    run_case(done.case, tmp_path / "whole", progress=lambda now, end: whole.append(now / end))
+    assert seen == whole[2:], "two rows are not computed again"
+    assert_same(numbers(tmp_path), numbers(done.out))
+
+
+def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(HEAD + kind.text + f'[sweep]\n"{kind.pressed}" = ["10 kPa", "20 kPa"]\n')
+    results = rv.sweep(read_cases(study), out=tmp_path / "out", workers=0, progress=False)
+    assert results.contact_area.dims == ("case", kind.axis)
+    np.testing.assert_array_equal(results.contact_area[0], done.result.contact_area)
+    assert (results.contact_area[1, -1] > 1.5 * results.contact_area[0, -1]).all()
+    table = rv.to_table(tmp_path / "out")
+    assert isinstance(table, pd.DataFrame)
+    assert table[f"{kind.pressed} [kPa]"].tolist() == [10, 20]
+    assert table["status"].tolist() == ["converged"] * 2
+    row = int(done.result[kind.curve].argmax(kind.axis)) if kind.axis == "speed" else -1
+    unit = done.result[kind.axis].attrs["units"]
+    assert table[f"{kind.axis} [{unit}]"].iloc[0] == float(done.result[kind.axis][row])
+    assert table["contact_area [m^2]"].iloc[0] == float(done.result.contact_area[row])
+
+
+@plain_load_is_thorough
+def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pictures):
+    drawn = rv.plot.save_figures(done.result, tmp_path, "one")
+    names = {path.stem.rpartition("-")[2] for path in drawn}
+    assert {"history", "section", "distributions", "surface"} <= names
+    assert names & {"maps", "pressure_maps"}
+    assert ("slide" in names or "friction" in names) == kind.moves
+    for path in drawn:
+        with Image.open(path) as picture:
+            assert np.ptp(np.asarray(picture.convert("L"))) > 100, path
+
+
+@plain_load_is_thorough
+def test_report__tells_what_was_done(kind, done, tmp_path, coarse_pictures):
+    page = rv.report(done.result, tmp_path / "page.html").read_text()
+    for words in (
+        "Every service",
+        "zener",
+        "accuracy and cost",
+        "Assumptions of the model",
+        "data:image",
+        done.case.key,
+    ):
+        assert words in page, words
+    assert f"<th>{done.case.experiment().table}</th>" in page
+    assert f"Contact over {kind.axis}</h2>" in page
+    (view,) = json.loads(re.search(r"const views = (.*);\n", page)[1])
+    assert len(view["frames"]) == ROWS
+    assert len({frame["maps"][0] for frame in view["frames"]}) == ROWS, "each row has a map of its own"
+    assert ("Friction coefficient" in {chart["label"] for chart in view["charts"]}) == kind.moves
+    whole = whole_of(done.result)
+    numbers = {name: f"{float(whole[name].max()):.2g}" for name in ("stated_error", "time_error") if name in whole}
+    for number in ("10 kPa", str(int(whole.convolutions.sum())), *numbers.values()):
+        assert f"<td>{number}</td>" in page or f">{number}<" in page, number
+
+
+def test_audit__has_a_verdict_on_each_assumption(kind, done):
+    found = rv.audit(done.result, work_of_adhesion="50 mJ/m^2", yield_strength="10 MPa", density="1100 kg/m^3")
+    verdicts = {one.name: one.verdict for one in found}
+    assert {"adhesion", "yielding", "inertia"} <= set(verdicts)
+    assert "not known" not in {verdicts["adhesion"], verdicts["yielding"], verdicts["inertia"]}
+    assert ("heating" in verdicts) == kind.moves
+    before = rv.audit(done.case, work_of_adhesion="50 mJ/m^2")
+    assert {one.name for one in before} <= set(verdicts)
+
+
+def test_leakage__falls_with_the_contact(kind, done):
+    found = rv.observables.leakage(done.result, viscosity="1 mPa s", pressure_drop="1 bar")
+    rate = over_the_rows(found.leak_rate, kind)
+    order = np.argsort(done.result.contact_area.values)
+    assert (np.diff(rate[order]) <= 0).all()
+    assert rate.max() > 0
+    assert (found.leak_rate_solver_lower <= found.leak_rate * (1 + 1e-9)).all()
+
+
+def test_conductance__rises_with_the_contact(kind, done):
+    found = over_the_rows(
+        rv.observables.conductance(done.result, ("1e-7 ohm m", "2e-7 ohm m")).electrical_conductance, kind
+    )
+    order = np.argsort(done.result.contact_area.values)
+    assert (np.diff(found[order]) > 0).all()
+    assert found.max() > 0
+
+
+def test_clusters__add_up_to_the_contact(kind, done):
+    found = rv.observables.clusters(done.result)
+    count = over_the_rows(found.cluster_count, kind)
+    total = (found.cluster_count * found.cluster_area_mean).fillna(0)
+    np.testing.assert_allclose(total, done.result.contact_area_counted)
+    assert count.max() > 1
+
+
+def test_grid_error__is_stated_in_every_row(kind, done):
+    """And holds what the same on twice as many cells each way has otherwise, whose surface has the same waves."""
+    few = computed(done.case, grid_error=True)
+    area = over_the_rows(few.grid_error_area, kind)
+    assert 0 < area.max() < 2
+    own = over_the_rows(few["grid_error_friction" if kind.axis == "speed" else "grid_error"], kind)
+    assert 0 < own.max() < 2
+    finer = vary(done.case, {"surface.shape": [69, 57]})
+    fine = computed(finer)
+    off = abs(few.contact_area.values - fine.contact_area.values) / few.contact_area.values.max()
+    scale = few.contact_area.values / few.contact_area.values.max() if kind.axis == "speed" else 1.0
+    assert (off <= area * scale + 1e-12).all()
+    one, other = (run.friction_coefficient if kind.axis == "speed" else run.approach for run in (few, fine))
+    unit = one.values if kind.axis == "speed" else one.values.max()
+    assert (abs(one.values - other.values) <= own * unit).all()
+
+
+@plain_load_is_thorough
+def test_trade__measures_each_setting(kind, done):
+    ds = rv.trade(done.case, [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=1.5)], progress=False)
+    assert not any(ds.note.values)
+    assert np.isfinite(ds.error).all()
+    assert ("friction_coefficient" in ds.quantity) == kind.moves
+    wrong = ds.error.sel(quantity="approach").values
+    assert wrong[1] < wrong[0]
+    assert wrong[1] < wrong[2]
+    lines = ds.attrs["recommendation"].splitlines()
+    assert lines[0].startswith(f"for 1 % {'on friction coefficient' if kind.moves else 'on contact area'} use")
+    assert rv.plot.trade(ds).axes
+
+
+def test_threads__change_no_bit(kind, done, monkeypatch):
+    """Fields of any size count as wide, which else have a million cells."""
+    monkeypatch.setattr("roughvisc.mechanics.arrays._THREADED", 64)
+    using, used = fft.set_workers, set()
+    monkeypatch.setattr(fft, "set_workers", lambda number: used.add(number) or using(number))
+    one, two = (computed(done.case, threads=number).drop_vars("wall_time") for number in (1, 2))
+    assert used == {1, 2}
+    xr.testing.assert_identical(one, two)
+
+
+@dataclass(frozen=True)
+class Scaled(Kernel):
+    """A half-space of so many times the compliance."""
+
+    factor: float
+    raises_surface: bool = False
+
+    def influence(self, shape, spacing):
+        return self.factor * love_kernel(shape, spacing)
+
+    def transfer(self, qx, qy):
+        magnitude = np.hypot(qx, qy)
+        return 2 * self.factor / np.where(magnitude > 0, magnitude, np.inf)
+
+
+def test_own_body__is_what_its_kernel_says(kind, done):
+    """A kernel of twice the compliance is a material of half the moduli, and no half-space of the material."""
+    own = computed(done.case, rv.Body(done.case.material(), Scaled(2.0)))
+    softer = computed(done.case, rv.zener(0.5e6, 0.25e6, 0.5e3))
+    for name in ("contact_area", "approach", kind.curve):
+        np.testing.assert_allclose(own[name], softer[name], rtol=1e-9)
+    plain = whole_of(done.result)
+    assert float(own.contact_area[-1]) > 1.5 * float(plain.contact_area[-1])
