@@ -6,17 +6,21 @@ import re
 import shutil
 import sys
 import tomllib
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
 import click
 import matplotlib
 import pytest
+from experiment.stack import LOADS, Stack, StackSection
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.statement import schema
+from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.topography import instruments
+from roughvisc.variables import axes
 from roughvisc.views.sweep_figures.case_text import study_text
 
 ROOT = Path(__file__).parents[1]
@@ -50,6 +54,23 @@ def blocks(path, language):
     return [b["text"] for b in found if b["language"] == language and "not run:" not in b["before"]]
 
 
+@contextmanager
+def as_before():
+    """What a page adds to the package's tables is gone afterwards."""
+    studies = (schema.Study, schema.StudyFile)
+    tables = [instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES, axes.AXES]
+    known = [(table, dict(table)) for table in (*tables, *(study.model_fields for study in studies))]
+    experiments = list(schema.EXPERIMENTS)
+    yield
+    for table, before in known:
+        table.clear()
+        table.update(before)
+    if experiments != schema.EXPERIMENTS:
+        schema.EXPERIMENTS[:] = experiments
+        for study in studies:
+            study.model_rebuild(force=True)
+
+
 @pytest.fixture
 def there(tmp_path, monkeypatch):
     """The project's folder as a reader has it, with measured data."""
@@ -57,12 +78,9 @@ def there(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
     for name, text in MEASURED.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    known = [(table, dict(table)) for table in (instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES)]
     monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    for table, before in known:  # what a page has added
-        table.clear()
-        table.update(before)
+    with as_before():
+        yield tmp_path
 
 
 def completed(text):
@@ -95,6 +113,22 @@ def test_python__runs(path, there):
             exec(compile(text, str(path), "exec"), space)
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+def test_experiment_of_a_page__is_gone_afterwards(tmp_path):
+    path = tmp_path / "stack.toml"
+    loading = study_text(BASE)
+    stacked = study_text({name: BASE[name] for name in ("surface", "material", "solve")} | {"stack": {"loads": [1.0]}})
+    with as_before():
+        axes.declare(LOADS)
+        schema.add_experiment(StackSection, "stack")
+        path.write_text(stacked)
+        assert read_study(path).experiment() == Stack((1.0,))
+    assert "load" not in axes.AXES
+    with pytest.raises(rv.InputError, match="stack: unknown key"):
+        read_study(path)
+    path.write_text(loading)
+    assert read_study(path).experiment().axis == "time"
 
 
 def test_commands__exist_with_their_options():
