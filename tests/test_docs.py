@@ -1,5 +1,6 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
+import ast
 import inspect
 import json
 import re
@@ -14,6 +15,7 @@ import click
 import matplotlib
 import pytest
 from experiment.stack import LOADS, Stack, StackSection
+from test_layers import ALLOWED
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -42,6 +44,10 @@ MEASURED = {
     "12,40;0,0102;0,1021\n12,50;0,0199;0,1043\n12,60;0,0200;0,1050\n",
     "dma.csv": "frequency, storage [MPa], loss [MPa]\n0.1, 1, 0.2\n1, 1.5, 0.5\n10, 3, 0.6\n100, 3.5, 0.3\n",
 }
+
+
+#: Pages that lead a reader through the files of the package.
+NAMES_FILES = ("how-a-solve-runs", "add-a-variable", "add-an-experiment", "add-your-own", "development")
 
 
 def named(path):
@@ -193,6 +199,74 @@ def test_notebook__runs_and_shows_what_it_gives(tmp_path, monkeypatch):
             exec("".join(line for line in cell["source"] if not line.startswith("%")), space)
     sys.modules["matplotlib.pyplot"].close("all")
     assert space["both"].shape == (64, 60)
+
+
+#: A piece of code in the text of a page, and the paths and functions among them.
+_SPAN = re.compile(r"`([^`\n]+)`")
+_PATH = re.compile(r"(?:[\w-]+/)+(?:[\w-]+\.py)?")
+_CALL = re.compile(r"((?:\w+\.)*\w+)\(\)")
+
+
+def place_of(path):
+    """File or folder that a page means; below the package where it says no more."""
+    roots = (ROOT, ROOT / "roughvisc", ROOT / "tests" / "faults")
+    return next((root / path for root in roots if (root / path).exists()), None)
+
+
+def names_in(path):
+    """Functions, classes and methods of a module, the latter with their class's name in front and without."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ClassDef):
+            methods = {one.name for one in node.body if isinstance(one, ast.FunctionDef)}
+            found |= {node.name, *methods, *(f"{node.name}.{one}" for one in methods)}
+        elif isinstance(node, ast.FunctionDef):
+            found.add(node.name)
+    return found
+
+
+def pieces(path):
+    """Paragraphs, items and rows of a page, without its code."""
+    text = _BLOCK.sub("\n", path.read_text(encoding="utf-8"))
+    return re.split(r"\n\n|\n(?=[|-]|\d+\. )", text)
+
+
+def test_files__that_pages_name_are_there():
+    tried = 0
+    for page in PAGES:
+        for piece in pieces(page):
+            for span in _SPAN.findall(piece):
+                is_path = _PATH.fullmatch(span) or re.fullmatch(r"\w+\.py", span)
+                if is_path and (page.stem in NAMES_FILES or ("/" in span and span.endswith(".py"))):
+                    assert place_of(span) is not None, f"{named(page)}: {span}"
+                    tried += 1
+    assert tried > 80
+
+
+def test_functions__that_pages_name_beside_a_file_are_in_it():
+    """The file is the last one named before, in the same paragraph, item or row."""
+    tried = 0
+    for page in (p for p in PAGES if p.stem in NAMES_FILES):
+        for piece in pieces(page):
+            file = None
+            for span in _SPAN.findall(piece):
+                if _PATH.fullmatch(span) or span.endswith(".py"):
+                    file = place_of(span)
+                elif (call := _CALL.fullmatch(span)) and file is not None and file.is_file():
+                    assert call[1] in names_in(file), f"{named(page)}: {span} in {file}"
+                    tried += 1
+    assert tried > 40
+
+
+def test_imports__are_as_the_page_on_a_solve_has_them():
+    rows = re.findall(r"^\| `([\w/.]+)` \| (.*?) \|", (DOCS / "how-a-solve-runs.md").read_text(encoding="utf-8"), re.M)
+    labels = {"errors", "units", "variables", "labels", "groups", "notebook"}
+    for file, said in rows:
+        room = file.removesuffix("/").removesuffix(".py").replace("/", ".")
+        others = {name for other in re.findall(r"what `([\w.]+)` may", said) for name in ALLOWED[other]}
+        stated = set(_SPAN.findall(re.sub(r"what `[\w.]+` may", "", said)))
+        assert stated | (others - labels) == ALLOWED[room] - labels, file
+    assert len(rows) > 8
 
 
 def test_code__fits_its_page():
