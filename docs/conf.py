@@ -48,7 +48,7 @@ html_theme_options = {
 html_sidebars = {
     "**": ["sidebar-nav-bs"],
     **{key: [] for key in ("index", "tutorial", "gallery", "first_contact", "theory", "limits")},
-    **{key: [] for key in ("nomenclature", "study-files", "changelog")},
+    **{key: [] for key in ("nomenclature", "study-files", "changelog", "how-a-solve-runs")},
 }
 copyright = author
 

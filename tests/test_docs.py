@@ -1,22 +1,28 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
+import ast
 import inspect
 import json
 import re
 import shutil
 import sys
 import tomllib
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
 import click
 import matplotlib
 import pytest
+from experiment.stack import LOADS, Stack, StackSection
+from test_layers import ALLOWED
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.statement import schema
+from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.topography import instruments
+from roughvisc.variables import axes
 from roughvisc.views.sweep_figures.case_text import study_text
 
 ROOT = Path(__file__).parents[1]
@@ -40,6 +46,10 @@ MEASURED = {
 }
 
 
+#: Pages that lead a reader through the files of the package.
+NAMES_FILES = ("how-a-solve-runs", "add-a-variable", "add-an-experiment", "add-your-own", "development")
+
+
 def named(path):
     return str(path.relative_to(DOCS))
 
@@ -50,6 +60,23 @@ def blocks(path, language):
     return [b["text"] for b in found if b["language"] == language and "not run:" not in b["before"]]
 
 
+@contextmanager
+def as_before():
+    """What a page adds to the package's tables is gone afterwards."""
+    studies = (schema.Study, schema.StudyFile)
+    tables = [instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES, axes.AXES]
+    known = [(table, dict(table)) for table in (*tables, *(study.model_fields for study in studies))]
+    experiments = list(schema.EXPERIMENTS)
+    yield
+    for table, before in known:
+        table.clear()
+        table.update(before)
+    if experiments != schema.EXPERIMENTS:
+        schema.EXPERIMENTS[:] = experiments
+        for study in studies:
+            study.model_rebuild(force=True)
+
+
 @pytest.fixture
 def there(tmp_path, monkeypatch):
     """The project's folder as a reader has it, with measured data."""
@@ -57,12 +84,9 @@ def there(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
     for name, text in MEASURED.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    known = [(table, dict(table)) for table in (instruments.READERS, instruments.OWN_SUFFIXES, rv.plot.FIGURES)]
     monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    for table, before in known:  # what a page has added
-        table.clear()
-        table.update(before)
+    with as_before():
+        yield tmp_path
 
 
 def completed(text):
@@ -95,6 +119,22 @@ def test_python__runs(path, there):
             exec(compile(text, str(path), "exec"), space)
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+def test_experiment_of_a_page__is_gone_afterwards(tmp_path):
+    path = tmp_path / "stack.toml"
+    loading = study_text(BASE)
+    stacked = study_text({name: BASE[name] for name in ("surface", "material", "solve")} | {"stack": {"loads": [1.0]}})
+    with as_before():
+        axes.declare(LOADS)
+        schema.add_experiment(StackSection, "stack")
+        path.write_text(stacked)
+        assert read_study(path).experiment() == Stack((1.0,))
+    assert "load" not in axes.AXES
+    with pytest.raises(rv.InputError, match="stack: unknown key"):
+        read_study(path)
+    path.write_text(loading)
+    assert read_study(path).experiment().axis == "time"
 
 
 def test_commands__exist_with_their_options():
@@ -159,6 +199,74 @@ def test_notebook__runs_and_shows_what_it_gives(tmp_path, monkeypatch):
             exec("".join(line for line in cell["source"] if not line.startswith("%")), space)
     sys.modules["matplotlib.pyplot"].close("all")
     assert space["both"].shape == (64, 60)
+
+
+#: A piece of code in the text of a page, and the paths and functions among them.
+_SPAN = re.compile(r"`([^`\n]+)`")
+_PATH = re.compile(r"(?:[\w-]+/)+(?:[\w-]+\.py)?")
+_CALL = re.compile(r"((?:\w+\.)*\w+)\(\)")
+
+
+def place_of(path):
+    """File or folder that a page means; below the package where it says no more."""
+    roots = (ROOT, ROOT / "roughvisc", ROOT / "tests" / "faults")
+    return next((root / path for root in roots if (root / path).exists()), None)
+
+
+def names_in(path):
+    """Functions, classes and methods of a module, the latter with their class's name in front and without."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ClassDef):
+            methods = {one.name for one in node.body if isinstance(one, ast.FunctionDef)}
+            found |= {node.name, *methods, *(f"{node.name}.{one}" for one in methods)}
+        elif isinstance(node, ast.FunctionDef):
+            found.add(node.name)
+    return found
+
+
+def pieces(path):
+    """Paragraphs, items and rows of a page, without its code."""
+    text = _BLOCK.sub("\n", path.read_text(encoding="utf-8"))
+    return re.split(r"\n\n|\n(?=[|-]|\d+\. )", text)
+
+
+def test_files__that_pages_name_are_there():
+    tried = 0
+    for page in PAGES:
+        for piece in pieces(page):
+            for span in _SPAN.findall(piece):
+                is_path = _PATH.fullmatch(span) or re.fullmatch(r"\w+\.py", span)
+                if is_path and (page.stem in NAMES_FILES or ("/" in span and span.endswith(".py"))):
+                    assert place_of(span) is not None, f"{named(page)}: {span}"
+                    tried += 1
+    assert tried > 80
+
+
+def test_functions__that_pages_name_beside_a_file_are_in_it():
+    """The file is the last one named before, in the same paragraph, item or row."""
+    tried = 0
+    for page in (p for p in PAGES if p.stem in NAMES_FILES):
+        for piece in pieces(page):
+            file = None
+            for span in _SPAN.findall(piece):
+                if _PATH.fullmatch(span) or span.endswith(".py"):
+                    file = place_of(span)
+                elif (call := _CALL.fullmatch(span)) and file is not None and file.is_file():
+                    assert call[1] in names_in(file), f"{named(page)}: {span} in {file}"
+                    tried += 1
+    assert tried > 40
+
+
+def test_imports__are_as_the_page_on_a_solve_has_them():
+    rows = re.findall(r"^\| `([\w/.]+)` \| (.*?) \|", (DOCS / "how-a-solve-runs.md").read_text(encoding="utf-8"), re.M)
+    labels = {"errors", "units", "variables", "labels", "groups", "notebook"}
+    for file, said in rows:
+        room = file.removesuffix("/").removesuffix(".py").replace("/", ".")
+        others = {name for other in re.findall(r"what `([\w.]+)` may", said) for name in ALLOWED[other]}
+        stated = set(_SPAN.findall(re.sub(r"what `[\w.]+` may", "", said)))
+        assert stated | (others - labels) == ALLOWED[room] - labels, file
+    assert len(rows) > 8
 
 
 def test_code__fits_its_page():

@@ -1,5 +1,6 @@
 """Root and groups of a result: what stands where, and that a selection of a root never carries what is another's."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from support import changed_package
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -196,47 +198,51 @@ def test_former_result__is_sorted_into_groups(kind, tmp_path):
     xr.testing.assert_identical(rv.open_result(again, group="accuracy"), rv.open_result(path, group="accuracy"))
 
 
-NEW_VARIABLE = """
+#: What a new variable touches, and above which line: its entry, and where the rows are made.
+NEW_VARIABLE = [
+    ("variables/__init__.py", '    "nominal_pressure": Variable('),
+    ("experiment/loading.py", '            "force": shown.force,'),
+]
+
+USED = """
 import sys
-from dataclasses import replace
-import roughvisc.variables as variables
-
-# the first file: its entry
-entry = variables.Variable(("time",), "Pa", "largest pressure", group="cost", every_step=True, may_be_missing=True,
-                           in_table="largest")
-variables.VARIABLES["largest_pressure"] = entry
-variables.STEPPED += ("largest_pressure",)  # as it is derived when the file is read
-variables.VARIABLES["step_largest_pressure"] = replace(entry, dims=("step",), group="steps", in_table="")
-
-from roughvisc.experiment import loading
-
-# the second file: where the rows are made
-made = loading.friction_row
-loading.friction_row = lambda step: made(step) | {"largest_pressure": float(step.shown.pressure.max())}
-
 import roughvisc as rv
 from roughvisc.study.storage.store import may_be_missing
 
-assert may_be_missing("largest_pressure")
+group = sys.argv[3]
+assert may_be_missing("largest_pressure") == bool(group)
 ds = rv.run(sys.argv[1], sys.argv[2], progress=False)
-peak = ds.roughvisc.cost.largest_pressure
+
+def holder(ds):
+    return ds.roughvisc.cost if group else ds
+
+peak = holder(ds).largest_pressure
+assert ("largest_pressure" in ds) == (not group)
 assert (peak == ds.pressure.max(("x", "y"))).all() and peak.units == "Pa" and peak.long_name == "largest pressure"
 assert ds.roughvisc.steps.largest_pressure.max() >= peak.max()
 assert rv.observables.history(ds).largest_pressure.sizes["time"] == ds.roughvisc.steps.sizes["step"]
 rv.open_results(sys.argv[2])
-assert rv.open_results(sys.argv[2], cases="all").roughvisc.cost.largest_pressure.dims == ("case", "time")
+assert holder(rv.open_results(sys.argv[2], cases="all")).largest_pressure.dims == ("case", "time")
 assert rv.to_table(sys.argv[2])["largest largest_pressure [Pa]"].item() == peak.max()
 rv.to_csv(ds, sys.argv[2] + "/ball.csv")
 assert "largest_pressure [Pa]" in open(sys.argv[2] + "/ball.csv").readline()
 """
 
 
-def test_new_variable__touches_two_files(tmp_path):
-    """Its entry and where it is computed: file, groups, index, table and labels follow."""
+@pytest.mark.parametrize("group", ["", "cost"])
+def test_new_variable__touches_two_files(tmp_path, group):
+    """Its entry and where it is computed: file, groups, index, table and labels follow, as the page about it has it."""
+    package = changed_package(tmp_path, "howto/add-a-variable.md", "test_groups.py", NEW_VARIABLE)
+    if group:
+        path = package / "roughvisc" / "variables" / "__init__.py"
+        entry = '"largest pressure", every_step=True'
+        assert path.read_text().count(entry) == 1
+        path.write_text(path.read_text().replace(entry, f'{entry}, group="cost", may_be_missing=True'))
     study = tmp_path / "ball.toml"
     study.write_text((FORMER.parent / "format_1" / "creep.toml").read_text().replace("grid_error = true", ""))
-    command = [sys.executable, "-c", NEW_VARIABLE, study, tmp_path / "out"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    command = [sys.executable, "-c", USED, study, tmp_path / "out", group]
+    env = os.environ | {"PYTHONPATH": str(package)}
+    done = subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 

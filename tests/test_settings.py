@@ -3,17 +3,16 @@
 import inspect
 import json
 import os
-import shutil
 import subprocess
 import sys
 from dataclasses import FrozenInstanceError, fields
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import changed_package
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -149,26 +148,23 @@ def test_study__states_the_settings_that_the_solver_gets(chosen):
     assert case.solving() == Settings(**{**vars(wanted), "fields": kept})
 
 
-#: What a new setting touches: its entry, the signature that takes it, and where it is used.
-NEW_SETTING = {
-    "settings.py": (
-        "    def __post_init__(self) -> None:\n        for name, entry",
-        "    patience: float = setting(\n"
-        '        2.0, "how long to wait", \'"3 s"\', bounds={"least": 1}, noun="a time", unit="s",\n'
-        '        in_attributes=True, only_over="time",\n    )\n\n',
-    ),
-    "api.py": (
+#: What a new setting touches, and above which line: its entry, the signature that takes it, and where it is used.
+NEW_SETTING = [
+    ("settings.py", "    def __post_init__(self) -> None:\n        for name, entry"),
+    (
+        "api.py",
         '    threads: int | None = None,\n    progress: bool | Progress = True,\n) -> xr.Dataset:\n    """Press',
-        "    patience: float = Settings.patience,\n",
     ),
-    "experiment/notes.py": ("def accuracy_note(", "PATIENCE = Settings.patience\n\n\n"),
-}
-HANDED_ON = ('    )\n    problem = Problem(checked(height, "simulate"', "        patience=patience,\n")
+    ("api.py", '    )\n    problem = Problem(checked(height, "simulate"'),
+    ("experiment/loading.py", "        scene, choice, profile, settings = self._scene, self._choice, self.profile"),
+]
 
 USED = """
-import sys, tomllib
+import logging, sys, tomllib
 from pathlib import Path
+from unittest.mock import patch
 import roughvisc as rv
+from roughvisc.experiment import loading
 from roughvisc.study.statement.case import read_study
 from roughvisc.study.statement.schema.meanings import meaning
 
@@ -192,7 +188,8 @@ told = refused(lambda: read_study(path))
 wanted = "expected a number in s, or a string with a unit of its kind, at least 1"
 assert told.endswith(f"solve.patience: found 0.5: {wanted}"), told
 about = rv.study_schema()["$defs"]["SolveSection"]["properties"]["patience"]["description"]
-assert about.startswith("how long to wait; a number in s") and meaning(["solve"], "patience")[1] == '"3 s"'
+assert about.startswith("how long a solve may take before it says so; a number in s")
+assert meaning(["solve"], "patience")[1] == '"3 s"'
 friction = '[friction]\\nspeeds = [1]\\nload = 1\\n[solve]\\nboundary = "periodic"\\npatience = 3\\n'
 path.write_text(text.split("[[program]]")[0] + friction)
 assert "patience: found 3.0: steady sliding has none" in refused(lambda: read_study(path))
@@ -201,23 +198,23 @@ found = rv.simulate(ball, rv.elastic(1e6), press, patience=4, progress=False)
 assert found.attrs["patience"] == 4.0
 told = refused(lambda: rv.simulate(ball, rv.elastic(1e6), press, patience=0))
 assert told == "patience is 0: expected a time at least 1 [s]", told
+heard = []
+logging.getLogger("roughvisc").addFilter(lambda record: heard.append((patience, record.getMessage())))
+slow = patch.object(loading.LoadingRows, "columns", lambda self, found: found | {"wall_time": 9 + 0 * found["force"]})
+for patience in (10, 8):
+    with slow:
+        rv.simulate(ball, rv.elastic(1e6), press, patience=patience, progress=False)
+assert [said for said in heard if "took" in said[1]] == [(8, "this took 9 s")], heard
 """
 
 
 def test_new_setting__touches_three_files(tmp_path):
-    """Study file, key, schema, page of keys, refusals and checks follow from its entry."""
-    shutil.copytree(Path(rv.__file__).parent, tmp_path / "roughvisc", ignore=shutil.ignore_patterns("__pycache__"))
-    for name, (before, added) in NEW_SETTING.items():
-        path = tmp_path / "roughvisc" / name
-        text = path.read_text()
-        assert text.count(before) == 1
-        path.write_text(text.replace(before, added + before))
-    path = tmp_path / "roughvisc" / "api.py"
-    assert path.read_text().count(HANDED_ON[0]) == 1
-    path.write_text(path.read_text().replace(HANDED_ON[0], HANDED_ON[1] + HANDED_ON[0]))
+    """Study file, key, schema, page of keys, refusals and checks follow from its entry, as the page about it has it."""
+    package = changed_package(tmp_path, "howto/add-a-variable.md", "test_settings.py", NEW_SETTING)
+    assert len({name for name, _ in NEW_SETTING}) == 3
     study = tmp_path / "ball.toml"
     study.write_text(BALL)
-    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    env = os.environ | {"PYTHONPATH": str(package)}
     command = [sys.executable, "-c", USED, str(study), read_study(study).key]
     done = subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
