@@ -54,28 +54,8 @@ from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
-
-def friction_row(step: Step) -> dict[str, float]:
-    """Distance, forces and work of an accepted step; empty for a program without slides."""
-    scene, state = step.scene, step.state
-    if not scene.motions:
-        return {}
-    slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
-    pressure, force = step.shown.pressure, step.shown.force
-    friction = tangential_force(scene.halfspace, pressure, step.displacement, slide)
-    return {
-        "sliding_distance": slid.distance,
-        "friction_force": friction,
-        "friction_coefficient": friction / force if force > 0 else math.nan,
-        "friction_force_across": force_across(scene.halfspace, pressure, step.displacement, slide),
-        "friction_force_error": step.uncertainty.friction,
-        "friction_work": slid.work,
-    }
-
-
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
-
 #: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
 _FEW = 9
 #: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
@@ -525,14 +505,22 @@ class LoadingRows(Rows):
         return STATUS_MEANINGS.index(meaning)
 
 
-def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:
-    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
-    own: dict[int, Array] = {}
-    for array in arrays.values():
-        if id(array) not in own:
-            whole = array.base is None or array.base.nbytes == array.nbytes
-            own[id(array)] = array if whole else array.copy()
-    return {name: own[id(array)] for name, array in arrays.items()}
+def friction_row(step: Step) -> dict[str, float]:
+    """Distance, forces and work of an accepted step; empty for a program without slides."""
+    scene, state = step.scene, step.state
+    if not scene.motions:
+        return {}
+    slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
+    pressure, force = step.shown.pressure, step.shown.force
+    friction = tangential_force(scene.halfspace, pressure, step.displacement, slide)
+    return {
+        "sliding_distance": slid.distance,
+        "friction_force": friction,
+        "friction_coefficient": friction / force if force > 0 else math.nan,
+        "friction_force_across": force_across(scene.halfspace, pressure, step.displacement, slide),
+        "friction_force_error": step.uncertainty.friction,
+        "friction_work": slid.work,
+    }
 
 
 def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
@@ -547,3 +535,13 @@ def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
     # beyond a mirror a cell's neighbour is its image
     outside = {"before": goes_on and not mirrored, "beyond": goes_on}
     return staircase(contact, free, scene.halfspace.cell_area, periodic and not mirrored, **outside)
+
+
+def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:
+    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
+    own: dict[int, Array] = {}
+    for array in arrays.values():
+        if id(array) not in own:
+            whole = array.base is None or array.base.nbytes == array.nbytes
+            own[id(array)] = array if whole else array.copy()
+    return {name: own[id(array)] for name, array in arrays.items()}

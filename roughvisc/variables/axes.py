@@ -79,10 +79,14 @@ def declare(axis: Axis) -> Axis:
     Raises
     ------
     InputError
-        If another axis has its name, or its coordinate is none of its variables.
+        If another axis has its name, or has a variable of that name, by which its results would be taken for others;
+        or if its coordinate is none of its variables.
     """
     if AXES.setdefault(axis.name, axis) != axis:
         raise InputError(f"the axis {axis.name!r} is known already: expected another name")
+    if others := [other.name for other in AXES.values() if other.name != axis.name and axis.name in other.variables]:
+        del AXES[axis.name]
+        raise InputError(f"the axis {axis.name!r} is a variable over {others[0]}: expected another name")
     if axis.name not in axis.variables:
         raise InputError(f"the axis {axis.name!r} is none of its variables: expected a Variable of that name")
     return axis

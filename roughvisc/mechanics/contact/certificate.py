@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from roughvisc.mechanics.arrays import blockwise, summed, total
-from roughvisc.mechanics.contact.problem import Array, Cells, Problem
+from roughvisc.mechanics.contact.problem import Array, Cells, ContactProblem
 
 # Under given approach and periodic boundaries the load is wrong by no more than this many times the tolerance.
 # Measured: below 98 % of contact the duality gap makes it less, so that no iteration is added.
@@ -26,13 +26,13 @@ ROUNDED = 1e-10
 _NEARLY_FULL = 1e-3
 
 
-def carries_excess(problem: Problem, contact: Cells) -> bool:
+def carries_excess(problem: ContactProblem, contact: Cells) -> bool:
     """Whether a given approach is nearly that of full contact, and the pressure leaves no gap at all."""
     return contact.size == problem.gap.size and 0 < problem.remaining < _NEARLY_FULL
 
 
 def load_certainty(
-    problem: Problem, contact: Cells, separation: Array, here: Array, load: float, rounding: float
+    problem: ContactProblem, contact: Cells, separation: Array, here: Array, load: float, rounding: float
 ) -> tuple[bool, bool]:
     """Whether the load is as certain as the tolerance asks, and whether the approach does not determine it.
 
@@ -56,13 +56,13 @@ def load_certainty(
     return error <= limit, error > limit and inside + above <= rounding * separation.size
 
 
-def stiffness(problem: Problem, contact: Cells, separation: Array) -> float:
+def stiffness(problem: ContactProblem, contact: Cells, separation: Array) -> float:
     """Bound on the change of load with a given approach; infinite where no cell is open."""
     opening, pressure = _opened(problem, contact, separation, problem.target)
     return float((opening * pressure).sum()) / problem.influence.scale if np.any(opening) else math.inf
 
 
-def _opened(problem: Problem, contact: Cells, separation: Array, level: float) -> tuple[Array, Array]:
+def _opened(problem: ContactProblem, contact: Cells, separation: Array, level: float) -> tuple[Array, Array]:
     """Gap outside a contact over its mean, zero if there is none, and about the pressure that opens it."""
     opening = separation - level
     np.maximum(opening, 0, out=opening)
@@ -80,7 +80,9 @@ def _opened(problem: Problem, contact: Cells, separation: Array, level: float) -
     return opening, pressure
 
 
-def approach_under_load(problem: Problem, pressure: Array, contact: Cells, displacement: Array, level: float) -> float:
+def approach_under_load(
+    problem: ContactProblem, pressure: Array, contact: Cells, displacement: Array, level: float
+) -> float:
     """Approach under given load: the level of the contact, weighted by pressure.
 
     Near full contact with periodic boundaries the weight ``q`` is about the pressure of a flat punch of the contact's
@@ -146,12 +148,14 @@ class Certificate:
         return math.sqrt(2 * max(self.duality_gap, 0.0) / self.energy) if self.energy > 0 else 0.0
 
 
-def certify(problem: Problem, pressure: Array, contact: Cells, displacement: Array) -> tuple[Certificate, Array | None]:
+def certify(
+    problem: ContactProblem, pressure: Array, contact: Cells, displacement: Array
+) -> tuple[Certificate, Array | None]:
     """Judge a pressure.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ContactProblem
         What is asked.
     pressure, displacement : ndarray, shape (nx, ny)
         The pressure, and its displacement.
@@ -200,7 +204,7 @@ def _together(parts: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
 
 
 def _under_approach(
-    problem: Problem, displacement: Array, load: float, excess: float, own_duality_gap: float, lowest: float
+    problem: ContactProblem, displacement: Array, load: float, excess: float, own_duality_gap: float, lowest: float
 ) -> float:
     """The duality gap where the approach is given; its own is that of the pressure under its own load."""
     missing = max(0.0, problem.target - lowest)
@@ -227,7 +231,7 @@ class Asked(NamedTuple):
 
 
 def estimated_error(
-    problem: Problem,
+    problem: ContactProblem,
     pressure: Array,
     contact: Cells,
     displacement: Array,
@@ -238,7 +242,7 @@ def estimated_error(
 
     Parameters
     ----------
-    problem : Problem
+    problem : ContactProblem
         What is asked.
     pressure, displacement : ndarray, shape (nx, ny)
         The pressure, and its displacement.
@@ -259,7 +263,7 @@ def estimated_error(
     return error_left(problem, pressure, certificate, asked)
 
 
-def is_measured(problem: Problem, contact: Cells) -> bool:
+def is_measured(problem: ContactProblem, contact: Cells) -> bool:
     """Whether what a step asks for tells the error.
 
     In full contact with periodic boundaries the energy is that of the pressure's variation alone. Over that of a flat
@@ -268,7 +272,7 @@ def is_measured(problem: Problem, contact: Cells) -> bool:
     return problem.sees_load and (problem.definite or contact.size < problem.gap.size)
 
 
-def error_left(problem: Problem, pressure: Array, certificate: Certificate, asked: Asked) -> float:
+def error_left(problem: ContactProblem, pressure: Array, certificate: Certificate, asked: Asked) -> float:
     """What the last preconditioned step asked for, less as the bound has fallen since, over the pressure."""
     load = total(pressure.reshape(-1), problem.influence.threads)
     if not load > 0:
@@ -278,7 +282,7 @@ def error_left(problem: Problem, pressure: Array, certificate: Certificate, aske
     return _CAUTION * relative * math.sqrt(fallen)
 
 
-def _of_next_step(problem: Problem, pressure: Array, contact: Cells, displacement: Array, level: float) -> float:
+def _of_next_step(problem: ContactProblem, pressure: Array, contact: Cells, displacement: Array, level: float) -> float:
     """The estimate under a given approach with periodic boundaries, and in full contact.
 
     It is what the next preconditioned step would change: the preconditioner is nearly the inverse, in the contact

@@ -46,7 +46,7 @@ class FreeSet(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
+class ContactProblem:
     """What is asked of the solver: all lengths over one of them, all pressures over another.
 
     Attributes
@@ -90,7 +90,7 @@ class Problem:
         approach: float | None,
         tolerance: float,
         present: Mask | None,
-    ) -> Problem:
+    ) -> ContactProblem:
         """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
         lowest = lowest_value(gap, present, halfspace.threads)
         if load is not None:

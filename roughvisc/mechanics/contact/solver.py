@@ -26,7 +26,7 @@ The method is that of constrained conjugate gradients on an evolving contact are
 :func:`solve_contact` is the entry, :func:`pcg` the loop. The pressure and its displacement are two fields that every
 step changes in place. The values that pass from step to step say how they are to be read: an :class:`Iterate` which
 cells carry pressure and whether the displacement is exact, a :class:`Search` how the next step is chosen, a
-:class:`Step` what it is conjugate to.
+:class:`SearchStep` what it is conjugate to.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ from roughvisc.mechanics.contact.certificate import (
     is_measured,
 )
 from roughvisc.mechanics.contact.influence import Array, Cells
-from roughvisc.mechanics.contact.problem import FreeSet, Problem
+from roughvisc.mechanics.contact.problem import ContactProblem, FreeSet
 
 # Iterations in which the duality gap must halve; otherwise a projected-gradient step is taken. Measured, like the
 # factors below, by the iterations of 400 solutions of workflows/benchmarks/solver_error.py's problems at 64 squared:
@@ -206,7 +206,9 @@ def solve_contact(
     with reused():
         if load is not None and present is None and (start is None or not any_positive(start)):
             start, start_displacement = coarse_guess(halfspace, gap, load), None
-        problem = Problem.scaled(halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present)
+        problem = ContactProblem.scaled(
+            halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present
+        )
         return pcg(
             problem,
             start,
@@ -218,7 +220,7 @@ def solve_contact(
 
 
 def pcg(
-    problem: Problem,
+    problem: ContactProblem,
     start: Array | None,
     start_displacement: Array | None,
     *,
@@ -229,7 +231,7 @@ def pcg(
     """Iterate from a first guess, which is used up, until the certificate settles the problem."""
     iterate = first_iterate(problem, start, start_displacement)
     search = Search(1 / problem.influence.scale)
-    previous: Step | None = None  # to conjugate to
+    previous: SearchStep | None = None  # to conjugate to
     asked: Asked | None = None  # by the last preconditioned step
     measured = estimate_error or error_tolerance is not None
 
@@ -352,7 +354,7 @@ class Search:
 
 
 @dataclass(frozen=True)
-class Trial:
+class SearchTrial:
     """A pressure to try on the free set.
 
     Attributes
@@ -377,7 +379,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """A trial whose displacement is known.
 
     Attributes
@@ -399,7 +401,7 @@ class Step:
     curvature: float
 
 
-def first_iterate(problem: Problem, start: Array | None, start_displacement: Array | None) -> Iterate:
+def first_iterate(problem: ContactProblem, start: Array | None, start_displacement: Array | None) -> Iterate:
     """The first guess, made admissible."""
     pressure, displacement = problem.initial_iterate(start, start_displacement)
     approximate = displacement is not None
@@ -411,7 +413,7 @@ def first_iterate(problem: Problem, start: Array | None, start_displacement: Arr
 
 
 def judge(
-    problem: Problem, iterate: Iterate, is_enough: Callable[[Certificate, Iterate], bool], last: bool
+    problem: ContactProblem, iterate: Iterate, is_enough: Callable[[Certificate, Iterate], bool], last: bool
 ) -> tuple[Iterate, Certificate, Array | None]:
     """The iterate, its certificate and its separation; no iterate is accepted by an approximate displacement."""
     while True:
@@ -422,7 +424,7 @@ def judge(
         iterate = with_exact_displacement(problem, iterate)
 
 
-def with_exact_displacement(problem: Problem, iterate: Iterate) -> Iterate:
+def with_exact_displacement(problem: ContactProblem, iterate: Iterate) -> Iterate:
     """The same pressure with its displacement computed anew in double precision, in the place of the old one."""
     displacement = problem.influence.displacement(iterate.pressure, out=iterate.displacement)
     return Iterate(iterate.pressure, displacement, iterate.contact, approximate=False)
@@ -435,7 +437,9 @@ def without_excess(iterate: Iterate) -> Iterate:
     return Iterate(pressure, iterate.displacement, np.flatnonzero(pressure), iterate.approximate)
 
 
-def forget(problem: Problem, iterate: Iterate, search: Search, previous: Step | None) -> tuple[Iterate, Search]:
+def forget(
+    problem: ContactProblem, iterate: Iterate, search: Search, previous: SearchStep | None
+) -> tuple[Iterate, Search]:
     """After a trial that does not descend: drop what is not exact, then the history, then the preconditioner too."""
     if iterate.approximate:
         return with_exact_displacement(problem, iterate), replace(search, single=False)
@@ -443,20 +447,20 @@ def forget(problem: Problem, iterate: Iterate, search: Search, previous: Step | 
 
 
 def conjugate_gradient(
-    problem: Problem,
+    problem: ContactProblem,
     free: FreeSet,
     level: float,
     energy: float,
     *,
     step_length: float,
-    previous: Step | None,
+    previous: SearchStep | None,
     measured: bool,
-) -> Trial:
+) -> SearchTrial:
     """Preconditioned trial, conjugate to the previous step.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ContactProblem
         What is asked.
     free : FreeSet
         Of the pressure so far; its separation is used up.
@@ -466,7 +470,7 @@ def conjugate_gradient(
         ``p.Kp``.
     step_length : float
         Length of the step along the search direction.
-    previous : Step or None
+    previous : SearchStep or None
         What to conjugate to.
     measured : bool
         Whether to measure the change that the preconditioner asks for.
@@ -498,10 +502,10 @@ def conjugate_gradient(
         return summed(by * downhill)
 
     slope = sum(blockwise(scale_to_load, search, held, change, residual, threads=threads))
-    return Trial(free_set, held, search, change, slope, asked)
+    return SearchTrial(free_set, held, search, change, slope, asked)
 
 
-def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells, previous: Step) -> Array:
+def _conjugate(problem: ContactProblem, search: Array, residual: Array, free_set: Cells, previous: SearchStep) -> Array:
     """Search direction conjugate to the previous step, if it descends still."""
     influence, threads = problem.influence, problem.influence.threads
     response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
@@ -525,8 +529,8 @@ def _conjugate(problem: Problem, search: Array, residual: Array, free_set: Cells
     return search
 
 
-def projected_gradient(problem: Problem, pressure: Array, displacement: Array, level: float) -> Trial:
-    """Trial along the negative gradient, projected onto what is admissible: descends in any case."""
+def projected_gradient(problem: ContactProblem, pressure: Array, displacement: Array, level: float) -> SearchTrial:
+    """SearchTrial along the negative gradient, projected onto what is admissible: descends in any case."""
     stiffest, separation = problem.influence.largest, problem.separation(displacement)
     moved = pressure - (separation - level) / stiffest
     if problem.present is not None:
@@ -535,7 +539,7 @@ def projected_gradient(problem: Problem, pressure: Array, displacement: Array, l
     free_set = np.flatnonzero((trial > 0) | (pressure > 0))
     held, tried = pressure.take(free_set), trial.take(free_set)
     change = tried - held
-    return Trial(free_set, held, tried, change, float((change * (separation - level).take(free_set)).sum()))
+    return SearchTrial(free_set, held, tried, change, float((change * (separation - level).take(free_set)).sum()))
 
 
 def onto_simplex(values: Array, total: float) -> Array:
@@ -548,7 +552,9 @@ def onto_simplex(values: Array, total: float) -> Array:
     return np.maximum(shifted - excess[last], 0)
 
 
-def take_step(problem: Problem, iterate: Iterate, search: Search, trial: Trial) -> tuple[Iterate, Search, Step | None]:
+def take_step(
+    problem: ContactProblem, iterate: Iterate, search: Search, trial: SearchTrial
+) -> tuple[Iterate, Search, SearchStep | None]:
     """The iterate after a trial, the search from there, and what to conjugate to: one convolution."""
     influence, free_set, threads = problem.influence, trial.free_set, problem.influence.threads
     pressure, displacement = iterate.pressure.reshape(-1), iterate.displacement
@@ -580,15 +586,15 @@ def take_step(problem: Problem, iterate: Iterate, search: Search, trial: Trial) 
         return stepped, replace(search, spacer=False), None
     factor = min(max(minimum, _SHRINKAGE), _GROWTH_IF_CUT if cut else _GROWTH)
     search = Search(search.step_length * factor, False, search.single, search.best, search.since)
-    return stepped, search, Step(free_set, trial.change, response, unit, curvature) if curvature > 0 else None
+    return stepped, search, SearchStep(free_set, trial.change, response, unit, curvature) if curvature > 0 else None
 
 
-def minimum_along(trial: Trial, curvature: float) -> float:
+def minimum_along(trial: SearchTrial, curvature: float) -> float:
     """Where ``f`` is least along a trial, in parts of it."""
     return min(-trial.slope / curvature, _FARTHEST) if curvature > 0 else _FARTHEST
 
 
-def admissible_fraction(trial: Trial, minimum: float, threads: int) -> tuple[float, bool]:
+def admissible_fraction(trial: SearchTrial, minimum: float, threads: int) -> tuple[float, bool]:
     """Fraction of a trial to take, and whether the border of the feasible set cut it."""
     held, tried, change = trial.held, trial.pressure, trial.change
 
@@ -612,7 +618,7 @@ def admissible_fraction(trial: Trial, minimum: float, threads: int) -> tuple[flo
 
 
 def in_own_units(
-    problem: Problem, iterate: Iterate, certificate: Certificate, iterations: int, error: float
+    problem: ContactProblem, iterate: Iterate, certificate: Certificate, iterations: int, error: float
 ) -> ContactState:
     """The iterate in its own units."""
     pressure, displacement = iterate.pressure, iterate.displacement

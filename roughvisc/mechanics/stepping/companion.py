@@ -31,7 +31,7 @@ from roughvisc.mechanics.stepping.scene import (
     Uncertainty,
 )
 from roughvisc.mechanics.stepping.step import (
-    advanced,
+    advance_trajectory,
     displacement_after,
     is_outgrown,
     segment_number,
@@ -250,7 +250,7 @@ def followed(
 
 def coarse_step(scene: Scene, state: State, companion: Trajectory, trial: Trial) -> State:
     """State whose companion has accepted a step to the same instant."""
-    changes = advanced(scene, companion, trial)
+    changes = advance_trajectory(scene, companion, trial)
     if companion.unresolved:
         changes |= without_past(scene, replace(companion, **changes))
     return replace(with_cost(state, trial), companion=_bare(replace(companion, **changes)), behind=0)

@@ -95,7 +95,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
                 yield step
             del step  # its fields are not needed while the next one is computed
         else:
-            through = (_through if segment.slide is None else through_slide)(scene, state, segment)
+            through = (_steps_of_segment if segment.slide is None else through_slide)(scene, state, segment)
             del state  # nor are its
             scene, state = yield from _without_jumps(in_pairs(through))
 
@@ -114,7 +114,7 @@ def _without_jumps(steps: Through) -> Through:
         del step, state
 
 
-def _through(scene: Scene, state: State, segment: Segment) -> Held:
+def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
     """Accepted steps through a segment; the last one has entered the next segment. In the end scene and state.
 
     Steps go in pairs: the companion takes both as one. The first step after an event extrapolates from nothing; it is
@@ -150,7 +150,7 @@ def _through(scene: Scene, state: State, segment: Segment) -> Held:
         judged = None
         if not outgrown:
             waits = scene.is_viscoelastic and single
-            accepted, guess = _accepted(scene, state, trial, error, waits), None
+            accepted, guess = _accept_and_suggest(scene, state, trial, error, waits), None
             if state.companion is not None and not waits:
                 guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
@@ -226,7 +226,7 @@ def _without_fields(state: State) -> State:
     return replace(state, now=now, before=None, displacement=NO_FIELD, memory=None)
 
 
-def _accepted(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
+def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
     """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
     time = trial.instant.time
     accepted = accept(scene, state, trial)

@@ -92,7 +92,7 @@ class ControllerState:
         Length of the next step; zero after an event. [s]
     sharpness : float
         Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
-    blind : bool
+    ignore_pressure_error : bool
         Whether the next estimate leaves the pressure out, once.
     rejected_error : float
         Estimate of the last attempt at the present step, if it was rejected; else infinite. [-]

@@ -131,7 +131,7 @@ def elastic_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[
     return alpha, carried, scene.halfspace.displacement(carried)
 
 
-def advanced(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
+def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
     """What a trial changes of a trajectory, once it is accepted."""
     now = trial.instant
     assert now.unit_displacement is not None
@@ -162,7 +162,7 @@ def advanced(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
 
 def accept(scene: Scene, state: State, trial: Trial) -> State:
     """State after an accepted trial."""
-    changes = advanced(scene, state, trial)
+    changes = advance_trajectory(scene, state, trial)
     now, work = changes["now"], changes["work"]
     return replace(
         state,

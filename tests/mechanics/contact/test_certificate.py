@@ -12,7 +12,7 @@ from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import certificate as full_contact
 from roughvisc.mechanics.contact import problem
 from roughvisc.mechanics.contact.certificate import Asked, Certificate, certify, estimated_error
-from roughvisc.mechanics.contact.problem import Problem
+from roughvisc.mechanics.contact.problem import ContactProblem
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CORNER = np.ones(SHAPE, bool)
@@ -26,7 +26,9 @@ class Case:
         self.halfspace = HalfSpace(SHAPE, SPACING, boundary)
         self.gap = rough_gap(SHAPE)
         wanted = {"load": None, "approach": None} | known
-        self.problem = Problem.scaled(self.halfspace, self.gap.copy(), **wanted, tolerance=tolerance, present=present)
+        self.problem = ContactProblem.scaled(
+            self.halfspace, self.gap.copy(), **wanted, tolerance=tolerance, present=present
+        )
         cells = np.eye(self.gap.size).reshape(-1, *SHAPE)
         ratio = self.problem.unit / self.problem.length
         self.matrix = np.array([self.halfspace.displacement(cell).ravel() for cell in cells]) * ratio

@@ -9,8 +9,15 @@ from support import rough_gap
 from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solver
-from roughvisc.mechanics.contact.problem import Problem
-from roughvisc.mechanics.contact.solver import Iterate, Search, Step, Trial, admissible_fraction, minimum_along
+from roughvisc.mechanics.contact.problem import ContactProblem
+from roughvisc.mechanics.contact.solver import (
+    Iterate,
+    Search,
+    SearchStep,
+    SearchTrial,
+    admissible_fraction,
+    minimum_along,
+)
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
 CONTROLS = pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 0.9}], ids=["load", "approach"])
@@ -20,7 +27,7 @@ def scaled(known, boundary="free", present=None):
     """A problem, and the matrix that displaces its cells, both in its own units."""
     halfspace = HalfSpace(SHAPE, SPACING, boundary)
     wanted = {"load": None, "approach": None} | known
-    problem = Problem.scaled(halfspace, rough_gap(SHAPE), **wanted, tolerance=1e-6, present=present)
+    problem = ContactProblem.scaled(halfspace, rough_gap(SHAPE), **wanted, tolerance=1e-6, present=present)
     cells = np.eye(problem.gap.size).reshape(-1, *SHAPE)
     matrix = np.array([halfspace.displacement(cell).ravel() for cell in cells]) * problem.unit / problem.length
     return problem, matrix
@@ -87,7 +94,7 @@ def test_next_step__is_conjugate_to_the_step_really_taken(known):
         change = rng.standard_normal(problem.gap.size)
         change -= change.mean() if problem.load is not None else 0.0
         displaced, unit = matrix @ change, 0.3
-        previous = Step(
+        previous = SearchStep(
             np.arange(change.size), change, (displaced / unit).reshape(SHAPE), unit, float(change @ displaced)
         )
         options = {"step_length": 1e-4, "measured": False}
@@ -143,7 +150,7 @@ def test_simplex_projection__keeps_a_small_sum_beside_large_values():
 )
 def test_minimum__is_that_of_the_parabola_and_not_too_far(slope, curvature, expected):
     nothing = np.zeros(1)
-    trial = Trial(np.zeros(1, int), nothing, nothing, nothing, slope)
+    trial = SearchTrial(np.zeros(1, int), nothing, nothing, nothing, slope)
     assert minimum_along(trial, curvature) == pytest.approx(expected)
 
 
@@ -170,7 +177,7 @@ def test_step__goes_as_far_as_the_energy_falls_and_no_pressure_turns_to_tension(
 ):
     monkeypatch.setattr(passes, "_BLOCK", part)
     held, tried = np.array(held), np.array(tried)
-    trial = Trial(np.arange(held.size), held, tried, tried - held, -1.0)
+    trial = SearchTrial(np.arange(held.size), held, tried, tried - held, -1.0)
     fraction, cut = admissible_fraction(trial, minimum, 1)
     assert (fraction, cut) == (pytest.approx(expected[0]), expected[1])
     assert (held + fraction * (tried - held)).min() >= -1e-15
@@ -237,7 +244,7 @@ def test_step_that_does_not_descend__forgets_rounding_then_history_then_the_prec
     displacement = (matrix @ pressure.ravel()).reshape(SHAPE)
     contact = np.arange(pressure.size)
     off = Iterate(pressure, displacement * 1.01, contact, approximate=True)
-    previous = Step(contact, pressure.ravel(), displacement, 1.0, 1.0)
+    previous = SearchStep(contact, pressure.ravel(), displacement, 1.0, 1.0)
     exact, search = solver.forget(problem, off, Search(0.7, False, True, 5.0, 3), previous)
     assert exact.displacement == pytest.approx(displacement, rel=1e-12)
     assert not exact.approximate
