@@ -50,7 +50,7 @@ ROOMS = {
     "checkpoint": (("study/storage/checkpoint.py",), ("study/storage/test_checkpoint.py",)),
     "estimate": (("study/cost/estimate.py",), ("study/cost/test_plan.py", "study/cost/test_growth.py")),
     "press": (("study/cost/press.py", "study/cost/first_pressure.py"), ("study/cost/test_press.py",)),
-    "stages": (("study/cost/stages.py",), ("study/cost/test_growth.py",)),
+    "stages": (("study/cost/estimate.py",), ("study/cost/test_growth.py",)),
     "conditioning": (
         tuple(f"topography/{name}.py" for name in ("bandwidth", "framing", "missing_points")),
         ("topography/test_conditioning.py",),

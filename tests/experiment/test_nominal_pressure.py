@@ -8,7 +8,7 @@ from rich.console import Console
 from support import run_whole, simulate_whole
 
 import roughvisc as rv
-from roughvisc.study.cost.foresight import full_contact_pressure, full_contact_warning
+from roughvisc.study.cost.full_contact import full_contact_pressure, full_contact_warning
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.statement.identity import identity
 from roughvisc.views.console.result_tables import result_table

@@ -20,7 +20,7 @@ def seen():
     import roughvisc as rv
     from roughvisc import errors
     from roughvisc.cli.group import main
-    from roughvisc.study.cost.columns import COLUMNS
+    from roughvisc.study.cost.plan import COLUMNS
     from roughvisc.variables import VARIABLES
     from roughvisc.variables.sliding import SLIDING
     from roughvisc.views.plot import FIGURES

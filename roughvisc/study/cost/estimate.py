@@ -25,18 +25,116 @@ from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.program import Program, Slide
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.settings import Settings
 from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
-from roughvisc.study.cost.short_slides import shortened, slid_cells
-from roughvisc.study.cost.stages import Stage, stage_at
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import axis_step, nominal_area, resampled_taper, spacing, with_taper_weights
 from roughvisc.topography.indenters import grown, grown_shape, remade
 from roughvisc.variables import STEPPED
+
+Widths = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One window of a surface, or one grid.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Cells of the surface.
+    solved : float
+        Cells that are solved on.
+    outside : float
+        Least gap beyond the window; infinite where it is the whole domain. [m]
+    width : tuple of float
+        Between the centres of the outermost cells, along x and along y: a contact as wide outgrows the grid. [m]
+    """
+
+    shape: tuple[int, int]
+    solved: float
+    outside: float = math.inf
+    width: Widths = (math.inf, math.inf)
+
+    def holds(self, level: float, width: Widths) -> bool:
+        """Whether a contact of an approach and a width stays inside. [m]"""
+        if self.outside < math.inf:
+            return self.outside > level
+        return all(own < limit for own, limit in zip(width, self.width, strict=True))
+
+
+def stages_of(profile: Profile, grows: bool) -> tuple[Stage, ...]:
+    """The windows of a profile from the present one on, and the grids that it grows to; it has the whole window then.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    grows : bool
+        Whether its grid may grow.
+    """
+    shape = (profile.height.sizes["x"], profile.height.sizes["y"])
+    found = []
+    while not profile.window.whole:
+        found.append(Stage(shape, math.prod(profile.window.shape), profile.window.outside))
+        profile.widen_window()
+    part = math.prod(profile.window.shape) / math.prod(shape)
+    while True:
+        sides = [(n - 1) * side for n, side in zip(shape, profile.spacing, strict=True)]
+        found.append(Stage(shape, part * math.prod(shape), width=(sides[0], sides[1])))
+        larger = grown_shape(shape, GROWTH)
+        if not grows or math.prod(larger) > MOST_CELLS:
+            return tuple(found)
+        shape = (larger[0], larger[1])
+
+
+def stage_at(stages: Sequence[Stage], level: float, width: Widths) -> int:
+    """Number of the first stage that holds a contact of an approach and a width; the last one, if none does. [m]"""
+    return next((i for i, stage in enumerate(stages) if stage.holds(level, width)), len(stages) - 1)
+
+
+#: Cells of the coarse grid that a slide goes there at most.
+_MOST = 24
+
+
+def slid_cells(program: Program, height: xr.DataArray) -> int:
+    """Steps that all slides of a program take: one a cell.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    height : xarray.DataArray, dims (x, y)
+        The surface. [m]
+    """
+    sides = spacing(height, "height")
+    return sum(segment.slide.cells(sides) for segment in program.segments if segment.slide is not None)
+
+
+def shortened(program: Program, height: xr.DataArray) -> Program:
+    """The program with slides of at least one cell of a coarse surface, and not of many, at their speed.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    height : xarray.DataArray, dims (x, y)
+        The coarse surface. [m]
+    """
+    sides, segments = spacing(height, "height"), []
+    for segment in program.segments:
+        if segment.slide is not None:
+            side = sides[segment.slide.axis]
+            way = float(np.clip(segment.slide.distance, side, _MOST * side))
+            duration = segment.duration * way / segment.slide.distance
+            segment = replace(segment, duration=duration, slide=Slide(way, segment.slide.direction))
+        segments.append(segment)
+    return replace(program, segments=tuple(segments))
+
 
 #: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
 #: to 512 squared the convolutions so found were -1 to +22 % off, the steps -8 to +7 %.

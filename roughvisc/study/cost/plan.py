@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,13 +21,14 @@ from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.notes import body_note, omitted_effects
 from roughvisc.experiment.profile import Profile, uses_window
-from roughvisc.experiment.refusal import PART, too_large
-from roughvisc.experiment.resources import PROCESS, Available, memory_available
+from roughvisc.experiment.refusal import PART, amount, too_large
+from roughvisc.experiment.resources import PROCESS, Available, cores, memory_available
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.notebook import table
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.study.audit.audit import evaluate
@@ -33,35 +36,88 @@ from roughvisc.study.audit.evidence import of_case
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.coarse_grids import foretold
-from roughvisc.study.cost.columns import COLUMNS, attributes
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,
     Copies,
     CostEstimate,
+    Stage,
     bytes_needed,
     disk,
     over,
     solved_on,
+    stages_of,
     wall_time,
     work,
 )
-from roughvisc.study.cost.foresight import (
+from roughvisc.study.cost.full_contact import (
     NEARLY_FULL,
     border_warning,
     full_contact_pressure,
     full_contact_warning,
     largest_pressure,
 )
-from roughvisc.study.cost.planned import Plan
-from roughvisc.study.cost.stages import Stage, stages_of
-from roughvisc.study.cost.totals import totals
 from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.side_by_side import processes_that_fit, threads_each
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.study.storage.upkeep import upgrade_note
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.units import unit_for
 
+#: variable of a plan -> unit and long name
+COLUMNS = {
+    "boundary": ("", "boundary"),
+    "padded": ("", "whether transforms are padded to twice the grid"),
+    "memory_model": ("", "what models the material's memory"),
+    "exponentials": ("1", "exponentials of the series"),
+    "scheme": ("", "how time is stepped"),
+    "cells_x": ("1", "cells along x"),
+    "cells_y": ("1", "cells along y"),
+    "grows": ("", "whether the grid may grow"),
+    "final_cells_x": ("1", "cells along x in the end, where the grid grows; 0: not known"),
+    "final_cells_y": ("1", "cells along y in the end, where the grid grows; 0: not known"),
+    "left_out": ("", "what costs nothing, and why: it is not modelled, computed or kept"),
+    "speeds": ("1", "speeds of a curve of friction"),
+    "steps": ("1", "accepted time steps expected"),
+    "rows": ("1", "kept times expected"),
+    "contact_fraction": ("1", "largest contact fraction of an elastic press on the pressed cells; if marched"),
+    "pressed_cells_x": ("1", "cells along x that were pressed for the contact fraction; 0: none"),
+    "pressed_cells_y": ("1", "cells along y that were pressed for the contact fraction; 0: none"),
+    "coarser_contact_fraction": ("1", "the same on cells twice as long, where the surface has more cells than pressed"),
+    "coarser_cells_x": ("1", "cells along x that were pressed for that; 0: none"),
+    "coarser_cells_y": ("1", "cells along y that were pressed for that; 0: none"),
+    "nominal_pressure": ("Pa", "largest nominal pressure, prescribed or of the coarse march: force over nominal area"),
+    "full_contact_pressure": ("Pa", "nominal pressure from which on contact takes 95 % of the area (Persson's theory)"),
+    "convolutions": ("1", "convolutions expected, one forward and one inverse transform each"),
+    "wall_time": ("s", "wall time expected, in one process with one thread"),
+    "memory": ("byte", "memory of the process at its peak"),
+    "half_wall_time": ("s", "wall time expected on cells twice as long"),
+    "rms_slope": ("1", "root mean square slope between neighbouring cells"),
+    "half_rms_slope": ("1", "the same of means over cells twice as long"),
+    "half_memory": ("byte", "memory of the process at its peak on cells twice as long"),
+    "disk": ("byte", "size of the result"),
+    "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
+    "body_note": ("", "what the base of a sheet does, by the coarse march; empty of a half-space"),
+    "program_note": ("", "how a measured history became segments"),
+    "audit": (
+        "",
+        "assumptions that are broken or doubtful, as far as known before a run; empty if none is, or not marched",
+    ),
+    "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
+    "border_warning": ("", "whether contact is foreseen to reach the border of a free surface, which stops the run"),
+    "refusal": ("", "why it cannot run; empty if it can"),
+}
+#: Cases that a notebook shows.
+_SHOWN = 8
+#: heading -> variable and its unit
+_COLUMNS = {
+    "steps": ("steps", ""),
+    "convolutions": ("convolutions", ""),
+    "wall time": ("wall_time", "s"),
+    "memory": ("memory", "byte"),
+    "disk": ("disk", "byte"),
+}
 #: Seconds for coarse marches; the cases that they do not reach take the figures of the one most like them.
 _BUDGET = 15.0
 #: Cells of the longer side of a grid still to come that a solve is timed on, at most.
@@ -72,19 +128,31 @@ _COUNTS = [f"{name}cells_{axis}" for name in ("", "final_", "pressed_", "coarser
 _HALVED = 8
 
 
-@dataclass(frozen=True)
-class _Surface:
-    """A surface's height, its copies and :class:`Stage`s, its rms slope and its textures, or why it cannot be had."""
+class Plan(xr.Dataset):
+    """What :func:`roughvisc.plan` gives."""
 
-    height: xr.DataArray | None
-    grows: bool
-    problem: str
-    copies: Copies | None = None
-    stages: tuple[Stage, ...] = ()
-    mirrored: bool = False
-    slope: float = 0.0
-    half_slope: float = math.nan
-    textures: dict[str, Texture] = field(default_factory=dict)  # boundary -> what it says of the surface
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        known = {"cells_x", "cells_y", "refusal", *(name for name, _ in _COLUMNS.values())}
+        if not known <= set(self.data_vars) or self["refusal"].dims != ("case",) or "processes" not in self.attrs:
+            return super()._repr_html_()  # a part of a plan, or something made from one
+        varied = [str(name) for name in self.coords if name not in ("case", "case_key")]
+        whole = [
+            f"{self.sizes['case']} cases, {self.attrs['processes']} side by side",
+            *(f"{word} {_text(self.attrs[name], unit)}" for word, (name, unit) in list(_COLUMNS.items())[2:]),
+        ]
+        rows = [("", *varied, "cells", *_COLUMNS, "refused" if self["refusal"].any() else "")]
+        for number in range(min(self.sizes["case"], _SHOWN)):
+            one = self.isel(case=number)
+            values = (_text(float(one[name]), unit) for name, unit in _COLUMNS.values())
+            given = (_varied(one[name]) for name in varied)
+            rows.append(
+                (str(number + 1), *given, f"{int(one.cells_x)} x {int(one.cells_y)}", *values, str(one.refusal.values))
+            )
+        if (more := self.sizes["case"] - _SHOWN) > 0:
+            rows.append(("...", f"{more} more"))
+        return table(f"{self.attrs.get('title') or 'Plan'}: {', '.join(whole)}", rows)
 
 
 def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None) -> Plan:
@@ -148,6 +216,21 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
         dataset, folder, workers, there
     )
     return dataset
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A surface's height, its copies and :class:`Stage`s, its rms slope and its textures, or why it cannot be had."""
+
+    height: xr.DataArray | None
+    grows: bool
+    problem: str
+    copies: Copies | None = None
+    stages: tuple[Stage, ...] = ()
+    mirrored: bool = False
+    slope: float = 0.0
+    half_slope: float = math.nan
+    textures: dict[str, Texture] = field(default_factory=dict)  # boundary -> what it says of the surface
 
 
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
@@ -407,3 +490,58 @@ def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
     damped = f", the two-step rule (BDF2) in {100 * found.damped:.0f} % of the steps" if found.damped else ""
     slid = f", {found.slid:.0f} of one cell in slides" if found.slid else ""
     return f"piecewise-linear pressure{damped}, steps {steps}{slid}"
+
+
+def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:
+    """Totals, what is free, and why it cannot fit."""
+    place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
+    free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
+    seconds = np.nan_to_num(dataset["wall_time"].values)
+    largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
+    processes = min(workers or cores(), total)
+    if workers is None:
+        processes = processes_that_fit(largest, processes, there.size)
+    together = float(np.sum(largest[:processes]))
+    size = float(np.nansum(dataset["disk"].values))
+    refusals = Counter(str(text) for text in dataset["refusal"].values if text)
+    reasons = [f"{count} of {total} cases: {why}" if total > 1 else why for why, count in refusals.most_common(3)]
+    if together > PART * there.size >= largest[0]:
+        needed = f"{processes} processes need {amount(together)} of memory, and {amount(there.size)} are {there.words}"
+        reasons.append(f"{needed}: use --workers {processes_that_fit(largest, processes, there.size)}")
+    if size > PART * free_disk:
+        reasons.append(
+            f"the results need {size:.3g} bytes of disk, {free_disk:.3g} are free in {place}: keep fewer times or "
+            "fields, or use another folder"
+        )
+    return {
+        "processes": processes,
+        "threads": threads_each(processes),
+        "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds, initial=0.0))),
+        "memory": together,
+        "free_memory": there.size,
+        "disk": size,
+        "free_disk": free_disk,
+        "refusal": "; ".join(reasons),
+    }
+
+
+def attributes(name: str) -> dict[str, str]:
+    """Attributes of a variable of a plan."""
+    units, long_name = COLUMNS[name]
+    return {"long_name": long_name} | ({"units": units} if units else {})
+
+
+def _varied(value: xr.DataArray) -> str:
+    number = value.values[()]
+    if not isinstance(number, np.number):
+        return str(number)
+    unit = str(value.attrs.get("units", ""))
+    return unit_for([number], unit).text(float(number), 6) if unit else f"{number:.6g}"
+
+
+def _text(value: float, unit: str) -> str:
+    if not np.isfinite(value):
+        return "not known"
+    if unit == "byte":
+        return unit_for([value], "B").text(value)
+    return unit_for([value], unit).text(value) if unit else f"{value:.0f}"

@@ -14,8 +14,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.resources import PROCESS
 from roughvisc.study.cost.coarse_grids import foretold
-from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, work
-from roughvisc.study.cost.stages import stages_of
+from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, stages_of, work
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result

@@ -18,8 +18,7 @@ from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.settings import Settings
 from roughvisc.study.cost import estimate
-from roughvisc.study.cost.estimate import CostEstimate, Passed, solved_on
-from roughvisc.study.cost.stages import Stage, stage_at, stages_of
+from roughvisc.study.cost.estimate import CostEstimate, Passed, Stage, solved_on, stage_at, stages_of
 from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.views.console.tables import plan_tables
 
@@ -128,7 +127,7 @@ def test_plan__foresees_the_grid_in_the_end_and_the_work_till_then(study, convol
 @pytest.mark.parametrize(("shape", "follow"), [((130, 121), True), ((20, 21), False), ((20, 22), False)])
 def test_stages__are_the_windows_and_grids_that_a_profile_comes_through(monkeypatch, shape, follow):
     monkeypatch.setattr(profile_module, "MOST_CELLS", 300**2)
-    monkeypatch.setattr("roughvisc.study.cost.stages.MOST_CELLS", 300**2)
+    monkeypatch.setattr("roughvisc.study.cost.estimate.MOST_CELLS", 300**2)
     height = rv.sphere(1e-2, (1e-3 * shape[0], 1e-3 * shape[1]), shape)
     profile = Profile(height, follow=follow, mirror=True)
     program = rv.Program().load(1e-3, over=1.0)
@@ -192,7 +191,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
 def test_grid_that_would_grow_too_large__is_foreseen(study, monkeypatch):
     for module in (profile_module, estimate):
         monkeypatch.setattr(module, "MOST_CELLS", 40**2)
-    monkeypatch.setattr("roughvisc.study.cost.stages.MOST_CELLS", 40**2)
+    monkeypatch.setattr("roughvisc.study.cost.estimate.MOST_CELLS", 40**2)
     case = study(HEAD + GROWING["mirrored"])
     costs = rv.plan([case])
     assert (int(costs.final_cells_x[0]), int(costs.final_cells_y[0])) == (36, 36)

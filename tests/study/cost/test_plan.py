@@ -19,9 +19,8 @@ from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost import plan as plan_module
-from roughvisc.study.cost import totals as totals_module
-from roughvisc.study.cost.estimate import CostEstimate, Solved, coarse, wall_time
-from roughvisc.study.cost.stages import Stage
+from roughvisc.study.cost import plan as totals_module
+from roughvisc.study.cost.estimate import CostEstimate, Solved, Stage, coarse, wall_time
 from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.variables import STEPPED
 from roughvisc.views.console import tables
