@@ -225,6 +225,7 @@ class SlidingRows(Rows):
             row |= self._added(row, found, self._smooth.slide(sliding, self._force, tolerance))
         if self._coarser is not None:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
+        row["convolutions"] = sliding.convolutions  # those without the shortest octave, too
         facts = {"number": number, "creep_left": self._creep(found, speed, law)}
         return Row(speed, row, fields, state=done, facts=facts, done=float(done))
 
@@ -253,7 +254,6 @@ class SlidingRows(Rows):
             "pressure_residual": found.residual,
             "friction_residual": found.friction_residual,
             "iterations": found.vectors,
-            "convolutions": found.convolutions,
             "outer_iterations": found.iterations,
             "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
         }

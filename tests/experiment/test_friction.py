@@ -2,10 +2,12 @@
 
 import io
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rich.console import Console
+from scipy import fft
 from support import friction_whole, simulate_whole
 
 import roughvisc as rv
@@ -13,6 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.mechanics.materials import frequency
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sliding import steady
 from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.variables.sliding import SLIDING
@@ -274,3 +277,19 @@ def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion()
     rough = rv.self_affine((1e-3, 1e-3), (15, 11), hurst=0.8, rms_slope=0.1, seed=1)
     with pytest.raises(InputError, match="creeps without end"):
         friction_whole(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
+
+
+@pytest.mark.parametrize("last_octave", [False, True])
+def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
+    """Of the solution, of its forces, and of the same without the shortest octave of waves."""
+    forward = []
+
+    def counted(*given, **named):
+        forward.append(1)
+        return fft.rfft2(*given, **named)
+
+    here = {name: getattr(fft, name) for name in ("irfft2", "fftfreq", "rfftfreq")}
+    monkeypatch.setattr(steady, "fft", SimpleNamespace(rfft2=counted, **here))
+    ds = friction_whole(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
+    assert int(ds.convolutions.sum()) == len(forward)
+    assert (ds.convolutions > 2 * ds.iterations).all()

@@ -52,8 +52,6 @@ class SteadyState:
         Interior-point iterations.
     vectors : int
         Vectors of the linear solver in all; each costs two convolutions.
-    convolutions : int
-        Forward and inverse transforms in pairs, those of the preconditioner too.
     loss_tangent : float
         The largest on the grid.
     """
@@ -67,7 +65,6 @@ class SteadyState:
     converged: bool
     iterations: int
     vectors: int
-    convolutions: int
     loss_tangent: float
 
 
@@ -137,7 +134,7 @@ class Sliding:
         self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
-        #: Pairs of transforms so far.
+        #: Convolutions so far: forward and inverse transforms in pairs, those of the preconditioner too.
         self.convolutions = 0
         self.cell_area = dx * dy
         one = np.zeros(shape)
@@ -205,7 +202,7 @@ def steady_state(
     -------
     SteadyState
     """
-    cell, before = sliding.cell_area, sliding.convolutions
+    cell = sliding.cell_area
 
     def drag(pressure: Array) -> float:
         return -float((pressure * sliding.lagging(pressure)).sum()) * cell
@@ -243,5 +240,4 @@ def steady_state(
         iterations=found.iterations,
         vectors=found.vectors,
         loss_tangent=sliding.loss_tangent,
-        convolutions=sliding.convolutions - before,  # last: those above are counted
     )
