@@ -1,5 +1,7 @@
 """Settings of a solve, each declared once: its default, what it may be, what it means, and where it stands.
 
+The signature in :mod:`roughvisc.api` and the table ``[keep]`` of a study repeat the names alone.
+
 From the entries here follow the checks of :class:`Settings`, the tables ``[solve]`` and ``[keep]`` of a study file with
 the page of their keys, the key of a case, and what is refused of experiments over another axis than time.
 """
@@ -155,7 +157,7 @@ class Settings:
     )
     times: int | Sequence[float] | None = setting(
         None,
-        "instants in the result: all steps, so many evenly, or these",
+        "instants in the result: all steps, so many, denser after each corner, or these",
         "50",
         table="keep",
         only_over="time",

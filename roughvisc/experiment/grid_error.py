@@ -1,6 +1,6 @@
 """Error of the grid, from the same history on cells two and four times as long and from the contact edge.
 
-Three grids show how fast a history settles (:mod:`~roughvisc.experiment.grid_error`). They may agree by
+Three grids show how fast a history settles (:func:`grid_uncertainty`). They may agree by
 chance, and do so where the contact is too small for any of them to see its shape. Therefore no error is stated that is
 smaller than what the finest grid leaves open by itself: the edge of the contact, which lies anywhere in its cells, and
 the peak between the highest ones.

@@ -429,6 +429,8 @@ class LoadingRows(Rows):
             return step.shown.pressure
         if name == "displacement":
             return step.displacement
+        if name != "gap":
+            raise KeyError(f"a step has no field {name!r}")
         found = np.empty(contact.shape)
 
         def fill(rows: slice) -> None:
@@ -470,6 +472,8 @@ class LoadingRows(Rows):
         for rows, displacement in self._reach(window).rows(arrays["source"]):
             if name == "displacement":
                 out[rows] = displacement
+            elif name != "gap":
+                raise KeyError(f"a row has no field {name!r}")
             else:
                 np.add(displacement, self.profile.gap[rows], out=out[rows])
                 self._clip_gap(out[rows], records.plain[index]["facts"]["level"], rows)

@@ -20,7 +20,8 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import is_wide
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
-from roughvisc.mechanics.hereditary.exponentials import Memory, Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.hereditary.memory import Memory
 from roughvisc.settings import Settings
 from roughvisc.variables.chunks import chunks
 

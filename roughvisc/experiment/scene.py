@@ -18,7 +18,7 @@ from roughvisc.mechanics.bodies.kernel import has_finite_mean
 from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice, choose_memory
-from roughvisc.mechanics.hereditary.exponentials import ActsOn
+from roughvisc.mechanics.hereditary.memory import ActsOn
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.controller import SMALLEST_STEP

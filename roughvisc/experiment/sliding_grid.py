@@ -163,7 +163,7 @@ class CoarserFaces:
 
     Parameters
     ----------
-    face : Face
+    face : SlidingGrid
         On the grid of the surface.
     """
 

@@ -41,7 +41,9 @@ _BLOCK = 8
 
 
 class HalfSpace:
-    """Surface of an elastic half-space of unit contact compliance, sampled by equal rectangular cells.
+    """From pressure to displacement on a grid: convolution with a body's kernel, a half-space's by default.
+
+    Of unit contact compliance, sampled by equal rectangular cells.
 
     Not for two threads at once: the transforms share their working memory from one call to the next.
 

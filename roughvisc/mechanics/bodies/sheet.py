@@ -112,7 +112,7 @@ SHORTEST_WAVE = 24.0
 _PIECE, _NODES = 0.15, 10
 # Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cells of more thicknesses than the first are long: see the module on them. Beyond the second they are refused.
+# Cells of more thicknesses than the first are long, see :func:`long_cell_influence`; beyond the second: refused.
 _LONG, _LONGEST = 0.5, 50.0
 # Below this, sinh(2 x) - 2 x comes from its series.
 _SERIES_BELOW = 0.5
@@ -146,7 +146,7 @@ class Sheet(Kernel):
 
     In free space the kernel is that of the half-space less a smooth correction,
     ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
-    the thickness it is that of :mod:`roughvisc.mechanics.bodies.sheet`.
+    the thickness it is that of :func:`long_cell_influence`.
 
     References
     ----------

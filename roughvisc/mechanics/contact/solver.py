@@ -16,7 +16,8 @@ The method is that of constrained conjugate gradients on an evolving contact are
 4. Stopped on the duality gap, a bound on the error that costs nothing, not on the stagnation of the pressure. Under
    given approach and periodic boundaries that norm does not see the mean pressure, since a uniform pressure displaces
    nothing: there the load must be certain, too.
-5. Without a first guess, a sparse contact is found on every eighth cell first.
+5. Without a first guess, under a load and from 256 cells a side, the contact is solved on half as many cells a side
+   first, and so on down.
 6. Far from the solution, steps are convolved in single precision and added to the displacement in double. What that
    leaves is 1e-7 of the steps and not of the displacement; before the solution is accepted, its displacement is
    computed anew in double precision, and judged.
@@ -465,7 +466,7 @@ def conjugate_gradient(
     free : FreeSet
         Of the pressure so far; its separation is used up.
     level : float
-        Approach of the contact.
+        Approach of the contact, where it is given; under a load the mean over the free set takes its place.
     energy : float
         ``p.Kp``.
     step_length : float
@@ -479,12 +480,15 @@ def conjugate_gradient(
     free_set, residual, held = free
     reference = level if problem.load is None else total(residual, threads) / residual.size
     blockwise(np.subtract, residual, reference, out=residual, threads=threads)
-    search, caution = problem.precondition(residual, free_set, held, energy)
+    direction, caution = problem.precondition(residual, free_set, held, energy)
     asked = (
-        caution * sum(blockwise(lambda here: summed(np.abs(here)), search, threads=threads)) if measured else math.nan
+        caution * sum(blockwise(lambda here: summed(np.abs(here)), direction, threads=threads))
+        if measured
+        else math.nan
     )
     if previous is not None:
-        search = _conjugate(problem, search, residual, free_set, previous)
+        direction = _conjugate(problem, direction, residual, free_set, previous)
+    trial = direction  # in whose memory the trial is made
 
     def move(here: Array, before: Array) -> float:
         here *= -step_length
@@ -492,20 +496,22 @@ def conjugate_gradient(
         np.maximum(here, 0, out=here)  # in the manner of Polonsky and Keer: cut at zero, then scaled to the load
         return summed(here)
 
-    carried = sum(blockwise(move, search, held, threads=threads))
+    carried = sum(blockwise(move, trial, held, threads=threads))
     scale = 1.0 if problem.load is None else problem.load / carried
-    change = np.empty_like(search)
+    change = np.empty_like(trial)
 
     def scale_to_load(here: Array, before: Array, by: Array, downhill: Array) -> float:
         here *= scale
         np.subtract(here, before, out=by)
         return summed(by * downhill)
 
-    slope = sum(blockwise(scale_to_load, search, held, change, residual, threads=threads))
-    return SearchTrial(free_set, held, search, change, slope, asked)
+    slope = sum(blockwise(scale_to_load, trial, held, change, residual, threads=threads))
+    return SearchTrial(free_set, held, trial, change, slope, asked)
 
 
-def _conjugate(problem: ContactProblem, search: Array, residual: Array, free_set: Cells, previous: SearchStep) -> Array:
+def _conjugate(
+    problem: ContactProblem, direction: Array, residual: Array, free_set: Cells, previous: SearchStep
+) -> Array:
     """Search direction conjugate to the previous step, if it descends still."""
     influence, threads = problem.influence, problem.influence.threads
     response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
@@ -513,7 +519,7 @@ def _conjugate(problem: ContactProblem, search: Array, residual: Array, free_set
     def product(here: Array, cells: Cells) -> float:
         return summed(here * (response.take(cells) * unit))
 
-    beta = sum(blockwise(product, search, free_set, threads=threads))
+    beta = sum(blockwise(product, direction, free_set, threads=threads))
     if beta > 0:
         former = regather(previous.change, previous.free_set, free_set, influence.size, threads)
         mean = 0.0 if problem.load is None else total(former, threads) / former.size
@@ -524,9 +530,9 @@ def _conjugate(problem: ContactProblem, search: Array, residual: Array, free_set
             np.subtract(there, here, out=here)
             return summed(downhill * here)
 
-        if sum(blockwise(conjugate, former, search, residual, threads=threads)) > 0:
+        if sum(blockwise(conjugate, former, direction, residual, threads=threads)) > 0:
             return former
-    return search
+    return direction
 
 
 def projected_gradient(problem: ContactProblem, pressure: Array, displacement: Array, level: float) -> SearchTrial:

@@ -10,7 +10,8 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.exponentials import STIFF, ActsOn, Modes, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.hereditary.memory import STIFF, ActsOn, stiff_ratio
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
 from roughvisc.mechanics.materials.protocol import check_creep, complete

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.hereditary.exponentials import ActsOn, Rule, mean_compliance
+from roughvisc.mechanics.hereditary.memory import ActsOn, Rule, mean_compliance
 from roughvisc.mechanics.materials.models import Material
 
 Array = NDArray[np.float64]

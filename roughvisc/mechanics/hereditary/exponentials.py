@@ -11,71 +11,18 @@ nothing of contact, transforms or grids; its state is a plain value.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import Cells, empty, inner, threads_of, weighted
-from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
+from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
+from roughvisc.mechanics.materials.models import Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]
-
-#: Ratio of :func:`stiff_ratio` from which the damped rule is taken (docs/theory.md, "Step lengths").
-STIFF = 0.5
-
-#: How pressure is taken to run within a step. ``linear``: second order, exact for piecewise-linear pressure.
-#: ``bdf2``: second order, damps what relaxes within a step. ``euler``: its start. ``right``: constant, jumping at
-#: the start of the step.
-Rule = Literal["linear", "bdf2", "euler", "right"]
-ActsOn = Literal["displacement", "pressure", "both"]
-
-
-class Memory(Protocol):
-    """What a march asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
-
-    @property
-    def acts_on(self) -> ActsOn:
-        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa], or ``(p, v)``."""
-        ...
-
-    @property
-    def rules(self) -> tuple[Rule, ...]:
-        """The rules that it knows."""
-        ...
-
-    def start(self, shape: tuple[int, int]) -> Any:
-        """State at rest."""
-        ...
-
-    def predict(self, state: Any, step: float, rule: Rule) -> tuple[float, Array]:
-        """``alpha`` [1/Pa] and the carried field of a step ahead, which may be zero (a jump). [s]"""
-        ...
-
-    def advance(self, state: Any, step: float, rule: Rule, field: Array) -> Any:
-        """State after that step, at whose end the field was ``field``."""
-        ...
-
-    def restart(self, state: Any) -> Any:
-        """State in which no step reaches behind the present instant: after a jump or a corner."""
-        ...
-
-    def roll(self, state: Any, cells: int, axis: int) -> Any:
-        """State of a periodic body seen from a profile that has moved by so many cells along an axis."""
-        ...
-
-    def enlarged(
-        self, state: Any, shape: tuple[int, int], offset: tuple[int, int], displaced: Callable[[Array], Array]
-    ) -> Any:
-        """State on a larger grid, in which the present one begins at ``offset``; not of displacements alone.
-
-        ``displaced`` gives the displacement at unit compliance under a pressure there.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -266,21 +213,3 @@ def padded(fields: Array, shape: tuple[int, int], offset: tuple[int, int]) -> Ar
         raise ValueError(f"a grid of {shape} cells does not contain one of {(nx, ny)} cells that begins at {offset}")
     larger[..., offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = fields
     return larger
-
-
-def mean_compliance(material: Material, step: float) -> float:
-    """Mean contact compliance over the first ``step`` of creep, ``int_0^h C / h``. [1/Pa]"""
-    return float(material.mean_contact_compliance(0.0, step))
-
-
-def stiff_ratio(material: Material, step: float) -> float:
-    """Weight of the old over the new pressure in a ``linear`` step; above :data:`STIFF` it rings.
-
-    ``C(h) / mean C - 1``: zero for an elastic material, one for a dashpot or a Kelvin-Voigt solid.
-    """
-    return old_weight(float(material.contact_compliance(step)), mean_compliance(material, step))
-
-
-def old_weight(compliance: float, mean: float) -> float:
-    """The ratio of :func:`stiff_ratio` from the compliance at the end of a step and its mean over it. [1/Pa]"""
-    return compliance / mean - 1 if mean > 0 else math.inf

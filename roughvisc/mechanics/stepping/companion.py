@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import cut_at_zero, empty, over_blocks, weighted
-from roughvisc.mechanics.hereditary.exponentials import Rule
+from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.program import Segment

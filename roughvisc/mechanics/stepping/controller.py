@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import l1_distance
-from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes, Rule
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.hereditary.memory import STIFF, Rule
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
@@ -251,7 +252,7 @@ def rule_for(scene: Scene, state: Trajectory, length: float, growth: float = _GR
     return "bdf2" if length <= growth * (state.now.time - state.before.time) else "euler"
 
 
-def estimate(scene: Scene, state: State, trial: Trial, segment: Segment, event: float) -> float:
+def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment, event: float) -> float:
     """Relative error in time of a step, from its difference to the extrapolation; NaN without one."""
     if state.before is None:
         return math.nan

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import inner
-from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState, Rule
+from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
+from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.sparse import Sparse
 

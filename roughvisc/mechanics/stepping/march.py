@@ -25,8 +25,8 @@ from roughvisc.mechanics.stepping.companion import (
     with_uncertainty,
 )
 from roughvisc.mechanics.stepping.controller import (
+    acceptance_error,
     error_limit,
-    estimate,
     growth,
     remaining,
     rule_for,
@@ -40,7 +40,7 @@ from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Held
 from roughvisc.mechanics.stepping.slide_march import through_slide
 from roughvisc.mechanics.stepping.step import (
     accept,
-    elastic_step,
+    carried_into_step,
     enlarged,
     initial_state,
     is_outgrown,
@@ -155,7 +155,7 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
                 guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
                     state = base = _without_fields(state)
-            judged = _estimate_error(scene, state, accepted, segment, trial, guess)
+            judged = _step_with_companion(scene, state, accepted, segment, trial, guess)
             del accepted, guess
         if first is not None:
             yield first
@@ -191,7 +191,7 @@ def _tried(scene: Scene, state: State, segment: Segment, event: float, end: floa
     rule, stated = rule_for(scene, state, length), scene.keeps(arrival)
     trial = trial_step(scene, state, segment.control, value, length, rule, share, stated=stated)
     trial = replace(trial, instant=replace(trial.instant, time=arrival))
-    return trial, estimate(scene, state, trial, segment, event)
+    return trial, acceptance_error(scene, state, trial, segment, event)
 
 
 def _too_long(scene: Scene, state: State, segment: Segment, trial: Trial, error: float, shown: bool) -> bool:
@@ -238,7 +238,7 @@ def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, 
     return restarted(scene, accepted, trial.length) if state.unresolved else accepted
 
 
-def _estimate_error(
+def _step_with_companion(
     scene: Scene,
     state: State,
     accepted: State,
@@ -274,7 +274,7 @@ def _estimate_error(
 
 def _touched(scene: Scene, state: State, time: float) -> float:
     """Approach at which surfaces that are apart would touch at a time to come. [m]"""
-    carried = elastic_step(scene, state.memory, time - state.now.time, "linear")[2]
+    carried = carried_into_step(scene, state.memory, time - state.now.time, "linear")[2]
     return scene.lowest(scene.gap + carried)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import cut_at_zero, empty, lowest, threads_of, weighted
 from roughvisc.mechanics.bodies.operator import HalfSpace
-from roughvisc.mechanics.hereditary.exponentials import Memory, Rule, mean_compliance, old_weight
+from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.energy import Energy
@@ -389,7 +389,7 @@ class State(Trajectory):
         As of then.
     slid : Slid or None
         How far the profile has slid; None before any slide.
-    pace : Pace
+    pace : ControllerState
         How long the next step should be.
     iterations, convolutions : int
         Spent so far, rejected steps included.

@@ -1,4 +1,4 @@
-r"""The algorithm of the seed paper with its slips corrected, not accelerated: the reference for speed and accuracy.
+r"""The paper's algorithm with its slips corrected, not accelerated: the reference for speed and accuracy.
 
 "A robust algorithm for the contact of viscoelastic materials" presses a profile step by step: rectangle rule in
 time, one convolution for each past increment of pressure, plain conjugate gradients from a uniform first guess with
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SeedSolution:
-    """Pressure [Pa], gap above the level [m], the level [m], iterations, and whether the pressure stagnated."""
+    """Pressure [Pa], its displacement [m], the level [m], what it took, and whether the pressure stagnated."""
 
     pressure: Array
     displacement: Array

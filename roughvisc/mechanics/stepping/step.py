@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.mechanics.arrays import blockwise, empty
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.hereditary.exponentials import Modes, Rule, padded
+from roughvisc.mechanics.hereditary.exponentials import Modes, padded
+from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
@@ -57,7 +58,7 @@ def trial_step(
     ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought and its displacement at
     unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves.
     """
-    alpha, effective, field = elastic_step(scene, state.memory, length, rule)
+    alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
     carried = None if effective is None else field
     threads = scene.halfspace.threads
@@ -121,7 +122,7 @@ def trial_step(
     )
 
 
-def elastic_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
+def carried_into_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
     """``alpha`` of a step, and what is carried into it: the effective pressure, if known, and the displacement."""
     alpha, carried = scene.memory.predict(memory, length, rule)
     if scene.memory.acts_on == "displacement":
@@ -343,7 +344,7 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict
         return replace(instant, contact=contact, unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
-    glassy, _, carried = elastic_step(scene, memory, 0.0, "linear")
+    glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
     unit_displacement = scene.halfspace.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement

@@ -23,7 +23,8 @@ from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
-from roughvisc.mechanics.hereditary.exponentials import STIFF, Modes
+from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.hereditary.memory import STIFF
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program, Slide
 from roughvisc.mechanics.stepping.scene import Scene

@@ -8,7 +8,8 @@ from strategies import examples, series
 from support import direct as displaced
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.exponentials import Modes, mean_compliance, old_weight, padded, stiff_ratio
+from roughvisc.mechanics.hereditary.exponentials import Modes, padded
+from roughvisc.mechanics.hereditary.memory import mean_compliance, old_weight, stiff_ratio
 
 CELL = (1, 1)
 
