@@ -26,6 +26,8 @@ from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
 
+#: Raised by whoever changes what a checkpoint holds of a state.
+_LAYOUT = 2
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
 
@@ -35,7 +37,8 @@ def save_checkpoint(path: Path, reached: Checkpoint, key: str) -> None:
     arrays: dict[str, Any] = {}
     seen: dict[int, str] = {}
     stated = {field.name: _flatten(getattr(reached, field.name), arrays, seen) for field in fields(reached)}
-    plain = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT, "reached": stated}
+    plain = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT, "layout": _LAYOUT}
+    plain["reached"] = stated
     with atomic_write(path) as temporary, open(temporary, "wb", buffering=0) as stream:
         write_record(stream, plain, arrays)
 
@@ -55,8 +58,8 @@ def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkp
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
-        found = plain["key"], plain["revision"], plain.get("result_format", 1)
-        if found == (key, NUMERICS_REVISION, RESULT_FORMAT):
+        found = plain["key"], plain["revision"], plain.get("result_format", 1), plain.get("layout", 1)
+        if found == (key, NUMERICS_REVISION, RESULT_FORMAT, _LAYOUT):
             kinds = {kind.__name__: kind for kind in states}
             parts = plain["reached"].items()
             reached = Checkpoint(**{name: _unflatten(value, arrays, kinds) for name, value in parts})
@@ -65,7 +68,7 @@ def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkp
     except (Damaged, OSError, KeyError, TypeError, ValueError) as error:
         log.warning("%s: is damaged and not used: %s", path, error)
         return None
-    if found != (key, NUMERICS_REVISION, RESULT_FORMAT):
+    if found != (key, NUMERICS_REVISION, RESULT_FORMAT, _LAYOUT):
         log.warning("%s: belongs to another case or revision and is not used", path)
         return None
     return reached

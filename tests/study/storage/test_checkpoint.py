@@ -501,14 +501,16 @@ def test_changed_study__does_not_use_what_is_not_its_own(whole, tmp_path, caplog
     assert values(run_case(case, tmp_path)) == whole(MODES)[1]
 
 
-def test_other_revision__begins_again(whole, tmp_path, monkeypatch):
+@pytest.mark.parametrize("what", ["NUMERICS_REVISION", "RESULT_FORMAT", "_LAYOUT"])
+def test_other_revision__begins_again(whole, tmp_path, monkeypatch, caplog, what):
     case, expected, steps = whole(MODES)
     with monkeypatch.context() as patched:
-        patched.setattr(checkpoint_module, "NUMERICS_REVISION", -1)
+        patched.setattr(checkpoint_module, what, -1)
         stopped(case, tmp_path, steps // 2)
     stop = Stop()
     assert values(run_case(case, tmp_path, stop=stop)) == expected
     assert stop.asked == steps
+    assert "belongs to another case or revision and is not used" in caplog.text
 
 
 def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, caplog):
