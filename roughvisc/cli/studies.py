@@ -251,7 +251,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
-    from roughvisc.study.trade.exact import quantities_of
+    from roughvisc.study.trade.reference import quantities_of
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.plot import trade as figure

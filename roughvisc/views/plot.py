@@ -16,21 +16,16 @@ from roughvisc.errors import InputError
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.animate import animate, animation
-from roughvisc.views.figures.area_load import area_against_load
 from roughvisc.views.figures.axes import fullest_frame, require, rows_of
-from roughvisc.views.figures.conductance import conductance
 from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
 from roughvisc.views.figures.fields import maps
-from roughvisc.views.figures.friction import friction
-from roughvisc.views.figures.friction_distance import friction_against_distance
-from roughvisc.views.figures.friction_maps import friction_maps
-from roughvisc.views.figures.histories import history
-from roughvisc.views.figures.leakage import leakage
-from roughvisc.views.figures.loops import has_loop, hysteresis
+from roughvisc.views.figures.friction import friction, friction_against_distance, friction_maps
+from roughvisc.views.figures.histories import area_against_load, has_loop, history, hysteresis
 from roughvisc.views.figures.sections import section
 from roughvisc.views.figures.stability import stability_map
 from roughvisc.views.figures.surfaces import surface
 from roughvisc.views.figures.trade import trade
+from roughvisc.views.figures.transport import conductance, leakage
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.files import save_sweep_figures, write_figure
 from roughvisc.views.sweep_figures.friction_curves import friction_of_cases

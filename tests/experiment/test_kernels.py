@@ -14,7 +14,7 @@ from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.operator import HalfSpace
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case
-from roughvisc.study.trade.exact import closed_form
+from roughvisc.study.trade.reference import closed_form
 
 FIELDS = ("pressure", "gap", "displacement")
 #: What counts time, and what knows a closed form of the half-space.

@@ -18,7 +18,7 @@ from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case, read_cases, vary
-from roughvisc.study.trade.exact import closed_form
+from roughvisc.study.trade.reference import closed_form
 
 RADIUS, THICKNESS = 1e-3, 1e-4
 WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)

@@ -23,7 +23,7 @@ from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.tables import Wanted, read_table
-from roughvisc.views.figures.area_load import area_against_load
+from roughvisc.views.figures.histories import area_against_load
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 NASTY = "cost $$ of_a $x \x1b[31m[/b] red"

@@ -1,7 +1,8 @@
-"""What is known of a scene, from a result or from a case that has not run."""
+"""What is known of a scene, from a result or from a case that has not run: its surface, its contact, its bodies."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,19 +10,279 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from scipy import fft, ndimage
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.bodies.body import BASE, separability_error
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.bodies.sheet import Sheet, complement
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.study.audit.contact import Contact, contact_of
-from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.case import Case
-from roughvisc.topography.grid import nominal_area
+from roughvisc.topography.borders import border_mismatch
+from roughvisc.topography.grid import nominal_area, spacing, taper_weights
+from roughvisc.topography.parameters import parameters, rms_slope
+from roughvisc.topography.spectrum import hann, last_octave, modes
+from roughvisc.topography.synthesis import is_analytic
 from roughvisc.variables import of_step
 from roughvisc.variables.axes import axis_of
+
+#: Part of the mean square slope beyond the shortest wave of a recipe, up to which it is the recipe's surface.
+_SHORTER = 1e-6
+
+
+@dataclass(frozen=True)
+class Stated:
+    """The shortest wave that a recipe states, along the axis on which it has the fewest cells.
+
+    Attributes
+    ----------
+    wavelength : float
+        [m]
+    cells : float
+        Of the grid, in one such wave.
+    """
+
+    wavelength: float
+    cells: float
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Measures of a surface.
+
+    Attributes
+    ----------
+    size : tuple of float
+        Sides. [m]
+    analytic : bool
+        Whether it is an indenter or a wave by its recipe, which has no other waves.
+    slope, laplacian : float
+        Root mean squares of slope and Laplacian of the whole surface. [-], [1/m]
+    roughness : float
+        Sum of ``|q| |h_q|^2`` over its waves; NaN where points are absent. [m]
+    last_octave : float
+        Part of the rms slope that its shortest octave of waves adds; NaN where points are absent. [-]
+    shortest : float
+        Longest wavelength of that octave. [m]
+    mismatch : float
+        Difference of opposite borders over that of neighbouring rows, along the worse axis. [-]
+    taper : float
+        Margin of a taper over the side, along the worse axis; zero of a surface that was not tapered. [-]
+    stated : Stated or None
+        The shortest wave by the recipe, if it has waves and there are no shorter ones.
+    """
+
+    size: tuple[float, float]
+    analytic: bool
+    slope: float
+    laplacian: float
+    roughness: float
+    last_octave: float
+    shortest: float
+    mismatch: float
+    taper: float = 0.0
+    stated: Stated | None = None
+
+    @property
+    def smooth(self) -> bool:
+        """Whether there is form alone: a recipe's, or waves longer than a quarter of the shorter side."""
+        return self.analytic or self.shortest > min(self.size) / 2
+
+
+def texture_of(height: xr.DataArray, boundary: str, recipe: str = "") -> Texture:
+    """Measures of a surface under a boundary.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        [m]
+    boundary : {"free", "periodic"}
+        In free space waves are those under a cosine window.
+    recipe : str
+        What the surface was made by; empty if it was measured.
+    """
+    height = height.transpose("x", "y")
+    cells = spacing(height, "audit")
+    periodic = boundary == "periodic"
+    size = (height.sizes["x"] * cells[0], height.sizes["y"] * cells[1])
+    measures = parameters(height, periodic)
+    whole = {"roughness": math.nan, "last_octave": math.nan, "shortest": math.nan}
+    if not height.isnull().any() and np.ptp(height.values) > 0:
+        z = height.values - height.values.mean()
+        whole = _spectral(z if periodic else hann(z), cells)
+    analytic = bool(recipe) and is_analytic(height.assign_attrs(recipe=recipe))
+    return Texture(
+        size=size,
+        analytic=analytic,
+        stated=_stated_waves(recipe, height, cells, analytic),
+        slope=float(measures["rms_slope"]),
+        laplacian=2 * float(measures["rms_curvature"]),
+        mismatch=max(border_mismatch(height).of_neighbours),
+        taper=_taper_margin(height),
+        **whole,
+    )
+
+
+def _taper_margin(height: xr.DataArray) -> float:
+    """Margin of a taper over the side, along the worse axis, to two digits. [-]
+
+    A margin ``w`` along each of two borders takes ``w`` off the integral of the weight along a side.
+    """
+    weights = taper_weights(height)
+    return 0.0 if weights is None else float(f"{max(1 - one.mean() for one in weights):.2g}")
+
+
+def loaded_slope(height: xr.DataArray, boundary: str, approach: float) -> float:
+    """Root mean square slope where a surface may be loaded: in free space down to the largest approach. [-]
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        [m]
+    boundary : {"free", "periodic"}
+    approach : float
+        The largest; NaN: the whole surface counts. [m]
+    """
+    periodic = boundary == "periodic"
+    above = float(height.attrs.get("highest", height.max())) - float(height.max())
+    return rms_slope(height, periodic, math.inf if periodic or math.isnan(approach) else approach - above)
+
+
+def _stated_waves(recipe: str, height: xr.DataArray, cells: tuple[float, float], analytic: bool) -> Stated | None:
+    """The shortest wave by a recipe; None if that states none, or the heights hold shorter ones and are others now."""
+    try:
+        made = json.loads(recipe or "{}")
+        waves = _shortest_along(made["name"], made["parameters"])
+    except (KeyError, TypeError, ValueError):
+        return None
+    if waves is None or height.isnull().any() or not (analytic or _without_shorter(height.values, cells, waves)):
+        return None
+    fewest = min(zip(waves, cells, strict=True), key=lambda along: along[0] / along[1])
+    return Stated(fewest[0], fewest[0] / fewest[1])
+
+
+def _shortest_along(name: str, parameters: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Shortest wavelength along x and along y that a recipe states; None of a form without waves. [m]"""
+    if name == "wavy":
+        wave = float(parameters["wavelength"])
+        return (wave, wave if parameters["waves"] == 2 else math.inf)
+    if name == "self_affine":
+        wave, stretch = float(parameters["shortcut"]), math.sqrt(parameters["anisotropy"])
+        return (wave * stretch, wave / stretch)
+    return None
+
+
+def _without_shorter(z: np.ndarray, cells: tuple[float, float], waves: tuple[float, float]) -> bool:
+    """Whether heights that repeat have next to nothing beyond the ellipse of these wavelengths."""
+    q_x, q_y, power, count = modes(z - z.mean(), cells, "forward")
+    squares = count * (q_x**2 + q_y**2) * power
+    # a profile that is the same along an axis has waves of infinite length there, and none that is shorter
+    across = (
+        np.multiply(q, wave, out=np.zeros_like(q), where=q != 0) for q, wave in zip((q_x, q_y), waves, strict=True)
+    )
+    beyond = np.hypot(*across) > 2 * np.pi * (1 + 1e-9)
+    return bool(squares[beyond].sum() <= _SHORTER * squares.sum())
+
+
+def _spectral(z: np.ndarray, cells: tuple[float, float]) -> dict[str, float]:
+    q_x, q_y, power, count = modes(z, cells, "forward")
+    q = np.hypot(q_x, q_y)
+    squares = count * q**2 * power
+    begins = last_octave(q, squares)
+    kept = float(squares[q <= begins].sum())
+    return {
+        "roughness": float((count * q * power).sum()),
+        "last_octave": 1 - math.sqrt(kept / float(squares.sum())),
+        "shortest": 2 * np.pi / begins if begins else 0.0,
+    }
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What the pressures of a result show.
+
+    Attributes
+    ----------
+    peak : float
+        Largest pressure of all rows. [Pa]
+    spots : int
+        Connected regions in contact where the force is largest; one across a border that repeats counts twice.
+    curvature : float
+        Mean curvature of the profile over them, positive at summits. [1/m]
+    half_width : float
+        Half of what they extend over, along the longer side. [m]
+    pressure : ndarray, shape (nx, ny)
+        There. [Pa]
+    cells : tuple of float
+        Cell sides. [m]
+    """
+
+    peak: float
+    spots: int
+    curvature: float
+    half_width: float
+    pressure: Array
+    cells: tuple[float, float]
+
+    def relief(self, sheet: Sheet) -> float:
+        """What the base of a sheet takes off the displacement under the pressure, over the compliance. [m Pa]
+
+        The mean weighted by the pressure, with periodic boundaries, the sheet's own compression left out.
+        """
+        power = np.abs(fft.rfft2(self.pressure)) ** 2
+        (nx, ny), (dx, dy) = self.pressure.shape, self.cells
+        q = 2 * np.pi * np.hypot(fft.fftfreq(nx, dx)[:, None], fft.rfftfreq(ny, dy))
+        power[0, 0], q[0, 0] = 0.0, 1.0
+        power[:, 1 : (ny + 1) // 2] *= 2  # conjugates are not stored
+        lost = power * 2 / q * complement(q * sheet.thickness, sheet.poisson, sheet.base)
+        return float(lost.sum() / (nx * ny * self.pressure.sum()))
+
+
+def contact_of(dataset: xr.Dataset, row: xr.Dataset) -> Contact | None:
+    """The contact of a result in one of its rows; None if nothing touches.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With ``pressure``, which is read a frame at a time.
+    row : xarray.Dataset
+        The same in that row.
+    """
+    pressures = dataset["pressure"].transpose(..., "x", "y")
+    peak = max(float(np.nanmax(frame.values)) for frame in pressures)
+    pressure = np.nan_to_num(row["pressure"].transpose("x", "y").values)
+    touching = pressure > 0
+    if not touching.any():
+        return None
+    height = dataset["height"].transpose("x", "y")
+    cells = spacing(height, "audit")
+    extents = (np.ptp(at) + 1 for at in np.nonzero(touching))
+    return Contact(
+        peak=peak,
+        spots=int(ndimage.label(touching, np.ones((3, 3)))[1]),
+        curvature=_curvature(height.values, cells, touching),
+        half_width=max(n * d for n, d in zip(extents, cells, strict=True)) / 2,
+        pressure=pressure,
+        cells=cells,
+    )
+
+
+def _curvature(z: Array, cells: tuple[float, float], where: NDArray[np.bool_]) -> float:
+    """Mean of minus half the Laplacian over some cells whose neighbours are all there; NaN if none is."""
+    padded = np.pad(z, [(1, 1) if n > 1 else (0, 0) for n in z.shape], constant_values=np.nan)
+    curvature = np.zeros(z.shape)
+    for axis, d in enumerate(cells):
+        if z.shape[axis] > 1:
+            across = 1 - axis
+            inner = np.take(padded, range(1, padded.shape[across] - 1), across) if z.shape[across] > 1 else padded
+            curvature -= np.diff(inner, 2, axis) / (2 * d**2)
+    found = curvature[where & np.isfinite(curvature)]
+    return float(found.mean()) if found.size else math.nan
 
 
 @dataclass(frozen=True)

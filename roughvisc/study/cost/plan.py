@@ -32,9 +32,8 @@ from roughvisc.notebook import table
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.study.audit.audit import evaluate
-from roughvisc.study.audit.evidence import of_case
+from roughvisc.study.audit.evidence import Texture, of_case, texture_of
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,

@@ -18,8 +18,8 @@ from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, stages_of
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
-from roughvisc.study.trade.exact import quantities_of
 from roughvisc.study.trade.ladder import Setting, changed, duration_of, has_steps, shape_of
+from roughvisc.study.trade.reference import quantities_of
 from roughvisc.topography.grid import nominal_area
 
 Report = Callable[[str, float, float], None]

@@ -13,8 +13,8 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.study.trade.bench import NotRun, Run, TimedRuns
-from roughvisc.study.trade.exact import relative
 from roughvisc.study.trade.ladder import Setting
+from roughvisc.study.trade.reference import relative
 from roughvisc.variables.axes import AXES, axis_of
 
 #: How the errors of a grid vanish where something slides, as :mod:`~roughvisc.experiment.grid_convergence` knows them.

@@ -19,10 +19,10 @@ from roughvisc.progress import reporting
 from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
-from roughvisc.study.trade.exact import ClosedForm, closed_form
 from roughvisc.study.trade.finest import ReferenceRun, all_grids
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
+from roughvisc.study.trade.reference import ClosedForm, closed_form
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.axes import AXES

@@ -44,8 +44,8 @@ from roughvisc.views.figures.fields import (
     plane_unit,
     value_scale,
 )
-from roughvisc.views.figures.leakage import draw_flux, flux_of, rate_unit, visible, with_leak_rate
 from roughvisc.views.figures.sections import cut_position, deformed_line
+from roughvisc.views.figures.transport import draw_flux, flux_of, rate_unit, visible, with_leak_rate
 from roughvisc.views.observables import contact, history
 
 #: A map's side along y over that along x from which the map takes the whole height.

@@ -1,6 +1,8 @@
-"""The figure of steady sliding: friction and contact area against speed."""
+"""Figures of friction: against speed, as maps at several speeds, and against the distance of a program that slides."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -11,9 +13,150 @@ from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
-from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.sliding import SLIDING
-from roughvisc.views.figures.axes import CYCLE, Unit, new_figure, styled, unit_for
+from roughvisc.views.figures.axes import (
+    BLUE,
+    CYCLE,
+    GREEN,
+    VERMILION,
+    Unit,
+    letter_panels,
+    new_figure,
+    require,
+    styled,
+    unit_for,
+)
+from roughvisc.views.figures.fields import draw_field, label_maps, map_panels, measured_part
+from roughvisc.views.figures.histories import failed_frames, leave_room
+from roughvisc.views.observables import history
+
+#: Direction of the motion -> where it points on a map.
+_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
+_MOST_MAPS = 12
+
+
+@styled
+def friction_maps(dataset: xr.Dataset, speeds: float | Sequence[float] | None = None) -> Figure:
+    """Maps of the pressure in the frame of the profile, on one colour scale; an arrow shows where the profile moves.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.friction` with ``pressure`` among the fields, or of a study of friction.
+    speeds : float or sequence of float, optional
+        The nearest ones are drawn. By default the lowest, the one of the largest friction, and the highest. [m/s]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the result holds no pressure, or more than 12 speeds are asked for.
+    """
+    require(dataset, "speed", "x", "y", "pressure", "friction_coefficient")
+    dataset = measured_part(dataset)
+    rows = _chosen(dataset, speeds)
+    figure, axes = map_panels(dataset, len(rows), 1)
+    draw_field(figure, axes[0], dataset, "pressure", rows)
+    label_maps(axes, dataset, [_title(dataset, row) for row in rows])
+    return figure
+
+
+def _chosen(dataset: xr.Dataset, speeds: float | Sequence[float] | None) -> list[int]:
+    known = dataset["speed"].values
+    if speeds is None:
+        peak = int(np.argmax(dataset["friction_coefficient"].values))
+        chosen = {int(np.argmin(known)), peak, int(np.argmax(known))}
+    else:
+        asked = np.atleast_1d(np.asarray(speeds, dtype=float)).ravel()
+        if not 0 < asked.size <= _MOST_MAPS or not (asked > 0).all():
+            raise InputError(f"speeds is {speeds!r}: expected 1 to {_MOST_MAPS} positive numbers [m/s]")
+        chosen = {int(np.abs(np.log(known / speed)).argmin()) for speed in asked}
+    return sorted(chosen, key=lambda row: float(known[row]))
+
+
+def _title(dataset: xr.Dataset, row: int) -> str:
+    """Arrow of the motion, speed and friction."""
+    speed, arrow = float(dataset["speed"][row]), _ARROWS[str(dataset.attrs.get("direction", "x"))]
+    number, _, power = f"{float(dataset['friction_coefficient'][row]):.2g}".partition("e")
+    friction = rf"{number}$\times 10^{{{int(power)}}}$" if power else number
+    return f"{arrow} V = {unit_for([speed], 'm/s').text(speed, 3)}\nµ = {friction}"
+
+
+_PANELS = (("friction_coefficient", BLUE), ("contact_area", GREEN))
+
+
+@styled
+def friction_against_distance(dataset: xr.Dataset) -> Figure:
+    """Friction coefficient and contact area against the distance slid, at every accepted step.
+
+    Strokes are lines; what happens at a stop lies at one distance, and is dotted. Friction is counted against the
+    motion: after a reversal it begins below zero. Steps that did not converge are crossed out.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result, of a program with slides.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or its program never slides.
+    """
+    require(dataset, "time", "sliding_distance", "friction_coefficient")
+    steps = history(dataset)
+    across = unit_for(steps["sliding_distance"].values, "m")
+    distance = across(steps["sliding_distance"].values)
+    panels = [panel for panel in _PANELS if panel[0] in steps]
+    figure = new_figure(4.6, 1.3 + 1.5 * len(panels))
+    axes = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
+    failed = failed_frames(steps)
+    for ax, (name, colour) in zip(axes, panels, strict=True):
+        unit = unit_for(steps[name].values, VARIABLES[name].units)
+        values = unit(steps[name].values)
+        _draw_against_distance(ax, distance, values, colour)
+        ax.plot(distance[failed], values[failed], "x", color=VERMILION, ms=5, mew=1.2)
+        leave_room(ax, values[_shown(distance)])
+        ax.set_ylabel(unit.label(VARIABLES[name].label))
+        ax.grid(color="0.9", lw=0.5)
+    axes[0].axhline(0.0, color="0.3", lw=0.6)
+    if len(_stops(distance)):
+        axes[0].plot([], [], color="0.3", label="sliding")
+        axes[0].plot([], [], color="0.3", lw=0.9, ls=(0, (1, 1.5)), label="at a stop")
+        axes[0].legend(loc="lower left", bbox_to_anchor=(0.08, 1.0), ncols=2, borderaxespad=0.15)
+    axes[-1].set_xlabel(across.label(VARIABLES["sliding_distance"].label))
+    letter_panels(axes)
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _shown(distance: np.ndarray) -> np.ndarray:
+    """Steps from the one on at which the first slide begins."""
+    begins = max(np.flatnonzero(distance > 0)[:1].sum() - 1, 0)
+    return np.arange(len(distance)) >= begins
+
+
+def _stops(distance: np.ndarray) -> list[tuple[int, int]]:
+    """First and last step of each stop after a slide."""
+    still = np.concatenate([[False], (np.diff(distance) == 0) & (distance[1:] > 0), [False]])
+    return list(zip(np.flatnonzero(~still[:-1] & still[1:]), np.flatnonzero(still[:-1] & ~still[1:]), strict=True))
+
+
+def _draw_against_distance(ax: Axes, distance: np.ndarray, values: np.ndarray, colour: str) -> None:
+    first = int(np.argmax(_shown(distance)))
+    for began, end in _stops(distance):
+        ax.plot(distance[first : began + 1], values[first : began + 1], color=colour)
+        ax.plot(distance[began : end + 1], values[began : end + 1], color=colour, lw=0.9, ls=(0, (1, 1.5)))
+        first = end
+    ax.plot(distance[first:], values[first:], color=colour)
+
 
 #: What is drawn on the left and on the right: of the solution, by Persson's theory, the grid's error of it, and what
 #: the last octave of waves adds to it.

@@ -1,9 +1,10 @@
-"""Figures of histories: force, approach and area over time, hysteresis loops, area against load."""
+"""Figures of histories: force, approach and area over the axis of a result, hysteresis loops, area against load."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -13,10 +14,12 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
+    CYCLE,
     GREEN,
     ORANGE,
     PURPLE,
@@ -27,11 +30,17 @@ from roughvisc.views.figures.axes import (
     new_figure,
     require,
     rows_of,
+    spans_decades,
+    spread_axis,
     styled,
     unit_for,
+    verbatim,
 )
 from roughvisc.views.observables import area_by_theory
 from roughvisc.views.observables import history as over_steps
+from roughvisc.views.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
+from roughvisc.views.observables.cycles import cycle_energy, has_cycles
+from roughvisc.views.observables.derived import material_of
 
 _PANELS = (
     ("force", BLUE),
@@ -246,3 +255,211 @@ def _nothing_below(ax: Axes, axes: Sequence[Axes]) -> bool:
     place = ax.get_subplotspec()
     below = [other.get_subplotspec() for other in axes]
     return not any(one.rowspan.start == place.rowspan.stop and one.colspan == place.colspan for one in below)
+
+
+#: Part of its range by which the approach must have come back for a loop.
+_BACK = 0.01
+
+
+def has_loop(dataset: xr.Dataset) -> bool:
+    """Whether the approach comes back at all: force against approach encloses nothing otherwise."""
+    approach = over_steps(dataset)["approach"].values
+    fallen = np.max(np.maximum.accumulate(approach) - approach, initial=0.0)
+    return bool(fallen > _BACK * np.ptp(approach))
+
+
+@styled
+def hysteresis(dataset: xr.Dataset) -> Figure:
+    """Force against approach at every accepted step, the direction of time marked, and the work done in all.
+
+    Where the program has cycles, what is dissipated in the last one that closes is stated too; where the approach never
+    comes back, that there is no loop.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    require(dataset, "time", "force", "approach")
+    steps = over_steps(dataset)
+    force, approach = steps["force"].values, steps["approach"].values
+    across, up = unit_for(approach, "m"), unit_for(force, "N")
+    x, y = across(approach), up(force)
+    figure = new_figure(3.6, 3.0)
+    ax = figure.add_subplot()
+    ax.plot(x, y, color=BLUE, marker=marker_of(len(x)), ms=2)
+    _draw_arrows(ax, x, y)
+    ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="start")
+    if len(x) > 1:
+        ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=_end(dataset))
+    lost = cycle_energy(dataset)["cycle_dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
+    if len(lost):
+        energy = unit_for([float(lost[-1])], "J")
+        label = f"cycle {int(lost['cycle'][-1])}: {energy.text(float(lost[-1]))} dissipated"
+        ax.plot([], [], ls="", label=label)
+    failed = failed_frames(steps)
+    if failed.any():
+        ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
+    if not has_loop(dataset):
+        ax.set_title("The approach does not come back: no loop", color="0.4")
+    ax.set_xlabel(across.label(VARIABLES["approach"].label))
+    ax.set_ylabel(up.label(VARIABLES["force"].label))
+    leave_room(ax, y)
+    ax.grid(color="0.9", lw=0.5)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2, handlelength=1.2)
+    return figure
+
+
+def _end(dataset: xr.Dataset) -> str:
+    """What the last point is, with the work that the result states."""
+    if "work" not in dataset:
+        return "end"
+    work = float(dataset["work"][-1])
+    return f"end: {unit_for([work], 'J').text(work)} of work done"
+
+
+def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray, count: int = 5) -> None:
+    """Arrows in the direction of time, at even distances along a path."""
+    width, height = (np.ptp(x) or 1.0), (np.ptp(y) or 1.0)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
+    if length[-1] == 0:
+        return
+    for place in (np.arange(count) + 0.5) / count * length[-1]:
+        k = min(max(int(np.searchsorted(length, place)), 1), len(x) - 1)
+        share = (place - length[k - 1]) / (length[k] - length[k - 1])
+        start = np.array([x[k - 1], y[k - 1]])
+        tip = start + share * (np.array([x[k], y[k]]) - start)
+        style = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", tip, start, arrowprops=style)
+
+
+_AREA = "contact_area"
+#: What the lines of the theories are, and what they assume.
+_THEORIES = (
+    "low loads: $A = \\sqrt{2\\pi}\\,F / (E^*\\,h^\\prime)$, little contact (Bush, Gibson, Thomas)\n"
+    "Persson: $A = A_0\\,\\mathrm{erf}(\\sqrt{2}\\,F / (A_0\\,E^*\\,h^\\prime))$\n"
+    "both: a Gaussian surface of rms slope $h^\\prime$,\nan elastic material of the modulus at the time named"
+)
+#: Recipes of surfaces without roughness.
+_SMOOTH = ("sphere", "cone", "flat_punch", "wavy")
+
+
+def _as_cases(results) -> dict[str, xr.Dataset]:
+    """Results by the label each has in the legend."""
+    if isinstance(results, xr.Dataset):
+        if "case" in results.dims:
+            return {str(one.values): results.sel(case=one) for one in results["case"]}
+        results = [results]
+    if isinstance(results, Mapping):
+        return {str(label): dataset for label, dataset in results.items()}
+    if not isinstance(results, Iterable):
+        raise InputError(f"expected one result, a list or a mapping of them, found {type(results).__name__}")
+    cases: dict[str, xr.Dataset] = {}
+    for number, dataset in enumerate(results, 1):
+        label = str(getattr(dataset, "attrs", {}).get("title") or f"case {number}")
+        cases[label if label not in cases else f"{label} ({number})"] = dataset
+    if not cases:
+        raise InputError("no result given: nothing to draw")
+    return cases
+
+
+@styled
+def area_against_load(results, *, contact_modulus=None) -> Figure:
+    r"""Contact area, corrected for the grid, against force at every accepted step, one line a case.
+
+    Parameters
+    ----------
+    results : xarray.Dataset, list or mapping of them
+        Results; the keys of a mapping, or else their titles, name the lines.
+    contact_modulus : float or mapping, optional
+        Contact modulus, or several by name such as ``{"glassy": 4e6, "rubbery": 1e6}``, for which to draw the lines
+        of the theories; ``{}`` for none. By default, where all cases state one material and a rough surface with
+        periodic boundaries: that at once and that after the last kept time. [Pa]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Notes
+    -----
+    The line of low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_, up to the nominal area; that of
+    Persson's theory [2]_ :math:`A = A_0 \, \mathrm{erf}(\sqrt2 F / (A_0 E^* h'_\mathrm{rms}))`; both with the
+    root-mean-square slope of the first case's surface. What a result's own history of load gives by them is
+    :func:`~roughvisc.views.observables.area_by_theory`.
+
+    References
+    ----------
+    .. [1] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
+    .. [2] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
+    """
+    cases = _as_cases(results)
+    for dataset in cases.values():
+        require(dataset, "time", "force", _AREA)
+    steps = {label: over_steps(dataset) for label, dataset in cases.items()}
+    loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
+    across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m^2")
+    moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
+    figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12) + (0.0 if moduli == {} else 0.6))
+    ax = figure.add_subplot()
+    for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
+        colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
+        nested = 2.2 - 1.2 * number / max(1, len(cases) - 1)  # a line shows on both sides of another on it
+        style = {"color": colour, "marker": marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
+        ax.plot(x, y, label=verbatim(label) if len(cases) <= 12 else "_", **style)
+    top = float(np.max(np.concatenate(loads)))
+    drawn = _draw_theories(ax, next(iter(cases.values())), moduli, top, across, up)
+    if spans_decades(np.sort(np.concatenate(loads))):
+        spread_axis(ax.xaxis, across(np.concatenate(loads)))
+        spread_axis(ax.yaxis, up(np.concatenate(areas)))
+    else:
+        leave_room(ax, *map(up, areas))
+        ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
+    ax.set_xlabel(across.label(VARIABLES["force"].label))
+    ax.set_ylabel(up.label(VARIABLES[_AREA].label))
+    ax.grid(color="0.9", lw=0.5)
+    if drawn:
+        figure.supxlabel(_THEORIES, fontsize=6.5, color="0.35")
+    if len(ax.get_legend_handles_labels()[1]) > 1:
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(ax.lines) < 4 else 2)
+    return figure
+
+
+def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
+    """Contact moduli that the results tell by themselves, where the theories hold; else none. [Pa]"""
+    stated = [json.loads(one.attrs.get("case", "{}")) for one in cases.values()]
+    first = next(iter(cases.values()))
+    alike = all(one.get("material") == stated[0].get("material") for one in stated)
+    rough = stated[0].get("surface", {}).get("generate") not in _SMOOTH
+    if not (
+        "material" in stated[0] and alike and rough and first.attrs.get("boundary") == "periodic" and "height" in first
+    ) or {"thickness", "kernel"} & set(first.attrs):
+        return {}
+    material = material_of(first)
+    end = max(float(one["time"][-1]) for one in cases.values())
+    named = {"at once": 0.0, f"after {unit_for([end], 's').text(end)}": end}
+    compliances = {name: float(material.contact_compliance(time)) for name, time in named.items()}
+    if len(set(compliances.values())) == 1:
+        return {"": 1 / compliances["at once"]}
+    return {name: 1 / compliance for name, compliance in compliances.items() if compliance > 0}
+
+
+def _draw_theories(ax: Axes, dataset: xr.Dataset, moduli, top: float, across, up) -> bool:
+    """Lines up to a load [N]; whether there is any to draw."""
+    named = moduli if isinstance(moduli, Mapping) else {"": moduli}
+    if not named:
+        return False
+    require(dataset, "height")
+    slope = rms_slope(dataset["height"], periodic=dataset.attrs.get("boundary") == "periodic")
+    nominal = nominal_area_of(dataset)
+    for (name, modulus), dash in zip(named.items(), ((4, 2), (1, 1.5), (6, 1, 1, 1)) * len(named), strict=False):
+        for label, theory, shade in (("low loads", asperity_fraction, "k"), ("Persson", persson_fraction, "0.55")):
+            loads = np.geomspace(1e-3 * top, top, 50)
+            areas = nominal * theory(loads / (nominal * modulus * slope))
+            known = areas <= nominal
+            said = f"{label}, {name}" if name else label
+            ax.plot(across(loads[known]), up(areas[known]), color=shade, lw=0.9, ls=(0, dash), label=said)
+    return True

@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import unit_for
-from roughvisc.views.sweep_figures.case_names import case_words, varied_texts
+from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
 
 def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:

@@ -31,10 +31,11 @@ from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
 from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
-from roughvisc.views.sweep_figures.case_names import case_words, names_of
 from roughvisc.views.sweep_figures.case_text import (
+    case_words,
     friction_words,
     material_words,
+    names_of,
     program_words,
     study_text,
     table_words,

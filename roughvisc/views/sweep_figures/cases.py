@@ -20,8 +20,7 @@ from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
-from roughvisc.views.sweep_figures.case_names import names_of
-from roughvisc.views.sweep_figures.case_text import ENDLESS, readable_setting, setting_unit
+from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
 
 #: Quantities that span decades, and of which zero means that there is none.
 _SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")

@@ -21,7 +21,7 @@ from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import verbatim
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
-from roughvisc.views.sweep_figures.case_names import case_words, file_stems
+from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
 from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
 from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of

@@ -16,9 +16,9 @@ import roughvisc as rv
 from roughvisc.study.statement.case import read_study
 from roughvisc.study.trade import recommend
 from roughvisc.study.trade.apply import apply
-from roughvisc.study.trade.exact import QUANTITIES
 from roughvisc.study.trade.files import write_trade
 from roughvisc.study.trade.ladder import Setting
+from roughvisc.study.trade.reference import QUANTITIES
 from roughvisc.views.console.trade_table import trade_table
 from roughvisc.views.figures.trade import _FAMILIES
 

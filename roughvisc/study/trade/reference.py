@@ -31,11 +31,18 @@ from roughvisc.topography.grid import spacing
 from roughvisc.variables.axes import AXES
 
 Array = NDArray[np.float64]
+
+
 Pressure = Callable[[Array, float], Array]
+
 
 #: What is compared, in the order of the results; and where something slides.
 QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
+
+
 SLIDING_QUANTITIES = ("friction_coefficient",)
+
+
 #: A cell whose centre has no finite pressure is averaged over so many points each way.
 _POINTS = 32
 

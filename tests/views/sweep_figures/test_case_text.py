@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from roughvisc.views.sweep_figures.case_names import case_words, file_stems
+from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 from roughvisc.views.sweep_figures.files import write_figure
 
 
