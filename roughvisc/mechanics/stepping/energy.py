@@ -177,7 +177,7 @@ def _lost(material: Prony, step: float) -> tuple[Array, Array, Array]:
     """What elements lose in a step, over their compliance: factors of ``<w, w>``, ``<w, d>`` and ``<d, d>``."""
     x = step / np.array(material.times)
     mean, twice = one_less_mean_decay(x), one_less_mean_decay(2 * x)
-    return x * (1 - twice), 2 * (twice - mean), _both_rises(x)
+    return x * (1 - twice), 2 * (twice - mean), _both_rises(x, mean, twice)
 
 
 # (-1)^(k+1) (2 - 2^k) / (k+1)! for k >= 2: up to 0.3 the next term is below rounding
@@ -185,8 +185,13 @@ _ORDERS = np.arange(2, 18)
 _SERIES = (-1.0) ** (_ORDERS + 1) * (2 - 2.0**_ORDERS) / np.cumprod(np.append(6.0, _ORDERS[1:] + 1))
 
 
-def _both_rises(x: Array) -> Array:
-    """``int_0^1 (1 - exp(-x s))^2 ds / x`` to full relative precision; ``x / 3`` for small ``x``."""
+def _both_rises(x: Array, mean: Array, twice: Array) -> Array:
+    """``int_0^1 (1 - exp(-x s))^2 ds / x`` to full relative precision; ``x / 3`` for small ``x``.
+
+    Parameters
+    ----------
+    x, mean, twice : ndarray, shape (m,)
+        Steps over retardation times, and one less the mean decay over one of these and over two.
+    """
     series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** (_ORDERS - 1), axis=-1)
-    large = np.maximum(x, 0.3)
-    return np.where(x < 0.3, series, (2 * one_less_mean_decay(large) - one_less_mean_decay(2 * large)) / large)
+    return np.where(x < 0.3, series, (2 * mean - twice) / np.maximum(x, 0.3))
