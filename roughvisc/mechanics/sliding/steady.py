@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.arrays import threads_of
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.sliding.interior_point import solve_complementarity
 
@@ -134,6 +135,7 @@ class Sliding:
         self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
+        self._threads = threads_of(nx * ny)
         #: Convolutions so far: forward and inverse transforms in pairs, those of the preconditioner too.
         self.convolutions = 0
         self.cell_area = dx * dy
@@ -151,8 +153,9 @@ class Sliding:
         self.convolutions += 1
         symbol, unit = self._stiffness
         largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
-        found = fft.rfft2((displacement / largest).astype(np.float32)) * symbol
-        return largest * unit * np.asarray(fft.irfft2(found, s=self.shape, overwrite_x=True), dtype=np.float64)
+        found = fft.rfft2((displacement / largest).astype(np.float32), workers=self._threads) * symbol
+        found = fft.irfft2(found, s=self.shape, overwrite_x=True, workers=self._threads)
+        return largest * unit * np.asarray(found, dtype=np.float64)
 
     def lagging(self, pressure: Array) -> Array:
         """Slope along x of the displacement out of phase. [-]"""
@@ -177,7 +180,8 @@ class Sliding:
 
     def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
         self.convolutions += 1
-        return np.asarray(fft.irfft2(fft.rfft2(field) * symbol, s=self.shape, overwrite_x=True))
+        found = fft.rfft2(field, workers=self._threads) * symbol
+        return np.asarray(fft.irfft2(found, s=self.shape, overwrite_x=True, workers=self._threads))
 
 
 def steady_state(

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from dense_sliding import PERIOD, TIME, dense, line_profiles, rubber, slid, strong_errors
+from scipy import fft
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -232,6 +233,23 @@ def test_units__do_not_matter():
     metres = slid(ROUGH, rubber(), 0.1, LOAD)
     microns = slid(ROUGH * 1e6, rubber(), 0.1e6, LOAD * 1e12, side=PERIOD * 1e6)
     assert microns.power_force / 1e12 == pytest.approx(metres.power_force, rel=1e-8)
+
+
+@pytest.mark.parametrize(("shape", "threads"), [((33, 20), 1), ((1023, 1026), 2)])
+def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch):
+    """Handing a small transform over takes ten times as long as the transform."""
+    used = set()
+    for name in ("rfft2", "irfft2"):
+        plain = getattr(fft, name)
+        monkeypatch.setattr(
+            fft, name, lambda *given, plain=plain, workers=None, **named: used.add(workers) or plain(*given, **named)
+        )
+    with fft.set_workers(2):
+        sliding = Sliding(HALF_SPACE, partial(complex_compliance, rubber()), shape, (1e-3, 1e-3), 1.0)
+        pressure = np.zeros(shape)
+        for transformed in (sliding.displacement, sliding.full_contact, sliding.lagging, sliding.force_across):
+            transformed(pressure)
+    assert used == {threads}
 
 
 def test_not_converged__says_so():
