@@ -241,8 +241,7 @@ def followed(
     length = time - companion.now.time
     value = segment.value(time - state.began, companion.start)
     rule = rule or rule_for(scene, companion, length, _GROWTH)
-    trial = trial_step(scene, companion, segment.control, value, length, rule, _SHARE, guess)
-    trial = replace(trial, instant=replace(trial.instant, time=time))
+    trial = trial_step(scene, companion, segment.control, value, length, rule, _SHARE, guess, arrival=time)
     if is_outgrown(scene, trial.instant):
         return None
     return coarse_step(scene, state, companion, trial), trial

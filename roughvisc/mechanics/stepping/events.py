@@ -117,7 +117,8 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
         trial = trial_step(scene, state, segment.control, value, 0.0, "linear", stated=True)
         state = with_cost(state, trial)
         if not is_outgrown(scene, trial.instant):
-            found = followed(scene, accept(scene, state, trial), segment, coarse_initial_guess(trial.instant), "linear")
+            jumped = accept(scene, state, trial, state.pace.with_pressure_error())
+            found = followed(scene, jumped, segment, coarse_initial_guess(trial.instant), "linear")
             if found is not None:
                 break
         scene, state = enlarged(scene, state, state.now.time)

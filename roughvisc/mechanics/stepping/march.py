@@ -189,8 +189,7 @@ def _tried(scene: Scene, state: State, segment: Segment, event: float, end: floa
     # what a short discarded solve shows of a soft step's end is the step's own residual, magnified
     share = _MAGNIFIED if scene.lacks_instantaneous_compliance(length) and scene.keeps(arrival) else 1.0
     rule, stated = rule_for(scene, state, length), scene.keeps(arrival)
-    trial = trial_step(scene, state, segment.control, value, length, rule, share, stated=stated)
-    trial = replace(trial, instant=replace(trial.instant, time=arrival))
+    trial = trial_step(scene, state, segment.control, value, length, rule, share, stated=stated, arrival=arrival)
     return trial, acceptance_error(scene, state, trial, segment, event)
 
 
@@ -229,9 +228,8 @@ def _without_fields(state: State) -> State:
 def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
     """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
     time = trial.instant.time
-    accepted = accept(scene, state, trial)
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
-    accepted = replace(accepted, pace=state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
+    accepted = accept(scene, state, trial, state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
     if waits:
         accepted = behind(state, accepted)
     # the first short step stands for a jump
@@ -287,9 +285,8 @@ def _step_while_open(scene: Scene, state: State, segment: Segment, until: float,
         else:
             state = found[0]
     value = segment.value(until - state.began, state.start)
-    trial = trial_step(scene, state, segment.control, value, until - state.now.time, "linear")
-    trial = replace(trial, instant=replace(trial.instant, time=until))
-    carried = accept(scene, with_cost(state, trial), trial)
+    trial = trial_step(scene, state, segment.control, value, until - state.now.time, "linear", arrival=until)
+    carried = accept(scene, with_cost(state, trial), trial, state.pace.with_pressure_error())
     in_contact = carried.companion is not None and carried.companion.now.force > 0
     found = followed(scene, carried, segment, coarse_initial_guess(carried.now), "right" if in_contact else "linear")
     if found is None:  # the companion is in contact, beyond the grid

@@ -72,7 +72,8 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, coarse_initial_guess(state.now))
     moved = _moved(scene, state, segment.slide, 1)
     # the step before is kept as the profile saw it
-    accepted = replace(accept(scene, with_cost(moved, trial), trial), before=state.now)
+    accepted = accept(scene, with_cost(moved, trial), trial, moved.pace.with_pressure_error())
+    accepted = replace(accepted, before=state.now)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
     if state.unresolved:
         accepted = restarted(scene, accepted, 0.0)
@@ -112,8 +113,9 @@ def _tried(
     value = segment.value(arrival, state.start)  # it is held
     body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
     stated = cells == 1 and scene.keeps(arrival)
-    trial = trial_step(scene, body, segment.control, value, cells * length, rule, share, guess, stated=stated)
-    return replace(trial, instant=replace(trial.instant, time=arrival), slides=True)
+    step, control = cells * length, segment.control
+    trial = trial_step(scene, body, control, value, step, rule, share, guess, stated=stated, arrival=arrival)
+    return replace(trial, slides=True)
 
 
 def _path(scene: Scene, state: State, accepted: State, slide: Slide) -> Slid:

@@ -18,7 +18,17 @@ from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Instant, Scene, State, Step, Trajectory, Trial
+from roughvisc.mechanics.stepping.scene import (
+    NO_FIELD,
+    ControllerState,
+    Guess,
+    Instant,
+    Scene,
+    State,
+    Step,
+    Trajectory,
+    Trial,
+)
 
 Array = NDArray[np.float64]
 # The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
@@ -52,11 +62,13 @@ def trial_step(
     share: float = 1.0,
     guess: Guess | None = None,
     stated: bool = False,
+    arrival: float | None = None,
 ) -> Trial:
     """Contact state a step ahead, where the load or the approach has a given value.
 
     ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought and its displacement at
-    unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves.
+    unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves; ``arrival``
+    is the time of the end where that is known to the last bit, and not only as a sum. [s]
     """
     alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
@@ -65,7 +77,7 @@ def trial_step(
     gap = field if carried is None else empty(field.shape)
     blockwise(np.add, scene.gap, field, out=gap, threads=threads)
     del field
-    time = state.now.time + length
+    time = state.now.time + length if arrival is None else arrival
     apart = value == 0 if control == "load" else value <= scene.lowest(gap)
     if apart:
         approach = scene.lowest(gap) if control == "load" else value
@@ -161,8 +173,8 @@ def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[st
     }
 
 
-def accept(scene: Scene, state: State, trial: Trial) -> State:
-    """State after an accepted trial."""
+def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState) -> State:
+    """State after an accepted trial; ``pace`` tells how long the next step may be."""
     changes = advance_trajectory(scene, state, trial)
     now, work = changes["now"], changes["work"]
     return replace(
@@ -172,7 +184,7 @@ def accept(scene: Scene, state: State, trial: Trial) -> State:
         largest_approach=max(state.largest_approach, abs(now.approach)),
         largest_work=max(state.largest_work, abs(work)),
         contact_since=state.contact_since if now.force > 0 and state.now.force > 0 else state.now.time,
-        pace=state.pace.with_pressure_error(),
+        pace=pace,
     )
 
 
