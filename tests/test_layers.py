@@ -45,7 +45,7 @@ ALLOWED = {
     "mechanics.contact": {*_ARRAYS, "errors", "mechanics.bodies"},
     "mechanics.hereditary": {*_ARRAYS, "errors", "mechanics.materials"},
     "mechanics.stepping": {*_MARCH, "errors", "notebook", "units"} - {"mechanics.stepping"},
-    "mechanics.sliding": {"errors", "mechanics.contact", "mechanics.bodies"},
+    "mechanics.sliding": {"errors", "mechanics.arrays", "mechanics.contact", "mechanics.bodies"},
     "mechanics.transport": {"errors", "mechanics.contact", "mechanics.bodies"},
     "mechanics.closed_forms": {*_BODY, "errors", "mechanics.stepping"},
     "topography": {*_LABELS, "tables"},

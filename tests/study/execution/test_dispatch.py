@@ -69,8 +69,8 @@ class Ear(NullMonitor):
     def reached(self, key, now, end):
         self.heard.append((key, now, end))
 
-    def told(self, message):
-        self.messages.append(message)
+    def message(self, text):
+        self.messages.append(text)
 
     def wait_until(self, condition):
         until = time.monotonic() + 60
@@ -351,9 +351,9 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
-def test_told__is_seen_whoever_watches(capsys):
-    NullMonitor().told("no worker")
-    LiveMonitor(None).told("no worker")
+def test_message__is_seen_whoever_watches(capsys):
+    NullMonitor().message("no worker")
+    LiveMonitor(None).message("no worker")
     assert capsys.readouterr().err == "roughvisc: no worker\nno worker\n"
 
 
