@@ -18,7 +18,6 @@ from roughvisc.problem import Problem
 from roughvisc.settings import Edge, Memory, Method, Missing, Settings, TimeStep
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
-from roughvisc.topography.grid import checked
 
 Progress = Callable[[float, float], None]
 
@@ -135,7 +134,7 @@ def simulate(
         memory=memory,
         grid_error=grid_error,
     )
-    problem = Problem(checked(height, "simulate", least=1), body_of(material), settings)
+    problem = Problem(height, body_of(material), settings)
     return root_of(solve(problem, Loading(program), progress=progress, threads=threads))
 
 
@@ -222,6 +221,6 @@ def friction(
         fields=fields,
         grid_error=grid_error,
     )
-    problem = Problem(checked(height, "friction", least=1), body_of(material), settings)
+    problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
     return root_of(found.assign_attrs(title="Steady sliding"))

@@ -85,8 +85,8 @@ def solve(
     loads = experiment.on_area(nominal_area(height))  # coarser grids may be of other sizes
 
     def on_coarser(few: xr.DataArray, places: list[float]) -> xr.Dataset:
-        wanted = replace(problem, height=few, settings=experiment.with_rows_at(settings, places))
-        found = _solve_once(wanted.on(few, fields=("pressure",)), loads, MemoryRecorder(), False, count)
+        wanted = replace(problem, settings=experiment.with_rows_at(settings, places)).on(few, fields=("pressure",))
+        found = _solve_once(wanted, loads, MemoryRecorder(), False, count)
         apart = np.abs(found[experiment.axis].values[:, None] - places)  # a slide has others, by half a longer cell
         return found.isel({experiment.axis: apart.argmin(axis=0)})
 
