@@ -155,7 +155,7 @@ NEW_SETTING = [
         "api.py",
         '    threads: int | None = None,\n    progress: bool | Progress = True,\n) -> xr.Dataset:\n    """Press',
     ),
-    ("api.py", '    )\n    problem = Problem(checked(height, "simulate"'),
+    ("api.py", "    )\n    problem = Problem(height, body_of(material), settings)\n    return root_of("),
     ("experiment/loading.py", "        scene, choice, profile, settings = self._scene, self._choice, self.profile"),
 ]
 
