@@ -52,6 +52,7 @@ from roughvisc.topography.conditioning import mirror as mirror
 from roughvisc.topography.conditioning import resample as resample
 from roughvisc.topography.conditioning import rotate90 as rotate90
 from roughvisc.topography.conditioning import taper as taper
+from roughvisc.topography.conditioning import without_short_waves as without_short_waves
 from roughvisc.topography.example import example_scan as example_scan
 from roughvisc.topography.fitting import fit_self_affine as fit_self_affine
 from roughvisc.topography.parameters import parameters as parameters
@@ -60,6 +61,7 @@ from roughvisc.topography.readers import list_channels as list_channels
 from roughvisc.topography.readers import supported_formats as supported_formats
 from roughvisc.topography.scans import open_scan as open_scan
 from roughvisc.topography.spectrum import psd as psd
+from roughvisc.topography.surrogates import surrogates as surrogates
 from roughvisc.topography.synthesis import cone as cone
 from roughvisc.topography.synthesis import flat_punch as flat_punch
 from roughvisc.topography.synthesis import self_affine as self_affine

@@ -17,10 +17,11 @@ METHODS = {
     name: f"roughvisc.topography.{module}"
     for module, names in {
         "conditioning": "level mask_outliers fill gaussian_filter resample band_limit crop rotate90 invert combine "
-        "taper mirror",
+        "taper mirror without_short_waves",
         "parameters": "parameters",
         "spectrum": "psd",
         "fitting": "fit_self_affine",
+        "surrogates": "surrogates",
     }.items()
     for name in names.split()
 }

@@ -2,7 +2,7 @@
 
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
 Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
-their order in the file: crop, rotate90, invert, level, outliers, fill, filter, band_limit,
+their order in the file: crop, rotate90, invert, level, outliers, fill, filter, shortest_wave, realisation, band_limit,
 resample, taper, mirror.
 """
 
@@ -20,6 +20,7 @@ from roughvisc.tables import regular
 from roughvisc.topography import conditioning
 from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.recipes import RECIPES, UNITS, make
+from roughvisc.topography.surrogates import surrogate
 from roughvisc.units import quantity, shown
 
 _PROVENANCE = ("title", "description", "licence", "source")
@@ -133,7 +134,8 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
     steps : mapping
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
-        cut-off, or a table of cutoff, keep and periodic), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
+        cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
+        a surrogate), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
         and ``mirror``. They act in this order; false leaves a step out.
 
     Returns
@@ -239,6 +241,8 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "outliers": lambda h, value: conditioning.mask_outliers(h, **_table("outliers", value, ("window", "threshold"))),
     "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
     "filter": _filter,
+    "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
+    "realisation": lambda h, value: surrogate(h, value),
     "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
     "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),

@@ -7,7 +7,7 @@ NaN, and stay so until :func:`fill`. The same steps are methods of the accessor 
 from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90, taper
 from roughvisc.topography.missing_points import fill, mask_outliers
-from roughvisc.topography.resampling import band_limit, resample
+from roughvisc.topography.resampling import band_limit, resample, without_short_waves
 
 __all__ = [
     "level",
@@ -22,4 +22,5 @@ __all__ = [
     "combine",
     "taper",
     "mirror",
+    "without_short_waves",
 ]

@@ -21,7 +21,9 @@ from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
     counts,
+    like,
     noted,
+    number,
     resampled_taper,
     spacing,
     with_coordinates,
@@ -139,6 +141,54 @@ def band_limit(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | N
     if not complete:
         heights[np.isnan(lay_on_cells(h, *cells)[0])] = np.nan
     return _on_cells(h, heights, marked(h, *cells), "band-limited", way, periodic)
+
+
+def without_short_waves(h: xr.DataArray, shortest: float, periodic: bool | None = None) -> xr.DataArray:
+    """Height without the waves that are shorter than a length, on the same cells.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y), without missing points. [m]
+    shortest : float
+        Wavelength of the shortest waves that are kept; at least two cells, and shorter than the sides. [m]
+    periodic : bool, optional
+        Whether the surface repeats in x and in y; default as in :func:`resample`.
+
+    Returns
+    -------
+    xarray.DataArray
+        Of the same mean. A periodic surface is a sum of waves. Another one is a sum of cosines together with its mirror
+        images. The cut is sharp: see :func:`gaussian_filter` for a smooth one. [m]
+
+    Raises
+    ------
+    InputError
+        If points are missing or the length is out of its range.
+    """
+    h = checked(h, "without_short_waves")
+    shortest, sides = number("shortest", shortest, "m"), spacing(h)
+    lengths = [n * d for n, d in zip(h.shape, sides, strict=True)]
+    if not 2 * max(sides) * (1 - _ROUNDING) <= shortest < min(lengths):
+        raise InputError(
+            f"without_short_waves: shortest is {shortest!r}: expected at least two cells, {2 * max(sides):.6g} [m], "
+            f"and less than the sides, {min(lengths):.6g} [m]"
+        )
+    if not _is_complete(h):
+        missing = h.size - count_of(h.values)
+        raise InputError(f"without_short_waves: {missing} points are missing: expected none (see fill)")
+    limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
+    if _repeats("without_short_waves", h, periodic):
+        q_x = 2 * np.pi * scipy.fft.fftfreq(h.shape[0], sides[0])
+        q_y = 2 * np.pi * scipy.fft.rfftfreq(h.shape[1], sides[1])
+        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.rfft2(h.values), 0.0)
+        heights = scipy.fft.irfft2(heights_q, s=h.shape)
+    else:
+        q_x, q_y = (np.pi * np.arange(n) / length for n, length in zip(h.shape, lengths, strict=True))
+        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.dctn(h.values, norm="ortho"), 0.0)
+        heights = scipy.fft.idctn(heights_q, norm="ortho")
+    stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
+    return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", **stated)
 
 
 def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept: bool = False) -> np.ndarray:

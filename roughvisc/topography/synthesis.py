@@ -159,11 +159,11 @@ def self_affine(
         source = np.random.default_rng(seed)
     except (TypeError, ValueError) as error:
         raise InputError(f"seed is {seed!r}: expected a whole number >= 0 or a numpy.random.Generator") from error
-    waves = _Waves(source.integers(1 << 32, size=4).tolist(), amplitudes == "gaussian")
+    waves = RandomWaves(source.integers(1 << 32, size=4).tolist(), amplitudes == "gaussian")
     spectrum, variance, slope2 = _spectrum(size, shape, hurst, band, stretch, waves)
     if not variance:
         raise InputError(f"no wave of the domain is longer than shortcut = {shortcut:.6g} [m]: expected a larger size")
-    heights = _synthesised(spectrum, shape[1])
+    heights = synthesised(spectrum, shape[1])
     heights *= target / math.sqrt(slope2 if rms_height is None else variance)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": _plain_seed(seed)}
@@ -176,7 +176,7 @@ def _plain_seed(seed: Any) -> int | None:
 
 
 @dataclass(frozen=True)
-class _Waves:
+class RandomWaves:
     """Random complex numbers by wavevector, whatever the grid: of modulus one, or normal of mean square one.
 
     Parameters
@@ -201,7 +201,7 @@ class _Waves:
 
 
 def _spectrum(
-    size: Any, shape: Any, hurst: float, band: tuple[float, float], stretch: Any, waves: _Waves
+    size: Any, shape: Any, hurst: float, band: tuple[float, float], stretch: Any, waves: RandomWaves
 ) -> tuple[np.ndarray, float, float]:
     """Half spectrum of unit scale, with its expected variance and mean square slope (Parseval)."""
     nx, ny = shape
@@ -227,14 +227,17 @@ def _spectrum(
         power = weight * amplitude**2
         variance += power.sum()
         slope2 += (power * (q_x[rows, None] ** 2 + q_y**2)).sum()
-    # the first column holds both halves: it must be Hermitian for the amplitudes to survive the real transform
-    column = spectrum[:, 0]
-    half = (nx - 1) // 2
-    column[nx - half :] = column[1 : half + 1][::-1].conj()
+    make_hermitian(spectrum)
     return spectrum, float(variance), float(slope2)
 
 
-def _synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
+def make_hermitian(spectrum: np.ndarray) -> None:
+    """Make the first column, which holds both halves, such that the amplitudes survive the real transform."""
+    column, half = spectrum[:, 0], (len(spectrum) - 1) // 2
+    column[len(spectrum) - half :] = column[1 : half + 1][::-1].conj()
+
+
+def synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
     """Heights in the memory of their half spectrum, which they overwrite."""
     nx, held = spectrum.shape
     for start in range(0, held, 64):

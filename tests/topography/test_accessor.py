@@ -25,7 +25,7 @@ def test_accessor__chains_steps():
 def test_accessor__has_every_step_and_number_with_its_docstring():
     from roughvisc.topography import conditioning
 
-    assert {*conditioning.__all__, "parameters", "psd", "fit_self_affine"} == set(METHODS)
+    assert {*conditioning.__all__, "parameters", "psd", "fit_self_affine", "surrogates"} == set(METHODS)
     h = rv.from_array(tilted(), CELL)
     for name in METHODS:
         assert name in dir(h.roughvisc)

@@ -365,11 +365,11 @@ def test_self_affine__takes_little_more_memory_than_its_result():
 
 
 def test_self_affine__transform_in_place_is_the_inverse_of_the_whole_one():
-    from roughvisc.topography.synthesis import _synthesised
+    from roughvisc.topography.synthesis import synthesised
 
     rng = np.random.default_rng(0)
     for nx, ny in [(2, 2), (3, 2), (2, 5), (65, 64), (130, 129), (64, 193)]:
         heights = rng.normal(size=(nx, ny))
-        found = _synthesised(np.fft.rfft2(heights, norm="forward"), ny)
+        found = synthesised(np.fft.rfft2(heights, norm="forward"), ny)
         np.testing.assert_allclose(found, heights, atol=1e-13)
         assert found.flags.c_contiguous

@@ -31,6 +31,8 @@ _PROSE = {
     "sha256",
     "synthetic",
 }
+#: Keys of a surface that came later: where they are absent they do not count, so that the keys of former cases stay.
+_LATER = {"shortest_wave", "realisation"}
 
 
 def identity(settings: Study) -> tuple[str, str]:
@@ -81,11 +83,12 @@ def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
         The conditioning, of the card too.
     """
     stated = surface.model_dump(mode="json", serialize_as_any=True, exclude={"second"})
+    stated = {key: value for key, value in stated.items() if value is not None or key not in _LATER}
     second = getattr(surface, "second", None)
     above = {} if second is None else {"second": surface_content(second)}
     if not isinstance(surface, FromFile):
         steps = SecondFace if isinstance(surface, SecondFace) else SurfaceSection
-        treatment = {key: stated.pop(key) for key in steps.model_fields if key != "second"}
+        treatment = {key: stated.pop(key) for key in steps.model_fields if key in stated}
         return _digest(stated), treatment | above
     stated |= above
     path = Path(stated.pop("file"))

@@ -114,6 +114,8 @@ class Prepared(Section):
 class Conditioned(Prepared):
     """What every surface may have done to it: the steps of a face, then those of the profile that is pressed."""
 
+    shortest_wave: nullable(LENGTH) = None
+    realisation: nullable(whole(1)) = None
     band_limit: nullable(SHAPE) = None
     resample: nullable(SHAPE) = None
     taper: nullable(SIZE) = None

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, crea
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.materials import models as materials
+from roughvisc.mechanics.materials.stiffness import stiffened
 from roughvisc.mechanics.materials.temperature import shifted
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
 from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
@@ -144,6 +145,7 @@ class MaterialSection(Section):
     """One material by the name of its model; each model has a class of its own, made from :data:`MODELS`."""
 
     model: str
+    modulus_factor: measured("1", above=0) = 1.0
 
     @property
     def shift(self) -> float:
@@ -161,7 +163,8 @@ class MaterialSection(Section):
                 if value is not None
             }
         )
-        return material if self.shift == 1 else shifted(material, self.shift)
+        material = material if self.shift == 1 else shifted(material, self.shift)
+        return material if self.modulus_factor == 1 else stiffened(material, self.modulus_factor)
 
     def body(self) -> Body:
         """What is made of it: a half-space, or a sheet."""
@@ -193,6 +196,8 @@ class MaterialSection(Section):
             stated.setdefault("poisson", 0.5)
         if self.shift != 1:  # however it was stated
             stated["shift_factor"] = self.shift
+        if self.modulus_factor != 1:
+            stated["modulus_factor"] = self.modulus_factor
         if self.sheet["thickness"] not in (None, math.inf):
             stated |= self.sheet | {"base": self.sheet["base"] or BASE}
         return stated

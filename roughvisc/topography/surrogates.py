@@ -1,0 +1,112 @@
+"""Random surfaces with the spectrum of a surface."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+import scipy.fft
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.topography.borders import is_periodic, period_of
+from roughvisc.topography.framing import mirror
+from roughvisc.topography.grid import checked, labelled, noted, spacing
+from roughvisc.topography.spectrum import psd
+from roughvisc.topography.synthesis import RandomWaves, make_hermitian, synthesised
+
+
+def surrogates(
+    h: xr.DataArray, count: int, *, seed: int, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
+) -> xr.DataArray:
+    r"""Random surfaces with the spectrum of a surface: what other patches of the same roughness may look like.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights without missing points. [m]
+    count : int
+        Number of surfaces.
+    seed : int
+        Source of phases and amplitudes. One seed and one number are one surface, on any grid of this size.
+    amplitudes : {"gaussian", "fixed"}
+        As :func:`self_affine` has them. With "fixed" each surface has the rms height of the spectrum exactly, and what
+        depends on it scatters too little.
+
+    Returns
+    -------
+    xarray.DataArray, dims (realisation, x, y)
+        Periodic surfaces of zero mean over the same cells, numbered from 1. [m]
+
+    Raises
+    ------
+    InputError
+        If points are missing, `count` is no positive whole number, `seed` is none, or `amplitudes` is neither word.
+
+    Notes
+    -----
+    The spectrum is the radial average of :func:`psd`, up to the largest wave number whose ring is whole: direction and
+    shape (skewness, kurtosis, ridges) of the surface are lost. A surface that does not repeat is taken with its mirror
+    images; one that is made of mirror images gives surfaces as large as the part that is mirrored, since that part is
+    all that was measured.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1, appendix D.
+
+    Examples
+    --------
+    >>> scan = self_affine(1e-3, (31, 33), hurst=0.8, rms_height=1e-6, seed=1)
+    >>> surrogates(scan, 3, seed=7).sizes["realisation"]
+    3
+    """
+    if not (isinstance(count, int | np.integer) and not isinstance(count, bool) and count >= 1):
+        raise InputError(f"surrogates: count is {count!r}: expected a positive whole number")
+    found = [surrogate(h, number, seed=seed, amplitudes=amplitudes) for number in range(1, int(count) + 1)]
+    return xr.concat(found, xr.DataArray(np.arange(1, count + 1), dims="realisation", name="realisation"))
+
+
+def surrogate(
+    h: xr.DataArray, realisation: int, *, seed: int = 0, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
+) -> xr.DataArray:
+    """One surface of :func:`surrogates`, by its number. [m]"""
+    h = checked(h, "surrogates")
+    if amplitudes not in ("fixed", "gaussian"):
+        raise InputError(f"surrogates: amplitudes is {amplitudes!r}: expected 'gaussian' or 'fixed'")
+    if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
+        raise InputError(f"surrogates: seed is {seed!r}: expected a whole number >= 0")
+    if not np.isfinite(h.values).all():
+        raise InputError("surrogates: points are missing: expected a surface without any (see fill)")
+    h = _measured_part(h)
+    repeating = h if is_periodic(h) else mirror(h)
+    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # its rings are as wide
+    (nx, ny), sides = h.shape, spacing(h)
+    area, whole = h.size * math.prod(sides), np.pi / max(sides)
+    waves = RandomWaves([int(seed), int(realisation)], amplitudes == "gaussian")
+    q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, sides[0]), 2 * np.pi * scipy.fft.rfftfreq(ny, sides[1])
+    rings = np.round(spectrum["wavevector"].values / step).astype(int)
+    density = np.zeros(rings[-1] + 1)
+    density[rings] = spectrum["psd"].values
+    centres = np.exp(1j * np.pi * np.arange(q_y.size) / ny)
+    heights_q = np.zeros((nx, q_y.size), dtype=complex)
+    for row in range(nx):
+        q = np.hypot(q_x[row], q_y)
+        inside = (q > 0) & (q < whole * (1 - 1e-12))
+        ring = np.maximum(np.round(q / step).astype(int), 1)
+        amplitude = np.sqrt(np.where(inside, density[np.where(inside, ring, 0)], 0.0) / area)
+        k_x = row if 2 * row < nx else row - nx
+        heights_q[row] = amplitude * np.exp(1j * np.pi * k_x / nx) * centres * waves.row(k_x, q_y.size)
+    make_hermitian(heights_q)
+    grid = labelled(synthesised(heights_q, ny), (sides[0], sides[1]))
+    return noted(
+        grid, f"surrogate {realisation} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
+    )
+
+
+def _measured_part(h: xr.DataArray) -> xr.DataArray:
+    """The part of a surface that its mirror images repeat; all of it where it is not made of them. [m]"""
+    values = h.values
+    if all(n % 2 == 0 for n in h.shape) and all(np.array_equal(values, np.flip(values, axis)) for axis in (0, 1)):
+        return h[: h.shape[0] // 2, : h.shape[1] // 2]
+    return h

@@ -1,0 +1,60 @@
+"""A stiffer material: all moduli multiplied by one factor."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.materials.stiffness import stiffened
+
+
+class Own:
+    """A material of the user's own."""
+
+    poisson = 0.3
+
+    def contact_compliance(self, t):
+        return 1e-6 * (1 + np.sqrt(np.asarray(t, dtype=float)))
+
+    def contact_integral(self, t):
+        t = np.asarray(t, dtype=float)
+        return 1e-6 * (t + t**1.5 / 1.5)
+
+
+MATERIALS = {
+    "prony": rv.Prony(2e-7, fluidity=1e-8, compliances=(3e-7, 1e-7), times=(0.1, 3.0), poisson=0.4),
+    "power_law": rv.PowerLaw(1e-7, 2e-7, 0.3),
+    "tabulated": rv.Tabulated((0.0, 1.0, 10.0), (1e-7, 3e-7, 5e-7)),
+    "pair": rv.pair(rv.zener(3e6, 1e6, 1e5), rv.elastic(1e7)),
+    "own": Own(),
+    "bulk": rv.maxwell(1e6, 1e5, bulk_modulus=1e9),
+}
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_stiffened__divides_every_compliance(name):
+    material, times = MATERIALS[name], np.array([0.0, 0.03, 0.7, 9.0])
+    harder = stiffened(material, 1.7)
+    before, now = complete(material), complete(harder)
+    np.testing.assert_allclose(now.contact_compliance(times), before.contact_compliance(times) / 1.7, rtol=1e-12)
+    np.testing.assert_allclose(now.contact_integral(times), before.contact_integral(times) / 1.7, rtol=1e-12)
+    assert now.poisson == before.poisson
+    assert "all moduli multiplied by 1.7" in now.note
+
+
+def test_stiffened__needs_as_much_more_load():
+    """The contact of a linear body depends on the load over the modulus alone."""
+    ball, rubber = rv.sphere(1e-3, 2e-4, 31), MATERIALS["prony"]
+    areas = []
+    for material, load in ((rubber, 1e-4), (stiffened(rubber, 3.0), 3e-4)):
+        press = rv.Program().load(load, over=0.0).hold(1.0)
+        ds = rv.simulate(ball, material, press, times=[0.0, 1.0], progress=False)
+        areas.append(ds.contact_area.values)
+    np.testing.assert_allclose(areas[1], areas[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, float("nan"), float("inf"), "2"])
+def test_stiffened__refuses_what_is_no_positive_number(factor):
+    with pytest.raises(InputError, match="modulus_factor"):
+        stiffened(MATERIALS["prony"], factor)

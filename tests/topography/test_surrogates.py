@@ -1,0 +1,104 @@
+"""Random surfaces with the spectrum of a surface."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+
+
+def rough(shape=(45, 52), shortcut=8e-5):
+    return rv.self_affine((1e-3, 0.9e-3), shape, hurst=0.7, rms_height=1e-6, shortcut=shortcut, seed=4)
+
+
+def test_surrogates__fixed_amplitudes_have_the_radial_spectrum_of_the_surface():
+    h = rough()
+    wanted = rv.psd(h)
+    whole = wanted.wavevector < 0.95 * np.pi * 45 / 1e-3  # rings that lie on the grid as a whole
+    for one in rv.surrogates(h, 3, seed=2, amplitudes="fixed"):
+        np.testing.assert_allclose(rv.psd(one).psd[whole], wanted.psd[whole], rtol=1e-9, atol=1e-12 * wanted.psd.max())
+
+
+def test_surrogates__gaussian_amplitudes_scatter_about_the_spectrum():
+    """The mean square of a wave's Gaussian amplitude has itself as standard deviation."""
+    h = rough((21, 23), None)
+    count = 300
+    found = rv.surrogates(h, count, seed=5)
+    power = np.abs(np.fft.fft2(found.values)) ** 2
+    fixed = np.abs(np.fft.fft2(rv.surrogates(h, 1, seed=5, amplitudes="fixed").values[0])) ** 2
+    present = fixed > 1e-6 * fixed.max()
+    ratio = power.mean(axis=0)[present] / fixed[present]
+    assert abs(ratio.mean() - 1) < 5 / np.sqrt(count * present.sum() / 2)
+    np.testing.assert_allclose(ratio, 1, atol=6 / np.sqrt(count))
+    assert 0.8 < (power.std(axis=0)[present] / fixed[present]).mean() < 1.2
+
+
+def test_surrogates__are_one_surface_on_any_grid():
+    h = rough((45, 52))
+    coarse = rv.resample(h, (31, 36))  # holds all of its waves
+    fine, few = (rv.surrogates(one, 1, seed=1)[0] for one in (h, coarse))
+    np.testing.assert_allclose(rv.resample(fine, (31, 36), periodic=True), few, atol=1e-9 * float(fine.std()))
+
+
+def test_surrogates__repeat_and_differ():
+    h = rough()
+    first, again, other = rv.surrogates(h, 2, seed=1), rv.surrogates(h, 1, seed=1), rv.surrogates(h, 1, seed=2)
+    xr.testing.assert_equal(first.isel(realisation=[0]), again)
+    assert abs(np.corrcoef(first[0].values.ravel(), first[1].values.ravel())[0, 1]) < 0.5
+    assert abs(np.corrcoef(first[0].values.ravel(), other[0].values.ravel())[0, 1]) < 0.5
+    assert first.realisation.values.tolist() == [1, 2]
+
+
+def test_surrogates__of_mirror_images_are_as_large_as_what_was_measured():
+    scan = rv.crop(rough(), x=(0, 6e-4), y=(1e-4, 8e-4))
+    xr.testing.assert_identical(rv.surrogates(rv.mirror(scan), 2, seed=3), rv.surrogates(scan, 2, seed=3))
+    assert rv.surrogates(scan, 1, seed=3).shape[1:] == scan.shape
+
+
+def test_surrogates__of_a_scan_are_periodic_and_have_its_slope():
+    scan = rv.crop(rough((90, 104)), x=(0, 6e-4))
+    found = rv.surrogates(scan, 8, seed=1)
+    slopes = [float(rv.parameters(one, periodic=True).Sdq) for one in found]
+    assert np.mean(slopes) == pytest.approx(float(rv.parameters(scan).Sdq), rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"count": 0}, "count is 0: expected a positive whole number"),
+        ({"count": 2.0}, "count is 2.0"),
+        ({"seed": -1}, "seed is -1: expected a whole number >= 0"),
+        ({"seed": None}, "seed is None"),
+        ({"amplitudes": "normal"}, "amplitudes is 'normal': expected 'gaussian' or 'fixed'"),
+    ],
+)
+def test_surrogates__refuse(options, message):
+    with pytest.raises(InputError, match=message):
+        rv.surrogates(rough(), **{"count": 1, "seed": 0, **options})
+
+
+def test_surrogates__refuse_missing_points():
+    h = rough()
+    h[3, 4] = np.nan
+    with pytest.raises(InputError, match="points are missing"):
+        rv.surrogates(h, 1, seed=0)
+
+
+def test_without_short_waves__leaves_those_that_are_longer():
+    wave, ripple = (rv.wavy(a, length, (1e-3, 8e-4), (50, 44)) for a, length in ((1e-6, 2e-4), (1e-7, 1e-4)))
+    cut = rv.without_short_waves((wave + ripple).assign_attrs(wave.attrs), 1.2e-4, periodic=True)
+    np.testing.assert_allclose(cut, wave, atol=1e-15)
+
+
+def test_without_short_waves__of_a_scan_are_those_of_its_mirror_images():
+    scan = rv.crop(rough(), x=(0, 6e-4))
+    both = rv.mirror(rv.without_short_waves(scan, 1e-4)), rv.without_short_waves(rv.mirror(scan), 1e-4)
+    np.testing.assert_allclose(both[0], both[1], atol=1e-18)
+    assert 0.3 < float(both[0].std() / rv.mirror(scan).std()) < 0.999
+
+
+@pytest.mark.parametrize("shortest", [1e-5, 9.1e-4, 0.0, float("nan")])
+def test_without_short_waves__refuses_a_length_out_of_range(shortest):
+    with pytest.raises(InputError, match="shortest is"):
+        rv.without_short_waves(rough(), shortest)
