@@ -26,8 +26,9 @@ def __getattr__(name: str) -> Any:
         return metadata.version("roughvisc")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'roughvisc' has no attribute {name!r}")
-    module = import_module(_PUBLIC[name])
-    value = getattr(module, name, None) or import_module(f"{module.__name__}.{name}")
+    module = _PUBLIC[name]
+    value = None if module == __name__ else getattr(import_module(module), name, None)
+    value = value or import_module(f"{module}.{name}")
     globals()[name] = value
     return value
 

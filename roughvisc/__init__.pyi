@@ -1,5 +1,6 @@
 """The public names of roughvisc and the modules that define them: for editors, for mypy, and for ``__init__.py``."""
 
+from roughvisc import observables as observables
 from roughvisc.api import friction as friction
 from roughvisc.api import simulate as simulate
 from roughvisc.errors import ConvergenceError as ConvergenceError
@@ -30,6 +31,7 @@ from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
+from roughvisc.study.observed import observe as observe
 from roughvisc.study.statement.case import read_cases as read_cases
 from roughvisc.study.statement.case import read_study as read_study
 from roughvisc.study.statement.case import study_schema as study_schema
@@ -68,11 +70,9 @@ from roughvisc.topography.synthesis import self_affine as self_affine
 from roughvisc.topography.synthesis import sphere as sphere
 from roughvisc.topography.synthesis import wavy as wavy
 from roughvisc.topography.writers import save_scan as save_scan
-from roughvisc.views import observables as observables
 from roughvisc.views import plot as plot
 from roughvisc.views.export import deformed as deformed
 from roughvisc.views.export import to_csv as to_csv
-from roughvisc.views.observed import observe as observe
 from roughvisc.views.report.page import report as report
 
 __version__: str

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.observables import history
 from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.views.observables import history
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
 #: But the map of extremes, whose script holds each case against its closed form, the seal, run by its script, the curve

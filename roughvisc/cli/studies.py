@@ -118,7 +118,7 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
     """Add to the results what the study asks to be observed; what to complain of, empty if nothing."""
     if all(case.settings.observe is None for case in cases):
         return ""
-    from roughvisc.views.observed import observe
+    from roughvisc.study.observed import observe
 
     with console.status("observing") as status:
         try:

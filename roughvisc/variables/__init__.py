@@ -339,7 +339,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8", every_step=True, meanings=STATUS_MEANINGS),
     "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time", group="cost"),
-    # derived from a result: see roughvisc.views.observables
+    # derived from a result: see roughvisc.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
     "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),

@@ -1,4 +1,4 @@
-"""The vocabulary of what flows through the contact: see :mod:`roughvisc.views.observables`."""
+"""The vocabulary of what flows through the contact: see :mod:`roughvisc.observables`."""
 
 from __future__ import annotations
 

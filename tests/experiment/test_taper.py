@@ -5,10 +5,10 @@ import pytest
 from support import friction_whole, run_whole, simulate_whole
 
 import roughvisc as rv
+from roughvisc.observables.area_theories import nominal_area_of
 from roughvisc.study.cost.estimate import coarse
 from roughvisc.study.storage.store import whole_result
 from roughvisc.topography.grid import nominal_area
-from roughvisc.views.observables.area_theories import nominal_area_of
 
 SIZE, SHAPE = (1e-3, 9e-4), (80, 72)
 RUBBER = rv.elastic(1e6)

@@ -9,8 +9,8 @@ from rich.console import Console
 from support import simulate_whole
 
 import roughvisc as rv
+from roughvisc import observables
 from roughvisc.topography.grid import labelled
-from roughvisc.views import observables
 from roughvisc.views.console.tables import scan_table
 from roughvisc.views.figures.fields import plane_ratio, plane_unit
 

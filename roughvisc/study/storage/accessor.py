@@ -22,7 +22,7 @@ _FORMATS = "roughvisc.study.storage.formats"
 #: Module that opens a result.
 _STORE = "roughvisc.study.storage.store"
 #: beginning of a method's name -> module whose public names follow
-_ROOMS = {"": "roughvisc.views.observables", _PLOT: "roughvisc.views.plot"}
+_ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.views.plot"}
 
 
 @xr.register_dataset_accessor("roughvisc")

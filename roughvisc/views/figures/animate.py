@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.observables import contact, history
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
@@ -46,7 +47,6 @@ from roughvisc.views.figures.fields import (
 )
 from roughvisc.views.figures.sections import cut_position, deformed_line
 from roughvisc.views.figures.transport import draw_flux, flux_of, rate_unit, visible, with_leak_rate
-from roughvisc.views.observables import contact, history
 
 #: A map's side along y over that along x from which the map takes the whole height.
 _TALL = 1.2

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
+from roughvisc.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -29,7 +30,6 @@ from roughvisc.views.figures.axes import (
     unit_for,
 )
 from roughvisc.views.figures.coarsened import row_parts
-from roughvisc.views.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
 
 _MOST_LINES = 24
 #: Contact clusters below which their number and their areas are no distribution.

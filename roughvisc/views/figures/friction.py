@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.observables import history
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures.axes import (
@@ -29,7 +30,6 @@ from roughvisc.views.figures.axes import (
 )
 from roughvisc.views.figures.fields import draw_field, label_maps, map_panels, measured_part
 from roughvisc.views.figures.histories import failed_frames, leave_room
-from roughvisc.views.observables import history
 
 #: Direction of the motion -> where it points on a map.
 _ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}

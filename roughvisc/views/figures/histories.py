@@ -14,6 +14,11 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.observables import area_by_theory
+from roughvisc.observables import history as over_steps
+from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
+from roughvisc.observables.cycles import cycle_energy, has_cycles
+from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.axes import axis_of
@@ -36,11 +41,6 @@ from roughvisc.views.figures.axes import (
     unit_for,
     verbatim,
 )
-from roughvisc.views.observables import area_by_theory
-from roughvisc.views.observables import history as over_steps
-from roughvisc.views.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
-from roughvisc.views.observables.cycles import cycle_energy, has_cycles
-from roughvisc.views.observables.derived import material_of
 
 _PANELS = (
     ("force", BLUE),
@@ -193,7 +193,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         One case's result.
     persson : bool
         Whether to draw the contact area by Persson's theory too, up to where the load falls: see
-        :func:`~roughvisc.views.observables.area_by_theory`.
+        :func:`~roughvisc.observables.area_by_theory`.
 
     Returns
     -------
@@ -389,7 +389,7 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     The line of low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_, up to the nominal area; that of
     Persson's theory [2]_ :math:`A = A_0 \, \mathrm{erf}(\sqrt2 F / (A_0 E^* h'_\mathrm{rms}))`; both with the
     root-mean-square slope of the first case's surface. What a result's own history of load gives by them is
-    :func:`~roughvisc.views.observables.area_by_theory`.
+    :func:`~roughvisc.observables.area_by_theory`.
 
     References
     ----------

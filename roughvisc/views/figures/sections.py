@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import axis_of
@@ -29,7 +30,6 @@ from roughvisc.views.figures.axes import (
 )
 from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
 from roughvisc.views.figures.fields import measured_part, plane_unit
-from roughvisc.views.observables import contact
 
 
 def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:

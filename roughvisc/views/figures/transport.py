@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
 from roughvisc.errors import InputError
+from roughvisc.observables import asked
+from roughvisc.observables import leakage as derived
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import axis_of
@@ -34,8 +36,6 @@ from roughvisc.views.figures.axes import (
 )
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
 from roughvisc.views.figures.histories import leave_room, marker_of
-from roughvisc.views.observables import asked
-from roughvisc.views.observables import leakage as derived
 
 #: Cells in contact on a map of the flow; fluid that stands still is white.
 _TOUCHING = "0.6"

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 from PIL import Image
 
+from roughvisc.observables import contact, history
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
@@ -22,7 +23,6 @@ from roughvisc.views.figures.axes import RowAxis, Unit, at_rows, fullest_frame, 
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
 from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, value_scale
 from roughvisc.views.figures.sections import cut_position, deformed_line
-from roughvisc.views.observables import contact, history
 
 #: Frames a case and cells along the longer side of a map, the richest first.
 _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64), (2, 48))

@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from roughvisc.observables import history
 from roughvisc.views.figures.axes import RowAxis, Unit, new_figure, styled
-from roughvisc.views.observables import history
 from roughvisc.views.sweep_figures.cases import (
     Parameter,
     cases_of,

@@ -17,9 +17,9 @@ from PIL import Image
 from support import labels, lines, text_boxes
 
 import roughvisc as rv
+from roughvisc import observables, plot
 from roughvisc.errors import InputError
 from roughvisc.topography.parameters import levelled_parameters
-from roughvisc.views import observables, plot
 from roughvisc.views.figures import animate as animation
 from roughvisc.views.figures import axes, sections
 

@@ -9,8 +9,8 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.views.observables.conductance import conductance
-from roughvisc.views.observables.leakage import leakage
+from roughvisc.observables.conductance import conductance
+from roughvisc.observables.leakage import leakage
 
 #: Table of ``[observe]`` -> what derives it from a result; the keys of the table are its keyword arguments.
 OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conductance": conductance}

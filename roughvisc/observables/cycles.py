@@ -11,8 +11,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
-from roughvisc.views.observables.derived import need_history
-from roughvisc.views.observables.response import history
+from roughvisc.observables.derived import need_history
+from roughvisc.observables.response import history
 
 #: Steps in a cycle below which its loop is not known.
 _FEWEST = 8

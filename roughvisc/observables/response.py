@@ -10,7 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.groups import group_of
 from roughvisc.labels import describe
-from roughvisc.views.observables.derived import along_time, need_history
+from roughvisc.observables.derived import along_time, need_history
 
 
 def history(dataset: xr.Dataset) -> xr.Dataset:
@@ -90,7 +90,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
 def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
     """Slope of force over approach along the history, with the creep between kept times in it.
 
-    The stiffness of the contact itself at a time is :func:`~roughvisc.views.observables.incremental_stiffness`.
+    The stiffness of the contact itself at a time is :func:`~roughvisc.observables.incremental_stiffness`.
 
     Parameters
     ----------

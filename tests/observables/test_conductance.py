@@ -12,8 +12,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
+from roughvisc.observables import conductance, incremental_stiffness, secant_stiffness
 from roughvisc.variables import VARIABLES
-from roughvisc.views.observables import conductance, incremental_stiffness, secant_stiffness
 
 RADIUS = 1e-2
 RUBBER = rv.zener(3e6, 1e6, 1e5)

@@ -50,7 +50,7 @@ def study(tmp_path):
 @pytest.fixture
 def counted(monkeypatch):
     """Names of the observables that were derived."""
-    from roughvisc.views.observables import tables
+    from roughvisc.observables import tables
 
     derived = []
     plain = tables.OBSERVABLES["leakage"]

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import xarray as xr
 
-from roughvisc.views.observables.area_theories import area_by_theory
-from roughvisc.views.observables.conductance import conductance
-from roughvisc.views.observables.cycles import cycle_energy
-from roughvisc.views.observables.densities import gap_distribution, gap_statistics, pressure_distribution
-from roughvisc.views.observables.frozen import incremental_stiffness
-from roughvisc.views.observables.leakage import leakage
-from roughvisc.views.observables.response import area_growth, history, older_name, secant_stiffness, stiffness, work
-from roughvisc.views.observables.spots import cluster_areas, clusters, contact, percolation
-from roughvisc.views.observables.tables import asked
+from roughvisc.observables.area_theories import area_by_theory
+from roughvisc.observables.conductance import conductance
+from roughvisc.observables.cycles import cycle_energy
+from roughvisc.observables.densities import gap_distribution, gap_statistics, pressure_distribution
+from roughvisc.observables.frozen import incremental_stiffness
+from roughvisc.observables.leakage import leakage
+from roughvisc.observables.response import area_growth, history, older_name, secant_stiffness, stiffness, work
+from roughvisc.observables.spots import cluster_areas, clusters, contact, percolation
+from roughvisc.observables.tables import asked
 
 __all__ = [
     "area_by_theory",

@@ -7,8 +7,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.topography.blocks import count_of, mean_of, median_of, row_blocks
-from roughvisc.views.observables.derived import frame_by_frame, need
 
 
 def _bin_edges(field: xr.DataArray, bins) -> np.ndarray:

@@ -11,10 +11,10 @@ from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.mechanics.transport.flow import Flow, fluxes
 from roughvisc.mechanics.transport.flow import flow as flow_through
+from roughvisc.observables.derived import need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import stated_quantity
 from roughvisc.variables.transport import LEAK_MEANINGS
-from roughvisc.views.observables.derived import need
 
 #: Distance of the bounds, relative, up to which a leak rate counts as known.
 _CERTIFIED = 1e-6

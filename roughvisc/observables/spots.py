@@ -10,10 +10,10 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.observables.connectivity import cluster_sizes, percolates
+from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.variables.axes import axis_of
-from roughvisc.views.observables.connectivity import cluster_sizes, percolates
-from roughvisc.views.observables.derived import frame_by_frame, need
 
 
 def _is_periodic(dataset: xr.Dataset) -> bool:

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.observables import asked, leakage
 from roughvisc.variables import VARIABLES
-from roughvisc.views.observables import asked, leakage
 
 CELL = (2e-6, 3e-6)
 

@@ -11,10 +11,10 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.observables.derived import frame_by_frame, material_of
+from roughvisc.observables.spots import contact
 from roughvisc.topography.grid import spacing
 from roughvisc.units import quantity
-from roughvisc.views.observables.derived import frame_by_frame, material_of
-from roughvisc.views.observables.spots import contact
 
 
 def incremental_stiffness(

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.observables.derived import material_of, need_history
+from roughvisc.observables.response import history
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.views.observables.derived import material_of, need_history
-from roughvisc.views.observables.response import history
 
 
 def persson_fraction(strain: ArrayLike) -> Any:

@@ -10,10 +10,10 @@ import sample_results as made
 import xarray as xr
 
 import roughvisc as rv
+from roughvisc import observables
 from roughvisc.errors import InputError
+from roughvisc.observables import connectivity
 from roughvisc.variables import VARIABLES
-from roughvisc.views import observables
-from roughvisc.views.observables import connectivity
 
 CHECKERBOARD = np.indices((6, 8)).sum(axis=0) % 2 == 0
 RING = np.array(
@@ -290,7 +290,7 @@ def test_observables__are_public_functions_with_docstrings():
     for name in rv.observables.__all__:
         function = getattr(rv.observables, name)
         assert inspect.isfunction(function)
-        assert function.__module__.startswith("roughvisc.views.observables")
+        assert function.__module__.startswith("roughvisc.observables")
         for section in ("Parameters", "Returns", "Raises"):
             assert re.search(rf"^ *{section}\n *-+$", function.__doc__, re.MULTILINE), f"{name}: no {section}"
 

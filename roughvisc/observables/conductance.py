@@ -11,9 +11,9 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
+from roughvisc.observables.connectivity import label_clusters
+from roughvisc.observables.frozen import over_frames
 from roughvisc.study.statement.resistivity import Kind, resistivities
-from roughvisc.views.observables.connectivity import label_clusters
-from roughvisc.views.observables.frozen import over_frames
 
 
 def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Kind | None = None) -> xr.Dataset:

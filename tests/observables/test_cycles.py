@@ -8,9 +8,9 @@ import sample_results as made
 import xarray as xr
 
 import roughvisc as rv
+from roughvisc import observables, plot
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
-from roughvisc.views import observables, plot
 
 PERIOD, RADIUS = 0.5, 1e-4
 RUBBER = rv.zener(3e6, 1e6, 1e5)
