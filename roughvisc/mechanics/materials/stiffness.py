@@ -50,12 +50,16 @@ def stiffened(material: Material, factor: float) -> Material:
     if isinstance(material, Pair):
         return pair(stiffened(material.a, factor), stiffened(material.b, factor))
     if isinstance(material, Prony):
-        softer = tuple(one / factor for one in material.compliances)
-        changes = {"glassy": material.glassy / factor, "fluidity": material.fluidity / factor, "compliances": softer}
-        return dataclasses.replace(material, **changes, note=_noted(material.note, factor))
+        return dataclasses.replace(
+            material,
+            glassy=material.glassy / factor,
+            fluidity=material.fluidity / factor,
+            compliances=tuple(one / factor for one in material.compliances),
+            note=_noted(material.note, factor),
+        )
     if isinstance(material, PowerLaw):
-        changes = {"glassy": material.glassy / factor, "coefficient": material.coefficient / factor}
-        return dataclasses.replace(material, **changes, note=_noted(material.note, factor))
+        note, coefficient = _noted(material.note, factor), material.coefficient / factor
+        return dataclasses.replace(material, glassy=material.glassy / factor, coefficient=coefficient, note=note)
     if isinstance(material, Tabulated):
         softer = tuple(one / factor for one in material.compliances)
         return dataclasses.replace(material, compliances=softer, remark=_noted(material.remark, factor))
