@@ -80,8 +80,8 @@ def example(commands: Path, at: Path) -> None:
     empty = at / "empty"
     empty.mkdir()
     ran(commands / "roughvisc", "new", at=empty)
-    ran(commands / "roughvisc", "run", "ground_steel-study.toml", at=empty)
-    (result,) = (empty / "results" / "ground_steel-study").glob("*.nc")
+    ran(commands / "roughvisc", "run", "focus_variation-study.toml", at=empty)
+    (result,) = (empty / "results" / "focus_variation-study").glob("*.nc")
     ran(commands / "roughvisc", "verify", result.parent, at=empty)
 
 

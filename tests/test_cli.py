@@ -249,15 +249,15 @@ def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan
 def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     status, out, err = invoke("new")
     assert (status, err) == (0, "")
-    assert "Scan: ground_steel.x3p\nStudy: ground_steel-study.toml\nNext: " in out
-    (case,) = read_cases("ground_steel-study.toml")
-    assert case.height().shape == (256, 224)
-    ds = rv.run(vary(case, {"surface.resample": [24, 21], "keep.times": 2}), progress=False)
+    assert "Scan: focus_variation.x3p\nStudy: focus_variation-study.toml\nNext: " in out
+    (case,) = read_cases("focus_variation-study.toml")
+    assert case.height().shape == (320, 512), "with its mirror images"
+    ds = rv.run(vary(case, {"surface.resample": [20, 32], "keep.times": 2}), progress=False)
     assert 0 < float(ds.contact_fraction[-1]) < 1
     assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"
-    (tmp_path / "ground_steel.x3p").write_bytes(b"mine")
+    (tmp_path / "focus_variation.x3p").write_bytes(b"mine")
     for arguments, words in (
-        (["-o", "third.toml"], "ground_steel.x3p: exists already, and is not written over"),
+        (["-o", "third.toml"], "focus_variation.x3p: exists already, and is not written over"),
         (["-o", "third.toml", "--unit", "um"], "--unit: says how a file is read, and none is named: expected FILE"),
     ):
         status, _, err = invoke("new", *arguments)
@@ -268,9 +268,9 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
 
 def test_help__names_what_the_example_has_written(invoke):
     assert invoke("new")[0] == 0
-    (case,) = read_cases("ground_steel-study.toml")
+    (case,) = read_cases("focus_variation-study.toml")
     results, traded = result_folder(case), trade_folder(case, None)
-    there = {"ground_steel.x3p", "ground_steel-study.toml", str(results), str(traded / "trade.nc")}
+    there = {"focus_variation.x3p", "focus_variation-study.toml", str(results), str(traded / "trade.nc")}
     named = set()
     for command in (main, *main.commands.values()):
         lines = re.findall(r"^ *roughvisc (\w+) ?(.*)$", command.help, re.M)

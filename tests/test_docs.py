@@ -198,7 +198,7 @@ def test_notebook__runs_and_shows_what_it_gives(tmp_path, monkeypatch):
         for cell in cells:
             exec("".join(line for line in cell["source"] if not line.startswith("%")), space)
     sys.modules["matplotlib.pyplot"].close("all")
-    assert space["both"].shape == (64, 60)
+    assert space["both"].shape == (160, 256)
 
 
 #: A piece of code in the text of a page, and the paths and functions among them.

@@ -160,7 +160,7 @@ def main() -> None:
     \b
     Example:
       roughvisc new
-      roughvisc scan ground_steel.x3p
-      roughvisc run ground_steel-study.toml
-      roughvisc report results/ground_steel-study
+      roughvisc scan focus_variation.x3p
+      roughvisc run focus_variation-study.toml
+      roughvisc report results/focus_variation-study
     """

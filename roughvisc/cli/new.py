@@ -21,14 +21,14 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
 
     The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
     on a rubber with a pressure that brings about 5 per cent of its area into contact, found by pressing it. FILE is an
-    instrument file or a surface card; without one a scan is written here to try things with, ground_steel.x3p.
+    instrument file or a surface card; without one a scan is written here to try things with, focus_variation.x3p.
 
     \b
     Example:
       roughvisc new
-      roughvisc plan ground_steel-study.toml
-      roughvisc run ground_steel-study.toml
-      roughvisc new ground_steel.x3p --out other.toml
+      roughvisc plan focus_variation-study.toml
+      roughvisc run focus_variation-study.toml
+      roughvisc new focus_variation.x3p --out other.toml
     """
     from rich.console import Console
 

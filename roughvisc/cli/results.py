@@ -21,8 +21,8 @@ def plot(result: Path, out: Path | None) -> None:
 
     \b
     Example:
-      roughvisc plot results/ground_steel-study --out figures
-      roughvisc plot results/ground_steel-study-trade/trade.nc
+      roughvisc plot results/focus_variation-study --out figures
+      roughvisc plot results/focus_variation-study-trade/trade.nc
     """
     from rich.console import Console
 
@@ -62,7 +62,7 @@ def report(results: Path, output: Path | None) -> None:
 
     \b
     Example:
-      roughvisc report results/ground_steel-study -o steel.html
+      roughvisc report results/focus_variation-study -o report.html
     """
     from rich.console import Console
 
@@ -92,7 +92,7 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 
     \b
     Example:
-      roughvisc audit results/ground_steel-study --work-of-adhesion "50 mJ/m^2"
+      roughvisc audit results/focus_variation-study --work-of-adhesion "50 mJ/m^2"
     """
     from rich.console import Console
 

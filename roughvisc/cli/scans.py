@@ -42,8 +42,8 @@ def scan(
 
     \b
     Example:
-      roughvisc scan ground_steel.x3p --plot steel.png
-      roughvisc scan ground_steel.x3p --to steel.nc --card
+      roughvisc scan focus_variation.x3p --plot scan.png
+      roughvisc scan focus_variation.x3p --to scan.nc --card
     """
     from rich.console import Console
 

@@ -42,8 +42,8 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
 
     \b
     Example:
-      roughvisc run ground_steel-study.toml --out steel
-      roughvisc run ground_steel-study.toml --scheduler-file scheduler.json
+      roughvisc run focus_variation-study.toml --out results
+      roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
 
@@ -206,7 +206,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 
     \b
     Example:
-      roughvisc plan ground_steel-study.toml
+      roughvisc plan focus_variation-study.toml
     """
     from rich.console import Console
 
@@ -239,8 +239,8 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     \b
     Example:
-      roughvisc trade ground_steel-study.toml
-      roughvisc trade ground_steel-study.toml --apply 1%
+      roughvisc trade focus_variation-study.toml
+      roughvisc trade focus_variation-study.toml --apply 1%
     """
     from dask.system import CPU_COUNT
     from rich.console import Console

@@ -21,7 +21,7 @@ def verify(results: Path) -> None:
 
     \b
     Example:
-      roughvisc verify results/ground_steel-study
+      roughvisc verify results/focus_variation-study
     """
     from roughvisc.study.storage.checksum import UNSEALED
     from roughvisc.study.storage.upkeep import verify as verified
@@ -53,7 +53,7 @@ def clean(results: Path, everything: bool, superseded: bool) -> None:
 
     \b
     Example:
-      roughvisc clean results/ground_steel-study
+      roughvisc clean results/focus_variation-study
     """
     from roughvisc.study.storage.upkeep import clean_folder, kept_of_other_versions
 

@@ -1,27 +1,28 @@
-"""The scan that ships with roughvisc, to try things with."""
+"""The measured scan that ships with roughvisc, to try things with."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-#: Its name, and the folders that hold it: of an installation, and of a checkout.
-EXAMPLE = "ground_steel.x3p"
+#: Name of the file, and the folders where it may be: in an installation, and in a checkout.
+EXAMPLE = "focus_variation.x3p"
 _PACKAGE = Path(__file__).parents[1]
 _HELD_IN = (_PACKAGE / "example", _PACKAGE.parent / "surfaces")
 
 
 def example_scan() -> Path:
-    """Path of a scan that ships with roughvisc: ground steel, tilted, with spikes and missing points.
+    """Path of the measured scan that ships with roughvisc.
 
     Returns
     -------
     Path
-        An X3P file, 256 x 224 points. It is to be read; ``roughvisc new`` writes a copy of one's own.
+        An X3P file, 160 x 256 points over 70 um x 112 um, measured by focus variation and not levelled. Do not change
+        it; ``roughvisc new`` writes a copy into the current folder.
 
     Examples
     --------
     >>> import roughvisc as rv
     >>> rv.open_scan(rv.example_scan()).shape
-    (256, 224)
+    (160, 256)
     """
     return next(folder / EXAMPLE for folder in _HELD_IN if (folder / EXAMPLE).exists())

@@ -503,6 +503,27 @@ def test_ground_steel__presses_nicely_after_conditioning():
     assert h.attrs["filled_points"] == int(np.isnan(raw).sum()) + h.attrs["outliers"]
 
 
+@real
+def test_focus_variation__is_the_inside_of_the_original():
+    shipped, original = open_scan(ROOT / "surfaces" / "focus_variation.x3p"), open_scan(SCANS / "al3d-1.al3d")
+    inside = original.values[20:-20, 20:-20]
+    assert shipped.shape == inside.shape
+    off = inside - shipped.values
+    assert np.ptp(off) < 1e-12, "a constant alone is taken off"
+    assert spacing(shipped) == pytest.approx(spacing(original), rel=1e-9)
+
+
+def test_focus_variation__is_small_named_and_tilted():
+    path = ROOT / "surfaces" / "focus_variation.x3p"
+    assert path.stat().st_size < 100_000, "every wheel carries it"
+    raw, h = open_scan(path), open_scan(path.with_suffix(".toml"))
+    assert h.attrs["source"].startswith("SurfaceTopography, test/file_format_examples/al3d-1.al3d at commit 119cb66")
+    assert "Alicona" in h.attrs["instrument"]
+    assert "Alicona" in raw.attrs["instrument"]
+    assert np.isfinite(raw).all()
+    assert float(raw.std()) > 20 * float(h.std()), "the tilt is left for `level`"
+
+
 def test_ground_steel__script_writes_the_file_that_ships(tmp_path):
     script = ROOT / "workflows" / "make_ground_steel.py"
     assert len(script.read_text().splitlines()) <= 60
