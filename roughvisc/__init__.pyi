@@ -27,11 +27,13 @@ from roughvisc.mechanics.materials.temperature import arrhenius_shift as arrheni
 from roughvisc.mechanics.materials.temperature import shifted as shifted
 from roughvisc.mechanics.materials.temperature import wlf_shift as wlf_shift
 from roughvisc.mechanics.stepping.program import Program as Program
+from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.observed import observe as observe
+from roughvisc.study.statement.case import Case as Case
 from roughvisc.study.statement.case import read_cases as read_cases
 from roughvisc.study.statement.case import read_study as read_study
 from roughvisc.study.statement.case import study_schema as study_schema

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 
 import xarray as xr
 
-from roughvisc.errors import former_arguments
+from roughvisc.errors import InputError, former_arguments
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.groups import root_of
@@ -15,7 +16,7 @@ from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
 from roughvisc.problem import Problem
-from roughvisc.settings import Edge, Memory, Method, Missing, Settings, TimeStep
+from roughvisc.settings import Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
 
@@ -24,9 +25,10 @@ Progress = Callable[[float, float], None]
 _BODY = "give a body in place of the material: rv.sheet(material, thickness, base)"
 _OWN = "give a body in place of the material: rv.Body(material, kernel)"
 _FORMER = {"thickness": _BODY, "base": _BODY, "kernel": _OWN}
+_NUMERICS = {one.name: f"write numerics=rv.Numerics({one.name}=...)" for one in fields(Numerics)}
 
 
-@former_arguments(**_FORMER)
+@former_arguments(**_FORMER, **_NUMERICS)
 def simulate(
     height: xr.DataArray,
     material: Material | Body,
@@ -34,14 +36,12 @@ def simulate(
     *,
     boundary: Boundary = Settings.boundary,
     tolerance: float = Settings.tolerance,
-    time_step: TimeStep = Settings.time_step,
-    times: int | Sequence[float] | None = Settings.times,
+    times: int | Sequence[float | str] | None = Settings.times,
     fields: Sequence[str] = Settings.fields,
-    method: Method = Settings.method,
     missing: Missing = Settings.missing,
     edge: Edge = Settings.edge,
-    memory: Memory = Settings.memory,
     grid_error: bool = Settings.grid_error,
+    numerics: Numerics = Numerics(),
     threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
@@ -67,26 +67,22 @@ def simulate(
         Asked of ``stated_error`` at every kept time: the error that time steps, contact solver and series leave of
         pressure (L1), force and approach, over the largest force and approach so far. Rows that miss it state by how
         much, and ``accuracy_note`` counts them; the error of the grid comes on top.
-    time_step : "auto" or float
-        Steps chosen by the tolerance, or of a given length. [s]
-    times : int or sequence of float, optional
+    times : int or sequence of float or str, optional
         Times whose fields are kept, stepped onto exactly: a count, the corners of the program and the rest where the
         result changes; a list; or None, all corners and every accepted step that keeps the tolerance. [s]
     fields : sequence of str
         Fields to keep, of ``pressure``, ``gap``, ``displacement``.
-    method : {"fast", "seed"}
-        ``seed`` is the seed paper's algorithm, slips corrected and not accelerated.
     missing : {"refuse", "absent"}
         Missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
         In free space, whether contact may reach the border of the grid. Where it is accepted, the attribute ``edge``
         of the result says so, and ``edge_note`` when contact came to the border, where the surface acts as a punch.
-    memory : {"auto", "direct"}
-        ``direct`` keeps every past pressure, whatever the material: dearer, and independent of any series.
     grid_error : bool
         Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
         the grid makes: ``grid_error``, ``grid_error_area`` and the bounds ``contact_area_lower`` and
         ``contact_area_upper`` at the kept times.
+    numerics : Numerics
+        Settings that are rarely changed: length of the time steps, algorithm, and memory of past pressures.
     threads : int, optional
         Of a large grid; the bits are the same with any number. Default: as ``scipy.fft.set_workers`` has it; where
         nobody has set that, all cores the process may use, but one beside other threads or in a process that was
@@ -122,16 +118,16 @@ def simulate(
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """
+    if not isinstance(numerics, Numerics):
+        raise InputError(f"numerics is {numerics!r}: expected rv.Numerics(...)")
     settings = Settings(
+        **vars(numerics),
         boundary=boundary,
         tolerance=tolerance,
-        time_step=time_step,
         times=times,
         fields=fields,
-        method=method,
         missing=missing,
         edge=edge,
-        memory=memory,
         grid_error=grid_error,
     )
     problem = Problem(height, body_of(material), settings)

@@ -1,6 +1,7 @@
 """Settings of a solve, each declared once: its default, what it may be, what it means, and where it stands.
 
-The signature in :mod:`roughvisc.api` and the table ``[keep]`` of a study repeat the names alone.
+The signature in :mod:`roughvisc.api` and the table ``[keep]`` of a study repeat the names alone. Settings that are
+rarely changed stand in :class:`Numerics`, which :func:`roughvisc.simulate` takes as one argument.
 
 From the entries here follow the checks of :class:`Settings`, the tables ``[solve]`` and ``[keep]`` of a study file with
 the page of their keys, the key of a case, and what is refused of experiments over another axis than time.
@@ -17,14 +18,14 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import Boundary
-from roughvisc.units import range_in_words, within
+from roughvisc.units import in_si, quantity, range_in_words, within
 from roughvisc.variables import FIELDS
 
 Method = Literal["fast", "seed"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
 Memory = Literal["auto", "direct"]
-TimeStep = float | Literal["auto"]
+TimeStep = float | str | Literal["auto"]
 
 #: Rounding leaves so much of the numbers that are held against a tolerance: a march to a finer one would not end.
 FINEST_TOLERANCE = 1e-12
@@ -88,7 +89,11 @@ def _times(value: Any) -> int | tuple[float, ...] | None:
             raise _refusal("times", int(value), f"{wanted}; at most {MOST_TIMES} times")
         return int(value)
     try:
-        return tuple(np.unique(np.asarray(value, dtype=float)).tolist())
+        numbers = in_si(value, "s", "times")
+    except InputError as error:
+        raise InputError(f"{error}; times may be {wanted}") from None
+    try:
+        return tuple(np.unique(np.asarray(numbers, dtype=float)).tolist())
     except (TypeError, ValueError):
         raise _refusal("times", value, wanted) from None
 
@@ -106,15 +111,71 @@ def _fields(value: Any) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class Numerics:
+    """Settings of a solve that are rarely changed.
+
+    Parameters
+    ----------
+    time_step : "auto" or float or str
+        Steps chosen by the tolerance, or of a given length. [s]
+    method : {"fast", "seed"}
+        ``seed`` is the seed paper's algorithm, slips corrected and not accelerated.
+    memory : {"auto", "direct"}
+        ``direct`` keeps every past pressure, whatever the material: slower, and independent of any series.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected.
+
+    Examples
+    --------
+    >>> Numerics(time_step="10 ms")
+    Numerics(time_step=0.01, method='fast', memory='auto')
+    """
+
+    time_step: TimeStep = setting(
+        "auto",
+        "steps chosen by the tolerance, or of one length",
+        '"10 ms"',
+        bounds={"above": 0},
+        noun="a time",
+        unit="s",
+        always_in_key=True,
+        only_over="time",
+    )
+    method: Method = setting(
+        "fast",
+        "`fast`; or `seed`: the algorithm of the paper that the method started from",
+        '"seed"',
+        in_attributes=True,
+        always_in_key=True,
+        only_over="time",
+    )
+    memory: Memory = setting(
+        "auto",
+        "exponentials as far as they are accurate; or every past pressure",
+        '"direct"',
+        only_over="time",
+    )
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            object.__setattr__(self, one.name, _checked(one.name, ENTRIES[one.name], getattr(self, one.name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(Numerics):
     """How an experiment is computed and what is kept of it; see :func:`roughvisc.simulate`.
 
     The defaults stand here alone: of :func:`roughvisc.simulate`, and of the tables of a study file.
 
     Parameters
     ----------
-    boundary, tolerance, time_step, times, fields, method, missing, edge, memory, grid_error
+    boundary, tolerance, times, fields, missing, edge, grid_error
         As :func:`roughvisc.simulate` has them; any sequence of times or fields becomes a tuple.
+    time_step, method, memory
+        As :class:`Numerics` has them.
 
     Raises
     ------
@@ -127,7 +188,7 @@ class Settings:
     >>> Settings(tolerance=1e-2, times=[1.0, 0.5]).times
     (0.5, 1.0)
     >>> Settings().to_attributes()
-    {'boundary': 'free', 'tolerance': 0.001, 'method': 'fast'}
+    {'method': 'fast', 'boundary': 'free', 'tolerance': 0.001}
     """
 
     boundary: Boundary = setting(
@@ -145,17 +206,7 @@ class Settings:
         in_attributes=True,
         always_in_key=True,
     )
-    time_step: TimeStep = setting(
-        "auto",
-        "steps chosen by the tolerance, or of one length",
-        '"10 ms"',
-        bounds={"above": 0},
-        noun="a time",
-        unit="s",
-        always_in_key=True,
-        only_over="time",
-    )
-    times: int | Sequence[float] | None = setting(
+    times: int | Sequence[float | str] | None = setting(
         None,
         "instants in the result: all steps, so many, denser after each corner, or these",
         "50",
@@ -165,14 +216,6 @@ class Settings:
     )
     fields: Sequence[str] = setting(
         ("pressure", "gap"), "fields in the result", '["pressure", "gap"]', table="keep", check=_fields
-    )
-    method: Method = setting(
-        "fast",
-        "`fast`; or `seed`: the algorithm of the paper that the method started from",
-        '"seed"',
-        in_attributes=True,
-        always_in_key=True,
-        only_over="time",
     )
     missing: Missing = setting(
         "refuse",
@@ -188,19 +231,9 @@ class Settings:
         always_in_key=True,
         only_over="time",
     )
-    memory: Memory = setting(
-        "auto",
-        "exponentials as far as they are accurate; or every past pressure",
-        '"direct"',
-        only_over="time",
-    )
     grid_error: bool = setting(
         False, "whether to bound the error of the grid, by two more computations on coarser ones", "true"
     )
-
-    def __post_init__(self) -> None:
-        for name, entry in ENTRIES.items():
-            object.__setattr__(self, name, _checked(name, entry, getattr(self, name)))
 
     def to_attributes(self) -> dict[str, Any]:
         """Those that stand in the attributes of a result."""
@@ -237,6 +270,11 @@ def _checked(name: str, entry: Entry, value: Any) -> Any:
     word = WORD_OR_NUMBER.get(name)
     if isinstance(value, str) and value == word:
         return value
+    if isinstance(value, str) and entry.unit != "1":
+        try:
+            value = quantity(value, entry.unit, name)
+        except InputError as error:
+            raise InputError(f"{error}; or {word!r}" if word else str(error)) from None
     if not (isinstance(value, int | float) and math.isfinite(value) and within(value, **entry.bounds)):
         wanted = f"{entry.noun}{range_in_words(**entry.bounds)}" + (f" [{entry.unit}]" if entry.unit != "1" else "")
         raise _refusal(name, value, wanted if word is None else f"{word!r} or {wanted}")

@@ -89,6 +89,39 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     return result
 
 
+def in_si(value: Any, unit: str, name: str) -> Any:
+    """A value with the texts in it as numbers; anything else stays as it is.
+
+    Parameters
+    ----------
+    value : Any
+        A number or text; or a list, tuple or dictionary of such values.
+    unit : str
+        The unit expected of text.
+    name : str
+        What the value is given as, for the message.
+
+    Raises
+    ------
+    InputError
+        As :func:`quantity` does, of the first text that is no quantity of this kind.
+
+    Examples
+    --------
+    >>> in_si(("1 mm", 2.0), "m", "size"), in_si(None, "m", "size")
+    ((0.001, 2.0), None)
+    """
+    if isinstance(value, str):
+        return quantity(value, unit, name)
+    if isinstance(value, Mapping):
+        return {key: in_si(one, unit, f"{name}[{key!r}]") for key, one in value.items()}
+    if not isinstance(value, list | tuple) or not any(
+        issubclass(kind, str | list | tuple) for kind in {*map(type, value)}
+    ):
+        return value
+    return type(value)([in_si(one, unit, f"{name}[{number}]") for number, one in enumerate(value)])
+
+
 def number_and_unit(text: str) -> tuple[float, str]:
     """Number and unit of a quantity as they are written.
 

@@ -142,7 +142,7 @@ def test_what_cannot_be_represented__is_refused(program, message):
 
 def test_steps_that_do_not_move_time__are_refused():
     with pytest.raises(rv.InputError, match="time_step is 1e-15 s and the program ends at 100 s"):
-        simulate(BALL, ZENER, rv.Program().load(1e-3, over=100.0), time_step=1e-15)
+        simulate(BALL, ZENER, rv.Program().load(1e-3, over=100.0), numerics=rv.Numerics(time_step=1e-15))
 
 
 def test_shortest_segment__is_computed():
@@ -492,6 +492,6 @@ def test_a_flat_periodic_surface_in_full_contact_has_no_residual(material):
     for amplitude in (0.0, 1e-18):
         for step in ("auto", 0.01):
             surface = rv.wavy(1.0, 1e-3, 1e-3, (12, 9)) * amplitude
-            ds = simulate(surface, material, program, boundary="periodic", time_step=step)
+            ds = simulate(surface, material, program, boundary="periodic", numerics=rv.Numerics(time_step=step))
             np.testing.assert_allclose(ds.pressure[-1], 1e-3 / 1e-6, rtol=1e-9)
             assert ds.roughvisc.accuracy.residual.max() < 1e-9

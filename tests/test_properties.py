@@ -160,7 +160,11 @@ def test_work_of_a_jump__is_two_fifths_under_a_sphere(method):
     """Hertz, loaded at once: the stored energy, not half of force times approach."""
     ball = rv.sphere(1.0, 0.6, 41)
     ds = simulate(
-        ball, rv.elastic(1.0), rv.Program().load(0.02, over=0).hold(1.0), "free", method=method, time_step=1.0
+        ball,
+        rv.elastic(1.0),
+        rv.Program().load(0.02, over=0).hold(1.0),
+        "free",
+        numerics=rv.Numerics(method=method, time_step=1.0),
     )
     expected = 0.4 * float(ds.force[0] * ds.approach[0])
     # of second order in h / a = 0.094

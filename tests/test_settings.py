@@ -17,7 +17,7 @@ from support import changed_package
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.choice import Kind
-from roughvisc.settings import WORDS, Settings
+from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.statement.schema import study_schema
 from roughvisc.study.statement.schema.conditioning import Conditioned
@@ -43,7 +43,8 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
     assert {one.name: getattr(Settings(), one.name) for one in fields(Settings)} == USUAL
     signature = inspect.signature(rv.simulate).parameters
     given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
-    assert given == USUAL | {"threads": None, "progress": True}
+    assert given | vars(given.pop("numerics")) == USUAL | {"threads": None, "progress": True}
+    assert given.keys().isdisjoint(vars(Numerics()))
     solve, keep = SolveSection(), KeepSection()
     assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
     assert (keep.fields, keep.times) == (USUAL["fields"], "all")
@@ -73,10 +74,24 @@ def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
         ({"tolerance": float("nan")}, "tolerance is nan: expected a number at least 1e-12 and below 1"),
         ({"time_step": 0}, "time_step is 0: expected 'auto' or a time above 0 [s]"),
         ({"time_step": float("inf")}, "time_step is inf: expected 'auto' or a time above 0 [s]"),
-        ({"time_step": "10 ms"}, "time_step is '10 ms': expected 'auto' or a time above 0 [s]"),
+        ({"time_step": "-10 ms"}, "time_step is -0.01: expected 'auto' or a time above 0 [s]"),
+        (
+            {"time_step": "10 mm"},
+            "time_step is '10 mm', which is in millimeter: expected a number in s, "
+            "or a string with a unit of its kind; or 'auto'",
+        ),
         ({"times": 0}, "times is 0: expected a positive count, a list, or None; at most 1000000 times"),
-        ({"times": "all"}, "times is 'all': expected a positive count, a list, or None"),
-        ({"times": [0.1, "soon"]}, "times is [0.1, 'soon']: expected a positive count, a list, or None"),
+        ({"times": {0.1}}, "times is {0.1}: expected a positive count, a list, or None"),
+        (
+            {"times": "all"},
+            "times is 'all', which is no quantity: expected a number in s, or a string with a unit of its kind; "
+            "times may be a positive count, a list, or None",
+        ),
+        (
+            {"times": [0.1, "soon"]},
+            "times[1] is 'soon', which is no quantity: expected a number in s, or a string with a unit of its kind; "
+            "times may be a positive count, a list, or None",
+        ),
         ({"fields": None}, "fields is None: expected some of pressure, gap, displacement"),
         ({"fields": ("gap", "stress")}, "fields holds 'stress': expected some of pressure, gap, displacement"),
     ],
@@ -85,6 +100,23 @@ def test_settings__refuse_with_what_was_found_and_what_was_expected(wrong, messa
     with pytest.raises(InputError) as caught:
         Settings(**wrong)
     assert str(caught.value) == message
+
+
+def test_times__are_numbers_or_text():
+    assert Settings(time_step="10 ms", times=["1 s", 0.25]) == Settings(time_step=0.01, times=(0.25, 1.0))
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(Numerics)])
+def test_numerics__are_one_argument(name):
+    """What is rarely changed is refused where it stood once, and checked where it is written."""
+    with pytest.raises(
+        InputError, match=rf"^{name} is no argument of simulate any more: write numerics=rv\.Numerics\("
+    ):
+        rv.simulate(None, None, None, **{name: "auto"})
+    with pytest.raises(InputError, match=f"^{name} is 'wrong'"):
+        rv.Numerics(**{name: "wrong"})
+    with pytest.raises(InputError, match=r"^numerics is \{'method': 'seed'\}: expected rv\.Numerics\("):
+        rv.simulate(None, rv.elastic(1e6), rv.Program(), numerics={"method": "seed"})
 
 
 def test_settings__are_one_frozen_value():
@@ -150,7 +182,7 @@ def test_study__states_the_settings_that_the_solver_gets(chosen):
 
 #: What a new setting touches, and above which line: its entry, the signature that takes it, and where it is used.
 NEW_SETTING = [
-    ("settings.py", "    def __post_init__(self) -> None:\n        for name, entry"),
+    ("settings.py", "    def to_attributes(self) -> dict[str, Any]:"),
     (
         "api.py",
         '    threads: int | None = None,\n    progress: bool | Progress = True,\n) -> xr.Dataset:\n    """Press',

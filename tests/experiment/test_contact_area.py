@@ -47,7 +47,7 @@ def pulled(request):
         patched.setattr(attempt, "_ALGEBRAIC", 1e-6)
         patched.setattr(attempt, "_SOLVED", 1e-4)
         runs = {
-            step: pressed(MATERIALS[request.param], PULLED, times=TIMES, time_step=step)
+            step: pressed(MATERIALS[request.param], PULLED, times=TIMES, numerics=rv.Numerics(time_step=step))
             for step in (0.1, 0.025, 1 / 80)
         }
     true = cells(runs.pop(1 / 80), "contact_area")

@@ -22,7 +22,11 @@ MIRRORED = {
     "periodic": (rv.wavy(0.02, 0.5, 1.0, (20, 26)), LOADED_TWICE, {"boundary": "periodic"}),
     "under given approach": (rv.sphere(1.0, 1.0, (24, 20)), rv.Program().approach(0.05, over=0.2).hold(0.3), {}),
     "mirrored scan": (rv.mirror(SCAN), LOADED_TWICE, {"boundary": "periodic"}),
-    "every pressure remembered": (rv.sphere(1.0, 0.7, (24, 20)), LOADED_TWICE, {"memory": "direct"}),
+    "every pressure remembered": (
+        rv.sphere(1.0, 0.7, (24, 20)),
+        LOADED_TWICE,
+        {"numerics": rv.Numerics(memory="direct", time_step=0.05)},
+    ),
 }
 
 
@@ -43,7 +47,8 @@ def profiles(monkeypatch):
 @pytest.mark.parametrize("name", MIRRORED)
 def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch):
     height, program, settings = MIRRORED[name]
-    given = {"times": 5, "tolerance": 1e-6, "time_step": 0.05, "fields": FIELDS, "progress": False, **settings}
+    usual = {"times": 5, "tolerance": 1e-6, "numerics": rv.Numerics(time_step=0.05), "fields": FIELDS}
+    given = {**usual, "progress": False, **settings}
     found = simulate_whole(height, ZENER, program, **given)
     monkeypatch.setattr("roughvisc.experiment.profile.is_mirrored", lambda height: False)
     whole = simulate_whole(height, ZENER, program, **given)
@@ -92,7 +97,8 @@ def test_border__of_a_quarter_is_that_of_the_surface():
 
 
 def test_seed_method__solves_all_of_it(profiles):
-    settings = {"method": "seed", "time_step": 0.1, "edge": "accept", "tolerance": 1e-2, "progress": False}
+    numerics = rv.Numerics(method="seed", time_step=0.1)
+    settings = {"numerics": numerics, "edge": "accept", "tolerance": 1e-2, "progress": False}
     simulate_whole(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
     assert not profiles[0].mirrored
 

@@ -37,7 +37,7 @@ def test_note__names_what_jumps(material, says):
 
 
 def test_note__counts_the_rows_that_state_more_than_the_tolerance():
-    ds = press(rv.zener(3e6, 1e6, 1e5), time_step=0.05)
+    ds = press(rv.zener(3e6, 1e6, 1e5), numerics=rv.Numerics(time_step=0.05))
     errors = ds.stated_error.values
     missed = np.count_nonzero(errors > 1e-2)
     assert missed
@@ -84,7 +84,7 @@ def ball_pressed(depth, **options):
     """A ball over a square of 17 x 15 cells; its contact is within it to about the depth of the middle of a side."""
     ball = rv.sphere(radius=1e-3, size=(17e-6, 15e-6), shape=(17, 15), exact=False)
     program = rv.Program().approach(depth, over=1.0).approach(1e-10, over=1.0)
-    with_defaults = {"boundary": "free", "times": [0.1, 2.0], "time_step": 0.05} | options
+    with_defaults = {"boundary": "free", "times": [0.1, 2.0], "numerics": rv.Numerics(time_step=0.05)} | options
     return rv.simulate(ball, rv.elastic(1e6), program, progress=False, **with_defaults)
 
 

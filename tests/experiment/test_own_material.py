@@ -99,7 +99,9 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(material):
 def test_a_cycle__is_the_same_by_the_whole_past(material):
     program = rv.Program().load(1e-3, over=0.2).load(3e-4, over=0.2).hold(0.4)
     settings = {"times": [0.1, 0.2, 0.4, 0.8], "fields": ("pressure",)}
-    series, past = (pressed(material, program, memory=memory, **settings) for memory in ("auto", "direct"))
+    series, past = (
+        pressed(material, program, numerics=rv.Numerics(memory=memory), **settings) for memory in ("auto", "direct")
+    )
     assert past.attrs["series_error"] == 0
     for name in ("force", "approach"):
         largest = float(past[name].max())
@@ -214,4 +216,4 @@ def changed(**functions):
 @pytest.mark.parametrize("memory", ["auto", "direct"])
 def test_what_is_no_material__is_refused(material, words, memory):
     with pytest.raises(InputError, match=words):
-        pressed(material, memory=memory)
+        pressed(material, numerics=rv.Numerics(memory=memory))

@@ -147,7 +147,7 @@ def test_zero_load__is_open():
 
 
 def test_seed_method__gives_the_same_dataset():
-    fast, seed = (simulate(method=m, time_step=0.02) for m in ("fast", "seed"))
+    fast, seed = (simulate(numerics=rv.Numerics(method=m, time_step=0.02)) for m in ("fast", "seed"))
     assert set(fast.variables) == set(seed.variables)
     assert float(abs(fast.pressure - seed.pressure).sum() / fast.pressure.sum()) < 0.02
 
@@ -177,10 +177,10 @@ def with_value(value):
         (lambda: simulate(height=BALL[[0, 1, 5]]), "expected a uniform, ascending grid"),
         (lambda: simulate(boundary="open"), "boundary is 'open'"),
         (lambda: simulate(tolerance=0), "tolerance is 0"),
-        (lambda: simulate(time_step=-1.0), r"time_step is -1\.0"),
+        (lambda: simulate(numerics=rv.Numerics(time_step=-1.0)), r"time_step is -1\.0"),
         (lambda: simulate(program=rv.Program()), "program is empty"),
         (lambda: simulate(fields=("stress",)), "fields holds 'stress': expected some of pressure, gap, displacement"),
-        (lambda: simulate(method="slow"), "method is 'slow'"),
+        (lambda: simulate(numerics=rv.Numerics(method="slow")), "method is 'slow'"),
         (lambda: simulate(times=[2.0]), "times holds 2 s: expected times from 0 to the program's end at 1 s"),
         (lambda: simulate(times=0), "times is 0"),
         (lambda: simulate(missing="ignore"), "missing is 'ignore'"),
@@ -245,7 +245,8 @@ FOLLOWED = {
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.thorough) if n == "soft" else n for n in FOLLOWED])
 def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
     material, program = FOLLOWED[name]
-    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "memory": "direct" if "direct" in name else "auto"}
+    numerics = rv.Numerics(memory="direct" if "direct" in name else "auto")
+    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "numerics": numerics}
     followed = simulate(two_hills(), material, program, **settings)
     assert len(set(solved_on)) >= 2, "the window grew"
     assert solved_on[0][0] < 60

@@ -144,7 +144,7 @@ def test_both_memories_and_the_grid_that_grows__agree():
     rubber, load = rv.zener(1e6, 3e5, 1e5), rv.Program().load(2e-3, over=0.1).hold(1.0).load(1e-3, over=0.1)
     ball, small = rv.sphere(RADIUS, 3.4e-4, (51, 51)), rv.sphere(RADIUS, 1.4e-4, (21, 21))
     one = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2])
-    direct = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2], memory="direct")
+    direct = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2], numerics=rv.Numerics(memory="direct"))
     grown = pressed(small, rubber, load, times=[0.1, 1.1, 1.2])
     assert grown.sizes["x"] > 21
     for other in (direct, grown):

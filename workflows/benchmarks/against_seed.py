@@ -17,7 +17,7 @@ def measure(sizes=((128, 60), (128, 200), (256, 200)), repeats=5):
 
         theirs, seed = seconds(
             lambda b=ball, p=program, n=steps, s=settings: rv.simulate(
-                b, material, p, method="seed", time_step=duration / n, edge="accept", **s
+                b, material, p, numerics=rv.Numerics(method="seed", time_step=duration / n), edge="accept", **s
             ),
             1,  # minutes: once
         )

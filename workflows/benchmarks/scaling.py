@@ -21,7 +21,7 @@ def run(name, surface, material, program, **settings):
     took, _ = seconds(press, 3 if surface.size < 1024**2 else 1)  # minutes: once
     with profiled() as profile:
         ds = press()
-    steps, iterations = program.duration / settings["time_step"], int(ds.roughvisc.cost.iterations.sum())
+    steps, iterations = program.duration / settings["numerics"].time_step, int(ds.roughvisc.cost.iterations.sum())
     beside = (1 - profile.share("transforms")) * profile.whole
     return {
         "case": name,
@@ -56,7 +56,8 @@ def following(cells, fields):
     ball, program = rv.sphere(RADIUS, size, cells), rv.Program().load(load, over=0).hold(1.0)
 
     def press():
-        return rv.simulate(ball, rv.zener(1.0, 1.0, 1.0), program, time_step=0.05, fields=fields, progress=False)
+        numerics = rv.Numerics(time_step=0.05)
+        return rv.simulate(ball, rv.zener(1.0, 1.0, 1.0), program, numerics=numerics, fields=fields, progress=False)
 
     for how in with_symmetry_and_without():
         press()
@@ -89,14 +90,15 @@ def measure(
             )
             name = f"rough creep, {boundary}, {cells}^2, {what}, 20 steps"
             edge = {"edge": "accept"} if boundary == "free" else {}
-            yield run(name, surface, zener, program, boundary=boundary, time_step=0.05, times=[1.0], fields=(), **edge)
+            settings = {"boundary": boundary, "numerics": rv.Numerics(time_step=0.05), "times": [1.0], "fields": ()}
+            yield run(name, surface, zener, program, **settings, **edge)
     ball = rv.sphere(RADIUS, 2.4, 128)
     for count in steps:
         name = f"ball on Zener, 128^2, {count} steps"
-        yield run(name, ball, zener, hold, time_step=1 / count, times=[1.0], fields=())
+        yield run(name, ball, zener, hold, numerics=rv.Numerics(time_step=1 / count), times=[1.0], fields=())
     for count in exponentials:
         material = rv.Prony(1.0, 0.0, (1.0 / count,) * count, tuple(np.geomspace(1e-2, 1e1, count)))
         name = f"ball, 128^2, {count} exponentials, 50 steps"
-        yield run(name, ball, material, hold, time_step=0.02, times=[1.0], fields=())
+        yield run(name, ball, material, hold, numerics=rv.Numerics(time_step=0.02), times=[1.0], fields=())
     for fields in (("pressure",), ("pressure", "gap")):
         yield from following(window, fields)

@@ -110,3 +110,7 @@ __all__ = [
     "westergaard",
     "westergaard_half_width",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -33,8 +33,9 @@ def test_missing__is_declared_where_it_occurs():
     ball, rubber = rv.sphere(1e-3, 2e-4, 20), rv.zener(3e6, 1e6, 1e5)
     program = rv.Program().load(1e-4, over=0.05).hold(0.1)
     found = set()
-    for settings in ({"method": "seed", "time_step": 0.01}, {"memory": "direct"}, {"time_step": 0.02}):
-        ds = simulate_whole(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, **settings)
+    for rare in ({"method": "seed", "time_step": 0.01}, {"memory": "direct"}, {"time_step": 0.02}):
+        numerics = rv.Numerics(**rare)
+        ds = simulate_whole(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, numerics=numerics)
         missing = {str(name) for name in ds.variables if ds[name].isnull().any()}
         assert all(ds[name].isnull().all() for name in missing), "throughout"
         found |= missing

@@ -47,7 +47,7 @@ def test_errors__are_those_against_the_closed_form(tmp_path):
     given = [
         ((33, 31), {"tolerance": 1e-2}),
         ((67, 63), {"tolerance": 1e-3}),
-        ((33, 31), {"tolerance": 1e-2, "time_step": 0.05, "method": "seed"}),
+        ((33, 31), {"tolerance": 1e-2, "numerics": rv.Numerics(time_step=0.05, method="seed")}),
     ]
     for i, (shape, solve) in enumerate(given):
         again = simulate_whole(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, times=TIMES, progress=False, **solve)
