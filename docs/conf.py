@@ -38,7 +38,7 @@ html_css_files = ["pages.css"]
 html_title = f"roughvisc {version}"
 html_theme_options = {
     "show_prev_next": True,
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 6,
     "navbar_align": "left",
     "secondary_sidebar_items": ["page-toc"],
     "logo": {"text": "roughvisc"},
