@@ -52,6 +52,40 @@ def test_quantity__is_the_float_that_a_person_would_write(number, unit):
     assert quantity(f"{number} {unit}", "m") == float(f"{number}{PREFIXES[unit]}")
 
 
+@given(
+    st.decimals(-(10**6), 10**6, places=6, allow_nan=False),
+    st.integers(-30, 30),
+    st.sampled_from(["m", "N", "Pa", "s", "Pa s"]),
+    st.sampled_from(["", "f", "p", "n", "µ", "\N{GREEK SMALL LETTER MU}", "u", "m", "k", "M", "G", "T"]),
+)
+def test_quantity__with_a_prefix_is_what_pint_makes_of_it(number, power, unit, prefix):
+    text = f"{number}e{power} {prefix}{unit}"
+    by_pint = quantity(f"{number}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
+    assert quantity(text, unit) == by_pint
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("1 min", "s", 60.0),
+        ("1 hPa", "Pa", 100.0),
+        ("1 Em", "m", 1e18),
+        ("2 s kPa", "Pa s", 2e3),
+        ("1 ft", "m", 0.3048),
+    ],
+)
+def test_quantity__with_what_is_no_plain_prefix_is_that_unit(text, unit, expected):
+    assert quantity(text, unit) == expected
+
+
+@pytest.mark.parametrize("text", ["1 smm", "1 mkm", "1 Mkg", "1 mm/s", "1 k", "1 N"])
+def test_quantity__with_two_prefixes_or_another_unit_is_refused(text):
+    with pytest.raises(InputError, match=r"unit|which is in"):
+        quantity(text, "m")
+    with pytest.raises(InputError, match="which is in"):
+        quantity("1 m", "Pa")
+
+
 @pytest.mark.parametrize("number", [3, 3.0, np.float64(3), np.int32(3)])
 def test_quantity__takes_plain_numbers_as_they_are(number):
     assert quantity(number, "m") == 3.0
@@ -103,6 +137,8 @@ def test_quantity__does_not_hang_on_hostile_text(text):
     start = time.perf_counter()
     with pytest.raises(InputError):
         quantity(text, "m")
+    with pytest.raises(InputError, match="which is in"):
+        quantity("1 m", "Pa")
     assert time.perf_counter() - start < 1
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 from scipy.special import sici
 
 from roughvisc.mechanics.materials.prony import Prony
@@ -158,7 +158,7 @@ class _Fit:
         # unknowns: the weights, and the largest deviation, which is to be small
         rows, terms = columns.shape
         largest = np.hstack([self._both, -np.ones((2 * rows, 1))])
-        self._nearest = linprog(np.append(np.zeros(terms), 1.0), largest, self._sides, method="highs").x
+        self._nearest = scipy.optimize.linprog(np.append(np.zeros(terms), 1.0), largest, self._sides, method="highs").x
         #: Least largest deviation.
         self.least = float(self._nearest[-1])
 
@@ -168,6 +168,8 @@ class _Fit:
         # unknowns: the weights, and the deviation of each row, whose sum is to be small
         single = np.hstack([self._both, np.tile(-np.eye(rows), (2, 1))])
         bounds = [(0.0, None)] * terms + [(0.0, max(_SLACK * self.least, 1e-6))] * rows
-        found = linprog(np.append(np.zeros(terms), np.ones(rows)), single, self._sides, bounds=bounds, method="highs")
+        found = scipy.optimize.linprog(
+            np.append(np.zeros(terms), np.ones(rows)), single, self._sides, bounds=bounds, method="highs"
+        )
         weights = (found.x if found.success else self._nearest)[:terms]
         return np.asarray(np.where(weights > _UNSEEN, weights, 0.0) / self.norms)

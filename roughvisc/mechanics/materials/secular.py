@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 
@@ -67,4 +67,4 @@ def _log_bracketed(function: Callable[[float], float], upper: float) -> float:
             return lower
     # a little wider: a zero at an end of the bracket must not slip out of it by the rounding of the logarithm
     low, high = math.log(lower) - 1e-9, math.log(min(upper, lower * 1e3)) + 1e-9
-    return math.exp(brentq(lambda y: function(math.exp(y)), low, high, xtol=1e-15))
+    return math.exp(scipy.optimize.brentq(lambda y: function(math.exp(y)), low, high, xtol=1e-15))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,6 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     scaled = columns / scale[:, None]
     norms = np.sqrt(np.sum(scaled**2, axis=0))
     norms[norms == 0] = 1.0
-    weights, _ = nnls(scaled / norms, target / scale, maxiter=50 * columns.shape[1])
+    weights, _ = scipy.optimize.nnls(scaled / norms, target / scale, maxiter=50 * columns.shape[1])
     seen = np.abs(scaled / norms).max(axis=0) * weights
     return np.where(seen > _UNSEEN, weights / norms, 0.0)

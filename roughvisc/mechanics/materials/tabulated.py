@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import isotonic_regression
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
@@ -232,7 +232,7 @@ def _ascending(times: Array, compliances: Array, noise: float) -> tuple[Array, l
         return compliances, []
     # relative deviations count alike; a compliance of zero comes first and is never moved
     weights = (highest[-1] / np.where(compliances > 0, compliances, highest[-1])) ** 2
-    repaired = np.maximum.accumulate(isotonic_regression(compliances, weights=weights).x)
+    repaired = np.maximum.accumulate(scipy.optimize.isotonic_regression(compliances, weights=weights).x)
     moved = np.abs(repaired - compliances) / np.where(repaired > 0, repaired, 1.0)
     return repaired, [
         f"{np.count_nonzero(moved > 1e-12)} of {times.size} rows were made to ascend by isotonic regression, "
