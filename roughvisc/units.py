@@ -315,8 +315,8 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
 def _prefixed(number: str, found: str, unit: str) -> float | None:
     """Value of a number in a unit whose factors are those expected, with prefixes; None: that is for pint to say.
 
-    Most quantities of a study are such, and pint takes 0.3 s to import. A number of at most 15 digits comes out as
-    pint's does once that is rounded to 15 digits.
+    Most quantities of a study are such, and the registry of pint takes 0.2 s to build. A number
+    of at most 15 digits comes out as pint's does once that is rounded to 15 digits.
     """
     expected, factors, power = unit.split(" "), found.split(" "), 0
     if len(expected) != len(factors) or not _WITH_PREFIX.issuperset(expected) or len(number) > 15:

@@ -33,7 +33,8 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
     assert (status, err) == (0, "")
     (result,) = (tmp_path / "results" / "ball").glob("*.nc")
     figures = {p.name.rpartition("-")[2] for p in result.parent.glob(f"{result.stem}-*.png")}
-    assert {"history.png", "maps.png", "section.png"} <= figures
+    assert figures == {"history.png", "maps.png"}
+    assert "2 figures: results/ball\n" in out
     assert f"Result: results/ball/{result.name}\n" in out
     for words in (
         "24 x 21 cells, free",
@@ -403,8 +404,12 @@ def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures):
     for target in (path, path.parent):
         status, out, err = invoke("plot", target, "--out", "figures")
         assert (status, err) == (0, "")
-        assert "Figure: figures/case-history.png" in out
-    assert (tmp_path / "figures" / "case-maps.png").exists()
+        assert out == "2 figures: figures\n"
+    assert {one.name for one in (tmp_path / "figures").iterdir()} == {"case-history.png", "case-maps.png"}
+    status, out, err = invoke("plot", path, "--all", "--out", "all")
+    drawn = {one.name for one in (tmp_path / "all").iterdir()}
+    assert (status, err, out) == (0, "", f"{len(drawn)} figures: all\n")
+    assert {"case-history.png", "case-maps.png", "case-section.png", "case-surface.png"} < drawn
     (tmp_path / "empty").mkdir()
     assert invoke("plot", "empty")[0] == 2
     status, _, err = invoke("plot", "gone.nc")

@@ -85,7 +85,7 @@ ALLOWED = {
         "study.execution",
         "study.trade",
         "study.validation",
-        "views.figures",
+        "observables",
     },
     "api": {*_SOLVE, "solve", "study.storage"},
     "cli": {

@@ -83,6 +83,12 @@ def say(console: Console, what: str, path: Path) -> None:
     console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
+def say_figures(console: Console, written: Sequence[Path]) -> None:
+    """How many figures were written and the folder that they are in; the file itself of a single one."""
+    what, path = ("Figure", written[0]) if len(written) == 1 else (f"{len(written)} figures", written[0].parent)
+    say(console, what, path)
+
+
 class _Screen(logging.Handler):
     """Warnings of roughvisc that no log takes, each once."""
 

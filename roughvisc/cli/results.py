@@ -7,13 +7,14 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.group import Failure, say
+from roughvisc.cli.group import Failure, say, say_figures
 
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
-def plot(result: Path, out: Path | None) -> None:
+@click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
+def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw the figures of a result, of a folder, or of a trade.
 
     Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases. What
@@ -36,18 +37,17 @@ def plot(result: Path, out: Path | None) -> None:
         raise no_results(result)
     console = Console()
     names = cases_in(paths) if result.is_dir() else {}
+    drawn: list[Path] = []
     for path in paths:
         if path.is_file() and is_trade(path):
-            picture = (out or path.parent) / f"{path.stem}.png"
-            say(console, "Figure", write_figure(trade(open_trade(path)), picture))
+            drawn.append(write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png"))
             continue
         stem, title = names.get(path, (path.stem, ""))
         with whole_result(path) as dataset:
-            for figure in save_figures(dataset, out or path.parent, stem, title=title):
-                say(console, "Figure", figure)
+            drawn += save_figures(dataset, out or path.parent, stem, title=title, every=every)
     together = results_of(result) if len(paths) > 1 else None
-    for figure in save_sweep_figures(together, out or result) if together is not None else ():
-        say(console, "Figure", figure)
+    drawn += save_sweep_figures(together, out or result) if together is not None else ()
+    say_figures(console, drawn)
 
 
 @click.command()

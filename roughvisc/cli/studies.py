@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say
+from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say, say_figures
 from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -109,8 +109,8 @@ def _run_one(
         if plots:
             from roughvisc.views.plot import save_figures
 
-            for figure in save_figures(dataset, folder, case.key):
-                say(console, "Figure", figure)
+            say_figures(console, save_figures(dataset, folder, case.key, every=False))
+            say(console, "All figures: roughvisc plot --all", path)
         return unconverged(dataset) or missed
 
 

@@ -14,6 +14,7 @@ from roughvisc.mechanics.transport.flow import flow as flow_through
 from roughvisc.observables.derived import need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import stated_quantity
+from roughvisc.variables.axes import axis_of
 from roughvisc.variables.transport import LEAK_MEANINGS
 
 #: Distance of the bounds, relative, up to which a leak rate counts as known.
@@ -165,3 +166,13 @@ def _status(found: Flow) -> int:
     if found.is_closed:
         return _CLOSED
     return _FLOWS if found.upper - found.lower <= _CERTIFIED * found.upper else _NOT_CERTIFIED
+
+
+def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
+    """The last kept time at which fluid flows, and the first after it, from which on the contact is closed. [s]"""
+    closed = dataset["leak_status"].values == LEAK_MEANINGS.index("closed")
+    if not closed[-1] or closed.all():
+        return None
+    last = int(np.flatnonzero(~closed)[-1])
+    times = dataset[axis_of(dataset.variables)].values
+    return float(times[last]), float(times[last + 1])

@@ -77,6 +77,9 @@ FIGURES = {
     "surface": (surface, ("height",), ()),
 }
 
+#: Those of them that a run draws, and `roughvisc plot` without --all.
+FIRST = ("friction", "pressure_maps", "history", "maps")
+
 #: Those of them that are drawn only where they say something.
 TELLING = {
     "clusters": has_clusters,
@@ -85,21 +88,30 @@ TELLING = {
 }
 
 
-def figures_of(dataset: xr.Dataset, leave: str = "") -> Iterator[tuple[str, Figure]]:
+def figures_of(dataset: xr.Dataset, leave: str = "", *, every: bool = True) -> Iterator[tuple[str, Figure]]:
     """Name and figure of all that the variables of a result allow and that says something of it, but of one to leave.
 
-    The section is drawn in the last row of the largest contact area.
+    Without `every`, only of the first ones. The section is drawn in the last row of the largest contact area.
     """
     for name, (draw, needed, wanted) in FIGURES.items():
+        if name == leave or not (every or name in FIRST):
+            continue
         stored = all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
-        if name == leave or not stored or (name in TELLING and not TELLING[name](dataset)):
+        if not stored or (name in TELLING and not TELLING[name](dataset)):
             continue
         options = {"time": float(rows_of(dataset)[fullest_frame(dataset)])} if name == "section" else {}
         yield name, draw(dataset, **options)
 
 
 def save_figures(
-    dataset: xr.Dataset, folder, stem: str, *, suffix: str = ".png", dpi: float = 200.0, title: str = ""
+    dataset: xr.Dataset,
+    folder,
+    stem: str,
+    *,
+    suffix: str = ".png",
+    dpi: float = 200.0,
+    title: str = "",
+    every: bool = True,
 ) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
@@ -120,6 +132,8 @@ def save_figures(
         Resolution of pictures made of pixels.
     title : str
         What stands above each figure, such as the case that it shows.
+    every : bool
+        False: only the first two, history and maps, or curve and maps of friction.
 
     Returns
     -------
@@ -133,7 +147,8 @@ def save_figures(
     """
     require(dataset, axis_of(dataset))
     written = [
-        write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title) for name, figure in figures_of(dataset)
+        write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title)
+        for name, figure in figures_of(dataset, every=every)
     ]
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)

@@ -9,11 +9,11 @@ from typing import Any
 import xarray as xr
 from rich.console import Group
 
+from roughvisc.observables.leakage import closing_times
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.console.tables import NOTES, accuracy_rows, number, readable, two_columns
-from roughvisc.views.figures.transport import closing_times
 
 #: Part of the friction force from which on a summary tells the force across the motion.
 _ACROSS = 0.05

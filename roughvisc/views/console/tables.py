@@ -13,7 +13,7 @@ from rich.text import Text
 
 from roughvisc.errors import printable
 from roughvisc.topography.grid import spacing
-from roughvisc.views.figures.axes import unit_for
+from roughvisc.units import unit_for
 
 if TYPE_CHECKING:
     from roughvisc.study.execution.profile import TimeProfile

@@ -14,11 +14,11 @@ from matplotlib.image import AxesImage
 from roughvisc.errors import InputError
 from roughvisc.observables import asked
 from roughvisc.observables import leakage as derived
+from roughvisc.observables.leakage import closing_times
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.variables.transport import LEAK_MEANINGS
 from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
@@ -98,16 +98,6 @@ def rate_unit(history: xr.DataArray) -> tuple[Unit, bool]:
     if history.name != "leak_rate" or not positive.size or positive.max() <= _SPANS * positive.min():
         return unit_for(history.values, si), False
     return unit_for(np.sqrt([positive.min()]) * np.sqrt(positive.max()), si), True
-
-
-def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
-    """The last kept time at which fluid flows, and the first after it, from which on the contact is closed. [s]"""
-    closed = dataset["leak_status"].values == LEAK_MEANINGS.index("closed")
-    if not closed[-1] or closed.all():
-        return None
-    last = int(np.flatnonzero(~closed)[-1])
-    times = rows_of(dataset).values
-    return float(times[last]), float(times[last + 1])
 
 
 def flux_of(dataset: xr.Dataset) -> xr.DataArray:
