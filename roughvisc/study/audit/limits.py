@@ -17,20 +17,20 @@ STIFF = 1.0
 
 @dataclass(frozen=True)
 class Limit:
-    """What an assumption is judged by.
+    """Limits by which an assumption is judged.
 
     Attributes
     ----------
     assumption : str
-        What is assumed.
+        The assumption, as a sentence.
     number : str
-        What the number is; the larger, the worse.
+        Meaning of the number. A larger number is worse.
     doubtful, broken : float
-        From where on the assumption is doubtful, and broken.
+        Numbers from which the assumption is doubtful, and broken.
     meaning : str
-        What these two mean.
+        Meaning of these two limits.
     source : str
-        Whence they are.
+        Source of the limits.
     """
 
     assumption: str
@@ -73,7 +73,7 @@ LIMITS: dict[str, Limit] = {
         "5597",
     ),
     "yielding": Limit(
-        "Neither body flows.",
+        "Neither body yields.",
         "largest pressure over the yield strength in tension",
         1.6,
         3.0,
@@ -82,11 +82,11 @@ LIMITS: dict[str, Limit] = {
     ),
     "thickness": Limit(
         "The body is deeper than the contact is wide.",
-        "part by which a half-space is off, estimated: too large an approach at the same load or, in free space, too "
-        "small a force at the same approach, whichever is more",
+        "estimated relative error of a half-space: too large an approach at the same load or, in free space, too small "
+        "a force at the same approach, whichever is larger",
         0.1,
         0.5,
-        "10 % off; the approach twice the true one, or the force half of it",
+        "10 % off; the approach twice the true one, or the force half the true one",
         "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8; closed_forms.half_space_excess and "
         "half_space_shortfall",
     ),
@@ -95,30 +95,30 @@ LIMITS: dict[str, Limit] = {
         "rms slope of the loaded surface",
         0.3,
         1.0,
-        "true area 4.5 % larger than projected, half of the slope's square; half as large again",
+        "true area 4.5 % larger than projected (half the squared slope); 50 % larger",
         "K. L. Johnson, Contact Mechanics, CUP, 1985, section 4.1",
     ),
     "strain": Limit(
         "The material is linear.",
-        "rms slope of the loaded surface, a/R on a sphere, over the strain up to which the material is linear",
+        "rms slope of the loaded surface (a/R for a sphere) over the largest strain at which the material is linear",
         1.0,
         5.0,
-        "largest strains, of the order of the slope, leave the range; representative ones do, 0.2 a/R",
+        "the largest strains, about the slope, exceed the linear range; the representative strain, 0.2 a/R, does",
         "D. Tabor, The Hardness of Metals, OUP, 1951; K. L. Johnson, Contact Mechanics, CUP, 1985, section 6.3",
     ),
     "inertia": Limit(
         "The motion is slow.",
-        "lag by radiated waves over the shortest time scale of the program or, in a slide, part by which waves add to "
-        "the displacement under a load that moves so fast, whichever is more",
+        "lag by radiated waves over the shortest time scale of the program or, in a slide, relative increase of the "
+        "displacement under a moving load, whichever is larger",
         0.1,
         1.0,
-        "force, or displacement, 10 % off its quasi-static value; as much as it",
+        "force or displacement 10 % off its quasi-static value; 100 % off",
         "J. Lysmer, F. E. Richart, J. Soil Mech. Found. Div. ASCE 92 (1966) 65; J. Cole, J. Huth, J. Appl. Mech. 25 "
         "(1958) 433",
     ),
     "heating": Limit(
         "Friction does not heat the spots.",
-        "rise of temperature of the spots in a slide, their mean [K], if the body takes up all of the heat",
+        "mean temperature rise of the spots in a slide [K] if all heat flows into the body",
         1.0,
         10.0,
         "retardation times of a rubber a fifth shorter; six times shorter (universal WLF constants)",
@@ -126,44 +126,44 @@ LIMITS: dict[str, Limit] = {
         "Landel, J. D. Ferry, J. Am. Chem. Soc. 77 (1955) 3701",
     ),
     "coupling": Limit(
-        "Pressure displaces nothing sideways.",
+        "Pressure causes no sideways displacement.",
         "Dundurs' second constant, (1 - 2 nu)/(2 - 2 nu) of one body",
         0.5,
         1.0,
-        "a punch that sticks is 10 % stiffer than one without friction; out of reach",
+        "a punch with full friction is 10 % stiffer than one without; cannot be reached",
         "D. A. Spence, Proc. R. Soc. A 305 (1968) 55",
     ),
     "resolution": Limit(
-        "The grid holds all waves that matter.",
-        "part of the rms slope that the last octave of waves adds: under light loads also the part of the contact area "
-        "that it takes away",
+        "The grid resolves all wavelengths that matter.",
+        "part of the rms slope from the last octave of wavelengths; under light loads also the part of the contact area "
+        "that it removes",
         0.1,
         0.5,
-        "10 % of the area; half of it, and the next octave as much again",
+        "10 % of the area; half of it, and as much again for the next octave",
         "B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840",
     ),
     STATED: Limit(
-        "The grid holds all waves that there are, of a surface whose generator states the shortest.",
-        "cell over the shortest wave",
+        "The grid resolves all wavelengths of a surface whose generator states the shortest.",
+        "cell size over the shortest wavelength",
         _JUST / 8,
         _JUST / 4,
-        "fewer than 8 cells a wave, a crest drawn straight between its cells is 8 % too low; fewer than 4, 29 %",
-        "arithmetic: 1 - cos(pi / n) of n cells a wave",
+        "fewer than 8 cells per wavelength: a crest interpolated between cells is 8 % too low; fewer than 4: 29 %",
+        "arithmetic: 1 - cos(pi / n) for n cells per wavelength",
     ),
     "border": Limit(
         "The surface repeats without a step.",
-        "difference of opposite borders over that of neighbouring rows",
+        "difference between opposite borders over that between neighbouring rows",
         2.0,
         10.0,
-        "a step is seen; on 100 rows the seam holds as much of the mean square slope as all the rest",
+        "a step is visible; on 100 rows the seam has as much of the mean square slope as all other rows",
         "topography.borders; arithmetic: the square of the number over the number of rows",
     ),
     "window": Limit(
-        "The roughness is that of the scan up to its border.",
-        "margin of a taper over the side",
+        "The roughness reaches to the border of the scan.",
+        "margin of the taper over the side",
         0.03,
         0.1,
-        "contact area over that of the grid 8 % too small; 17 %, and the mean gap as much",
+        "contact area over the area of the grid 8 % too small; 17 %, and the mean gap likewise",
         "tests/experiment/test_taper.py: periodic surfaces pressed as they are and tapered",
     ),
 }
