@@ -135,8 +135,8 @@ LIMITS: dict[str, Limit] = {
     ),
     "resolution": Limit(
         "The grid resolves all wavelengths that matter.",
-        "part of the rms slope from the last octave of wavelengths; under light loads also the part of the contact area "
-        "that it removes",
+        "part of the rms slope from the last octave of wavelengths; under light loads also the part of the contact "
+        "area that it removes",
         0.1,
         0.5,
         "10 % of the area; half of it, and as much again for the next octave",
