@@ -60,11 +60,14 @@ def naming_options(message: str) -> str:
     --------
     >>> naming_options("it states no unit of its heights: pass unit= (such as unit='um')")
     'it states no unit of its heights: pass --unit (such as --unit=um)'
+    >>> naming_options("pass unit= (such as unit='um'; or unit='mm', height_unit='um' where they differ)")
+    'pass --unit (such as --unit=um; or --unit=mm,um where they differ)'
     >>> naming_options("it states no size: pass spacing=(dx, dy) [m]")
     'it states no size: pass --spacing (such as --spacing=1um,1um)'
     """
     message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", "--spacing (such as --spacing=1um,1um)", message)
     message = message.replace(" (see supported_formats())", "")
+    message = re.sub(r"\bunit='(\w+)', height_unit='(\w+)'", r"--unit=\1,\2", message)
     message = re.sub(rf"\b({_NAMES})='(\w+)'", r"--\1=\2", message)
     message = re.sub(rf"\b({_NAMES})=(?=\W|$)", r"--\1", message)
     message = re.sub(rf"(^|: )({_NAMES}) is ", r"\1--\2 is ", message)

@@ -37,6 +37,7 @@ WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
 _FEWEST = 16
 #: No height in an array is further from zero: beyond, numbers stand for missing points. [m]
 FARTHEST = 1e3
+_PASS_UNITS = "pass unit= (such as unit='um'; or unit='mm', height_unit='um' where they differ)"
 _PASS_UNIT, _PASS_SPACING = "pass unit= (such as unit='um')", "pass spacing=(dx, dy) [m]"
 _READER = threading.RLock()
 
@@ -247,8 +248,11 @@ def _check_units(opened: Opened, chosen: Channel, units: _Units, sides: tuple[fl
                     f"it states its unit as {chosen.unit!r}: leave {key}= out, or scale the heights afterwards"
                 )
     elif units.vertical is None:
-        if sides is None and opened.load(chosen, 1.0)[1] is None:
+        found = opened.load(chosen, 1.0)[1] if sides is None else None
+        if sides is None and found is None:
             raise InputError(f"it states no unit of its heights and no size: {_PASS_UNIT}, and {_PASS_SPACING}")
+        if found is not None and not _states_lateral_unit(opened, chosen):
+            raise InputError(f"it states no unit of x, y and its heights: {_PASS_UNITS}")
         raise InputError(f"it states no unit of its heights: {_PASS_UNIT}")
     elif units.heights is not None and sides is None:
         if _states_lateral_unit(opened, chosen):

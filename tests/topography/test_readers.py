@@ -555,3 +555,13 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     for format, suffixes in (("x3p", ["a"]), ("mine", ["toml"])):
         with pytest.raises(InputError, match="expected others than the formats"):
             instruments.add_format(format, suffixes, read)
+
+
+def test_points_without_units__are_asked_for_both(tmp_path):
+    x, y = np.meshgrid(np.arange(5.0), np.arange(4.0), indexing="ij")
+    np.savetxt(tmp_path / "points.xyz", np.c_[x.ravel(), y.ravel(), np.sin(x * y).ravel()])
+    assert "no unit of x, y and its heights" in (message := refusal(tmp_path / "points.xyz"))
+    assert message.endswith("pass unit= (such as unit='um'; or unit='mm', height_unit='um' where they differ)")
+    h = open_scan(tmp_path / "points.xyz", unit="mm", height_unit="um")
+    assert spacing(h) == pytest.approx((1e-3, 1e-3))
+    assert float(h[1, 1]) == pytest.approx(1e-6 * np.sin(1))
