@@ -99,6 +99,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
     fields = [name for name in ("pressure", "gap", "displacement") if name in dataset][:2]
     scales, maps, chosen, block = [], [], [], 1
     fullest, every = fullest_frame(dataset), stride(dataset)
+    telling = AXES[over].telling_row(dataset) if AXES[over].telling in dataset else fullest
     trial = [_scale(dataset, name, [fullest]) for name in fields]
     for count, side in _LADDER:
         chosen = [int(frame) for frame in spread_frames(rows_of(dataset), count)]
@@ -118,12 +119,12 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
         "block": block * every,
         "extremes": every > 1,
         "ratio": plane_ratio(dataset),
-        "plane": _extent(dataset) + ("" if dataset is whole else ", as measured, without its mirror images"),
+        "plane": _extent(dataset) + ("" if dataset is whole else " as measured, without the mirror images"),
         "fields": [_scale_text(scale) for scale in scales],
         "section": _sections(dataset, chosen),
         "charts": _charts(dataset, chosen),
         "frames": [{"maps": row, **_numbers(dataset, frame)} for row, frame in zip(maps, chosen, strict=True)],
-        "start": int(np.abs(np.array(chosen) - fullest).argmin()),
+        "start": int(np.abs(np.array(chosen) - telling).argmin()),
     }
 
 
@@ -227,7 +228,7 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
         "surfaces": [_path(x[::every], up(one)[::every]) for one in surfaces],
         "contacts": [_runs(x, up(height), one) for one in on_line],
         "where": f"y = {plane.text(float(dataset['y'][index]))}",
-        "label": f"Height: {unit.text(high - low)} from bottom to top",
+        "label": f"Full height of the plot: {unit.text(high - low)}",
     }
 
 
@@ -388,7 +389,7 @@ def _numbers(dataset: xr.Dataset, frame: int) -> dict[str, Any]:
         if name in dataset and name in known
     ]
     if "contact_fraction" in dataset:
-        rows.append(("Of nominal", f"{100 * float(one['contact_fraction']):.3g} %"))
+        rows.append(("Contact fraction", f"{100 * float(one['contact_fraction']):.3g} %"))
     for name, label in _errors(over).items():
         if name in dataset:
             rows.append((f"Error, {label}", f"{float(one[name]):.2g}" if np.isfinite(one[name]) else "not known"))

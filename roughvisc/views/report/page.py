@@ -167,7 +167,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
     names: set[str] = set()
     for number, source in enumerate(sources):
         with _opened(source) as dataset:
-            row = table_row(dataset, source, number) | {"study": _study(dataset)}
+            row = table_row(dataset, source, number)
             rows.append(row)
             if row["name"] in names:
                 row["name"] += f" ({row['key'] or number + 1})"
@@ -179,7 +179,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
             row["view"] = len(views)
             told = {"number": number + 1, "title": row["name"], "key": row["key"]}
             views.append({**told, **frames_of(dataset, budget)})
-            studies.append(row["study"])
+            studies.append(_study(dataset))
             if len(sources) <= _DRAWN:
                 figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
             what = row["surface"]
@@ -201,6 +201,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         studies=studies,
         headings=list(dict.fromkeys(row["rows"] for row in rows)) or ["Times"],
         rubbed=any(row["friction"] for row in rows),
+        timed=any(row["time_error"] != "not known" for row in rows),
         audited=any(study["audit"] for study in studies),
         bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
         figures=figures,
@@ -230,7 +231,7 @@ def _histories(dataset: xr.Dataset) -> xr.Dataset:
 
 def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:
     return {
-        "title": "Contact area against force, a line a case" + (" (their names: table)" if len(cases) > 12 else ""),
+        "title": "Contact area against force, one line per case",
         "src": figure_uri(area_against_load(cases)),
     }
 

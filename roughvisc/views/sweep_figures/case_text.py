@@ -95,7 +95,7 @@ def material_words(material: Mapping[str, Any]) -> str:
     rest = [
         f"{key.replace('_', ' ')} {readable_setting(f'material.{key}', value)}"
         for key, value in material.items()
-        if key != "model" and not isinstance(value, list | dict)
+        if key != "model" and (key, value) != ("modulus_factor", 1.0) and not isinstance(value, list | dict)
     ]
     tables = [f"{len(value)} {key}" for key, value in material.items() if isinstance(value, list)]
     return ", ".join([str(material.get("model", "?")).replace("_", " "), *rest, *tables])

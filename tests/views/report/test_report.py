@@ -228,7 +228,7 @@ def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
     cells = re.findall(r'<td class="varied">(.*?)</td>', text)
     assert [cell[:10] for cell in cells] == [f"Load {load}," for load in loads]
     assert cells[0].endswith("time (material.terms.3) 3")
-    assert "<th>What was varied</th>" in text
+    assert "<th>Varied settings</th>" in text
     assert 'title="program.0.load"' not in text
 
 
@@ -291,6 +291,31 @@ def test_browser__would_tell_of_an_error(page, tmp_path):
     assert "nothing is not defined" in done.stderr
 
 
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+@pytest.mark.parametrize("width", [400, 1100, 1600])
+def test_browser__shows_the_page_without_horizontal_overflow(page, tmp_path, width):
+    """In a frame, since a window of a browser without a screen is at least 500 pixels wide."""
+    script = (
+        "onload = () => { const root = frames[0].document.documentElement; "
+        "document.body.dataset.widths = `${root.clientWidth},${root.scrollWidth}`; }"
+    )
+    frame = f'<iframe style="border: 0; width: {width}px; height: 900px" src="file://{page}"></iframe>'
+    outer = tmp_path / "outer.html"
+    outer.write_text(f"<body>{frame}<script>{script}</script></body>")
+    flags = [f"--{flag}" for flag in FLAGS.split()]
+    command = [
+        CHROMIUM,
+        *flags,
+        "--allow-file-access-from-files",
+        f"--user-data-dir={tmp_path / 'd'}",
+        f"file://{outer}",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    seen, needed = map(int, re.search(r'data-widths="(\d+),(\d+)"', done.stdout).groups())
+    assert width - 30 < seen <= width  # a scroll bar has its place
+    assert needed <= seen
+
+
 def test_frames__of_a_mirrored_surface_show_what_was_measured():
     whole = made.rough_creep((22, 16))
     mirrored = whole.assign_attrs(history="read a.x3p\nmirrored along x and y")
@@ -300,4 +325,4 @@ def test_frames__of_a_mirrored_surface_show_what_was_measured():
         with Image.open(io.BytesIO(base64.b64decode(view["frames"][0]["maps"][0].partition(",")[2]))) as picture:
             sizes.append(picture.size)
     assert sizes == [(22, 16), (11, 8)]
-    assert view["plane"].endswith("as measured, without its mirror images")
+    assert view["plane"].endswith("as measured, without the mirror images")
