@@ -1,10 +1,10 @@
-"""Settings of a solve, each declared once: its default, what it may be, what it means, and where it stands.
+"""Settings of a solve, each declared once: its default, its allowed values, its meaning, and its table.
 
-The signature in :mod:`roughvisc.api` and the table ``[keep]`` of a study repeat the names alone. Settings that are
-rarely changed stand in :class:`Numerics`, which :func:`roughvisc.simulate` takes as one argument.
+The signature in :mod:`roughvisc.api` and the table ``[keep]`` of a study only repeat the names. Settings that are
+rarely changed are in :class:`Numerics`, which :func:`roughvisc.simulate` takes as one argument.
 
-From the entries here follow the checks of :class:`Settings`, the tables ``[solve]`` and ``[keep]`` of a study file with
-the page of their keys, the key of a case, and what is refused of experiments over another axis than time.
+These entries determine the checks of :class:`Settings`, the tables ``[solve]`` and ``[keep]`` of a study file with the
+page of their keys, the key of a case, and the settings that experiments over other axes than time refuse.
 """
 
 from __future__ import annotations
@@ -36,27 +36,27 @@ _ENTRY = "entry"
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """What is said of a setting, beside its type and its default.
+    """Declaration of a setting, in addition to its type and its default.
 
     Attributes
     ----------
     about, example : str
-        Its meaning, and how it is written in a study file.
+        Its meaning, and an example value in a study file.
     table : {"solve", "keep", "surface"}
-        Table of a study file that it stands in.
+        Its table in a study file.
     bounds : dict
-        Of a number: some of ``above``, ``least``, ``most``, ``below``.
+        For a number: some of ``above``, ``least``, ``most``, ``below``.
     noun, unit : str
-        What a number is a number of; ``"1"`` of a pure one.
+        Name of the quantity, and its unit; ``"1"`` if it is dimensionless.
     in_attributes : bool
-        Whether it stands in the attributes of a result, unless it is None.
+        Whether it is an attribute of a result, unless it is None.
     always_in_key : bool
-        Whether it counts in the key of a case even where it is as usual; one that came later must not, so that the keys
-        of former cases stay.
+        Whether the key of a case includes it even if it has its default value. This must be False for a new setting, so
+        that the keys of existing cases do not change.
     only_over : str
-        Name of the axis whose experiments have it; empty: all have.
+        Name of the axis whose experiments have it; empty: all experiments.
     check : callable, optional
-        Of values that are neither one of a few words nor a number: gives the value as it is kept, or raises.
+        For values that are neither one of a few words nor a number: returns the value to store, or raises.
     """
 
     about: str
@@ -117,11 +117,11 @@ class Numerics:
     Parameters
     ----------
     time_step : "auto" or float or str
-        Steps chosen by the tolerance, or of a given length. [s]
+        Steps chosen by the tolerance, or a fixed step length. [s]
     method : {"fast", "seed"}
-        ``seed`` is the seed paper's algorithm, slips corrected and not accelerated.
+        ``seed`` is the algorithm of the seed paper with its errors corrected, without acceleration.
     memory : {"auto", "direct"}
-        ``direct`` keeps every past pressure, whatever the material: slower, and independent of any series.
+        ``direct`` stores every past pressure, for any material. It is slower, and needs no exponential series.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class Numerics:
 
     time_step: TimeStep = setting(
         "auto",
-        "steps chosen by the tolerance, or of one length",
+        "steps chosen by the tolerance, or a fixed length",
         '"10 ms"',
         bounds={"above": 0},
         noun="a time",
@@ -146,7 +146,7 @@ class Numerics:
     )
     method: Method = setting(
         "fast",
-        "`fast`; or `seed`: the algorithm of the paper that the method started from",
+        "`fast`; or `seed`: the algorithm of the original paper",
         '"seed"',
         in_attributes=True,
         always_in_key=True,
@@ -154,7 +154,7 @@ class Numerics:
     )
     memory: Memory = setting(
         "auto",
-        "exponentials as far as they are accurate; or every past pressure",
+        "`auto`: exponentials if they are accurate enough; `direct`: every past pressure",
         '"direct"',
         only_over="time",
     )
@@ -166,9 +166,9 @@ class Numerics:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(Numerics):
-    """How an experiment is computed and what is kept of it; see :func:`roughvisc.simulate`.
+    """How an experiment is computed and what is stored; see :func:`roughvisc.simulate`.
 
-    The defaults stand here alone: of :func:`roughvisc.simulate`, and of the tables of a study file.
+    The defaults of :func:`roughvisc.simulate` and of the tables of a study file are declared only here.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class Settings(Numerics):
     )
     times: int | Sequence[float | str] | None = setting(
         None,
-        "instants in the result: all steps, so many, denser after each corner, or these",
+        "times in the result: all steps, a number of times (denser after each corner), or a list",
         "50",
         table="keep",
         only_over="time",
@@ -219,21 +219,19 @@ class Settings(Numerics):
     )
     missing: Missing = setting(
         "refuse",
-        "whether missing points are refused, or places without material",
+        "whether missing points are refused, or mark places without material",
         '"absent"',
         table="surface",
         only_over="time",
     )
     edge: Edge = setting(
         "error",
-        "whether contact may reach the border in free space: the scan is then a punch of that outline",
+        "whether contact may reach the border in free space: the scan outline is then treated as a punch",
         '"accept"',
         always_in_key=True,
         only_over="time",
     )
-    grid_error: bool = setting(
-        False, "whether to bound the error of the grid, by two more computations on coarser ones", "true"
-    )
+    grid_error: bool = setting(False, "whether to estimate the grid error, with two more runs on coarser grids", "true")
 
     def to_attributes(self) -> dict[str, Any]:
         """Those that stand in the attributes of a result."""

@@ -150,7 +150,7 @@ def study_schema() -> dict[str, Any]:
     >>> sorted(study_schema()["properties"])
     ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title']
     >>> study_schema()["$defs"]["SolveSection"]["properties"]["edge"]["description"].partition(";")[0]
-    'whether contact may reach the border in free space: the scan is then a punch of that outline'
+    'whether contact may reach the border in free space: the scan outline is then treated as a punch'
     """
     schema = StudyFile.model_json_schema()
     schema["title"] = "roughvisc study"
