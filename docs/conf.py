@@ -45,10 +45,10 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": ["sphinx-version"],
 }
+#: Only sections with pages below them have something to list in a sidebar.
 html_sidebars = {
     "**": ["sidebar-nav-bs"],
-    **{key: [] for key in ("index", "tutorial", "gallery", "first_contact", "theory", "limits")},
-    **{key: [] for key in ("nomenclature", "study-files", "changelog", "how-a-solve-runs")},
+    **{page.stem: [] for page in Path(__file__).parent.glob("*.[mi][dp]*") if page.stem != "reference"},
 }
 copyright = author
 

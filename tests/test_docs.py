@@ -279,6 +279,13 @@ def test_code__fits_its_page():
         assert cell["cell_type"] != "code" or all(len(line) <= 98 for line in cell["source"])
 
 
+def test_lines__are_not_taken_for_comments():
+    """MyST leaves out a line that begins with a percent sign, as a wrapped "5 %" may."""
+    for path in PAGES:
+        for line in _BLOCK.sub("\n", path.read_text(encoding="utf-8")).splitlines():
+            assert not line.lstrip().startswith("%"), f"{named(path)}: {line}"
+
+
 def test_links__lead_somewhere():
     for path in PAGES:
         for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):
