@@ -48,7 +48,11 @@ html_theme_options = {
 #: Only sections with pages below them have something to list in a sidebar.
 html_sidebars = {
     "**": ["sidebar-nav-bs"],
-    **{page.stem: [] for page in Path(__file__).parent.glob("*.[mi][dp]*") if page.stem != "reference"},
+    **{
+        page.stem: []
+        for page in Path(__file__).parent.glob("*.[mi][dp]*")
+        if page.stem != "reference"
+    },
 }
 copyright = author
 
