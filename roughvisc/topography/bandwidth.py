@@ -16,7 +16,7 @@ from roughvisc.topography.grid import checked, like, noted, number, require_heig
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
-    """Height less its least-squares polynomial over the points present.
+    """Subtract the least-squares polynomial of the points present.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Levelled height, of zero mean. [m]
+        Levelled height with zero mean. [m]
 
     Raises
     ------
@@ -71,23 +71,23 @@ def off_plane(h: xr.DataArray) -> xr.DataArray:
 def gaussian_filter(
     h: xr.DataArray, cutoff: float, keep: Literal["long", "short"] = "long", periodic: bool = False
 ) -> xr.DataArray:
-    r"""Areal Gaussian filter by normalised convolution.
+    r"""Apply an areal Gaussian filter by normalised convolution.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
     cutoff : float
-        Wavelength of which half the amplitude passes; at least three cells. [m]
+        Wavelength at which half the amplitude passes; at least three cells. [m]
     keep : {"long", "short"}, default "long"
-        "long": waves longer than the cut-off (an S-filter). "short": the rest (an L-filter, the roughness).
+        "long": wavelengths above the cut-off (an S-filter). "short": the rest (an L-filter, the roughness).
     periodic : bool, default False
-        Whether the surface repeats; otherwise the weights end at its border.
+        Whether the surface is periodic; otherwise the weights end at its border.
 
     Returns
     -------
     xarray.DataArray
-        Filtered height; what is missing stays missing and weighs nothing. [m]
+        Filtered height; missing points stay missing and have no weight. [m]
 
     Raises
     ------
@@ -96,9 +96,9 @@ def gaussian_filter(
 
     Notes
     -----
-    The weight is :math:`\exp(-\pi (r / \alpha \lambda_c)^2)` with :math:`\alpha = \sqrt{\ln 2 / \pi}`, so that waves
-    of length :math:`\lambda` pass by :math:`\exp(-\pi (\alpha \lambda_c / \lambda)^2)`: 50 % at the cut-off. Where
-    points are missing or the scan ends, the weights of the points present are scaled to a sum of one.
+    The weight is :math:`\exp(-\pi (r / \alpha \lambda_c)^2)` with :math:`\alpha = \sqrt{\ln 2 / \pi}`, so the
+    transmission at the wavelength :math:`\lambda` is :math:`\exp(-\pi (\alpha \lambda_c / \lambda)^2)`: 50 % at the
+    cut-off. At missing points and at the border, the weights of the remaining points are scaled to a sum of one.
 
     References
     ----------

@@ -31,23 +31,24 @@ _DEPARTURE = 2.0
 def fit_self_affine(
     h: xr.DataArray, *, meet: Literal["rms_slope", "rms_height"] = "rms_slope", periodic: bool = False
 ) -> dict[str, float | None]:
-    r"""Parameters of self-affine roughness that has the spectrum of a scan.
+    r"""Fit the parameters of self-affine roughness to the spectrum of a scan.
 
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y), without missing points; of at least 16 cells each way. [m]
+        Height over (x, y), without missing points, with at least 16 cells along each axis. [m]
     meet : {"rms_slope", "rms_height"}, default "rms_slope"
-        Which of the two is given: the slope, which decides on the contact area, or the height.
+        Which of the two is returned: the slope, which determines the contact area, or the height.
     periodic : bool, default False
-        Whether the surface repeats. Otherwise a plane is taken off, and the border is weighted down by a Hann window.
+        Whether the surface is periodic. Otherwise a plane is subtracted, and a Hann window reduces the weight of the
+        border.
 
     Returns
     -------
     dict
-        ``hurst`` [-], ``rolloff`` [m], or None where the power law reaches the longest wave seen, ``shortcut`` [m],
-        ``anisotropy`` [-], and ``rms_slope`` [-] of the waves longer than the short cut-off, or ``rms_height`` [m]:
-        what :func:`roughvisc.self_affine` takes, as ``self_affine(size, shape, **fit_self_affine(h), seed=1)``.
+        ``hurst`` [-], ``rolloff`` [m], or None if the power law reaches the longest wavelength, ``shortcut`` [m],
+        ``anisotropy`` [-], and ``rms_slope`` [-] of the wavelengths above the short cut-off, or ``rms_height`` [m]: the
+        arguments of :func:`roughvisc.self_affine`, as in ``self_affine(size, shape, **fit_self_affine(h), seed=1)``.
 
     Raises
     ------
@@ -56,11 +57,11 @@ def fit_self_affine(
 
     Notes
     -----
-    The model is :math:`C = c \max(q, q_r)^{-2 - 2H}` for :math:`q < q_s`, with anything beyond. It is
-    fitted to the modes' power by Whittle's likelihood, :math:`\sum \ln C + |\tilde h|^2 / C`, over rings of
-    :math:`q = |(\sqrt a\, q_x, q_y / \sqrt a)|`, with the anisotropy :math:`a` that leaves no direction preferred. The
-    short cut-off is where the spectrum leaves the power law for good, downward (the instrument sees no finer) or upward
-    (noise), by a factor of two or more; two cells where it does not.
+    The model is :math:`C = c \max(q, q_r)^{-2 - 2H}` for :math:`q < q_s`, and arbitrary beyond :math:`q_s`. It is
+    fitted to the power of the modes by Whittle's likelihood, :math:`\sum \ln C + |\tilde h|^2 / C`, over rings of
+    :math:`q = |(\sqrt a\, q_x, q_y / \sqrt a)|`, with the anisotropy :math:`a` for which no direction is preferred. The
+    short cut-off is the wavelength below which the spectrum deviates from the power law by a factor of two or more,
+    downwards (resolution of the instrument) or upwards (noise); otherwise it is two cells.
 
     References
     ----------

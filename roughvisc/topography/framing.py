@@ -26,7 +26,7 @@ from roughvisc.topography.laying import laid_on
 
 
 def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> xr.DataArray:
-    """The part of a scan whose cell centres lie within limits.
+    """Crop a scan to the cells whose centres lie within limits.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, 
     Returns
     -------
     xarray.DataArray
-        The part; its coordinates are those that it had. [m]
+        The part, with its coordinates unchanged. [m]
 
     Raises
     ------
     InputError
-        If limits are no pair, or fewer than two cells lie within in a direction.
+        If limits are not a pair, or fewer than two cells lie within them along an axis.
     """
     h = checked(h, "crop")
     whole = h.shape
@@ -64,7 +64,7 @@ def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, 
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
-    """The surface turned by quarter turns, counter-clockwise as seen from above (x to the right, y up).
+    """Rotate a surface by quarter turns, counter-clockwise seen from above (x to the right, y up).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        The turned surface; coordinates start half a cell from zero. [m]
+        The rotated surface; coordinates start half a cell from zero. [m]
     """
     h = checked(h, "rotate90")
     TURNS.check("rotate90: turns", turns)
@@ -95,7 +95,7 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
 
 
 def invert(h: xr.DataArray) -> xr.DataArray:
-    """The surface with valleys for peaks, as a replica has it; x and y stay as they are.
+    """Exchange peaks and valleys, for the scan of a replica; x and y do not change.
 
     Parameters
     ----------
@@ -119,39 +119,38 @@ def combine(
     align: Literal["grid", "centre"] = "grid",
     offset: tuple[float, float] = (0.0, 0.0),
 ) -> xr.DataArray:
-    """One rigid profile for two scanned faces that are pressed together: the sum of their heights.
+    """Combine two scanned faces in contact to one rigid profile, the sum of their heights.
 
     Parameters
     ----------
     h1, h2 : xarray.DataArray
         Heights of the faces, each with its peaks towards the other. [m]
     flip : {"x", "y"}, optional
-        The axis along which the second face is reversed, as it is when a scan taken from above is turned over onto
-        the first. Default: `h2` is in the coordinates of `h1` already.
+        Axis along which the second face is reversed when a scan taken from above is turned over onto the first.
+        Default: `h2` is already in the coordinates of `h1`.
     align : {"grid", "centre"}, default "grid"
-        "grid": the two are on one grid. "centre": the second face, turned over, is laid with its centre on that of the
-        first; the sum is on those cells of the first that the second covers wholly. Over them the second is
-        averaged by area where its cells are smaller. Where they are larger it is interpolated between its cell centres,
-        by a cubic spline, or linearly if points of it are missing.
+        "grid": both faces are on the same grid. "centre": the centre of the second face, turned over, is aligned with
+        that of the first; the sum is on the cells of the first that the second covers completely. If the cells of the
+        second are smaller, it is averaged by area. If they are larger, it is interpolated between its cell centres by a
+        cubic spline, or linearly if points of it are missing.
     offset : pair of float
-        How far the second's centre lies from that of the first, along x and y; with `align` "centre". [m]
+        Position of the second centre relative to the first, along x and y; with `align` "centre". [m]
 
     Returns
     -------
     xarray.DataArray
-        Sum of heights on the grid of the first, missing where either is, marked as filled where either was. It counts
-        as tapered where both faces are. [m]
+        Sum of heights on the grid of the first face, missing where either face is missing, and marked as filled where
+        either was filled. It counts as tapered if both faces are. [m]
 
     Raises
     ------
     InputError
-        If the grids differ and are not aligned by their centres, or the faces have less than two cells in common along
-        an axis.
+        If the grids differ and are not aligned by their centres, or the faces share fewer than two cells along an axis.
 
     Notes
     -----
-    Two elastic or viscoelastic half-spaces that touch without friction have the gap of one rigid profile, the sum of
-    both, before a flat half-space whose contact compliance is the sum of theirs, :func:`roughvisc.pair`.
+    The frictionless contact of two elastic or viscoelastic half-spaces is equivalent to that of one rigid profile, the
+    sum of both, on a flat half-space whose contact compliance is the sum of theirs, :func:`roughvisc.pair`.
 
     References
     ----------
@@ -224,7 +223,7 @@ def _filled(h: xr.DataArray) -> np.ndarray:
 
 
 def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
-    """Height that runs out to its mean towards the border, so that it repeats without a step.
+    """Let heights fall to their mean at the border, so that the surface repeats without a step.
 
     Parameters
     ----------
@@ -237,17 +236,17 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
     -------
     xarray.DataArray
         Mean plus the deviation times a raised cosine, which is zero on the border and one inside the margin. The
-        coordinates ``taper_x`` and ``taper_y`` hold these weights along each axis. [m]
+        coordinates ``taper_x`` and ``taper_y`` contain these weights along each axis. [m]
 
     Notes
     -----
-    A taper is no equal of :func:`mirror`, which leaves the roughness as it is. The margin is smooth: the harder it is
-    pressed, the more of it touches. The nominal area of a tapered surface is the integral of the weight, and in the
-    contact fraction of a result each cell counts by its weight. Tried on periodic self-affine surfaces, whose true
-    contact is known without a taper: with margins of up to 10 % of the side that fraction is right within 3 % where
-    the true one is up to 0.2, and 6 % too small where it is 0.4. The contact area over that of the whole grid is 8 %
-    too small at a margin of 3 %, and 17 % at 10 %; there the mean gap is as far off. An audit has a row ``window``:
-    doubtful from a margin of 3 % of the side, broken from 10 %.
+    A taper is not equivalent to :func:`mirror`, which does not change the roughness. The margin is smooth, and more of
+    it touches under a higher load. The nominal area of a tapered surface is the integral of the weight, and in the
+    contact fraction of a result each cell counts by its weight. On periodic self-affine surfaces, whose true contact is
+    known without a taper, and with margins of up to 10 % of the side, this fraction is accurate to 3 % for true
+    fractions of up to 0.2, and 6 % too small at 0.4. The contact area over the area of the whole grid is 8 % too small
+    at a margin of 3 %, and 17 % at 10 %, where the mean gap has the same error. An audit has a row ``window``: doubtful
+    from a margin of 3 % of the side, broken from 10 %.
     """
     h = checked(h, "taper")
     widths = pair("width", width)
@@ -272,9 +271,10 @@ def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
-    """The surface with its mirror images, twice as long each way: it repeats without a step, slopes reverse.
+    """Add the mirror images of a surface, so that it repeats without a step.
 
-    Contact with periodic boundaries is solved on a quarter of it, and costs no more than that of the surface itself.
+    The result is twice as long along each axis, and slopes reverse at the seams. Contact with periodic boundaries is
+    solved on a quarter of it, and costs no more than that of the surface itself.
 
     Parameters
     ----------

@@ -37,8 +37,8 @@ def sphere(radius: float, size: Any, shape: Any, exact: bool = False) -> xr.Data
     Returns
     -------
     xarray.DataArray
-        Height over (x, y), not above zero. [m] The apex is at ``size / 2``, which lies between the cells where
-        their number is even; with even numbers of cells a quarter of the contact is solved, in half the time or less.
+        Height over (x, y), not above zero. [m] The apex is at ``size / 2``, which lies between the cells if their
+        number is even. With even numbers of cells only a quarter of the contact is solved, in half the time or less.
 
     Raises
     ------

@@ -24,7 +24,7 @@ _AT_ONCE = 2_000_000
 
 
 def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> xr.DataArray:
-    """Height with spikes made missing.
+    """Replace spikes by missing points.
 
     Parameters
     ----------
@@ -33,8 +33,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     window : int, default 9
         Side of the square window of the local median, an odd number of points.
     threshold : float, default 8
-        How far a point may be from the local median, in standard deviations as the median absolute deviation
-        estimates them; the larger of the window's own and the whole scan's counts.
+        Largest distance of a point from the local median, in standard deviations estimated from the median absolute
+        deviation, of the window or of the whole scan, whichever is larger.
 
     Returns
     -------
@@ -44,12 +44,12 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     Raises
     ------
     InputError
-        If `window` is not an odd number of at least 3, or `threshold` not positive.
+        If `window` is not an odd number of at least 3, or `threshold` is not positive.
 
     Notes
     -----
-    Instruments fail at steep flanks and put spikes beside the missing points. Mask them before :func:`fill`, which
-    would take the spikes for the rim of the hole.
+    Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
+    would otherwise use the spikes as the rim of the hole.
     """
     h = checked(h, "mask_outliers")
     WINDOW.check("mask_outliers: window", window)
@@ -72,27 +72,27 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
 
 
 def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "harmonic") -> xr.DataArray:
-    """Height with its missing points filled in, and marked as such.
+    """Fill missing points, and mark them as filled.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
     method : {"harmonic", "nearest", "linear"}, default "harmonic"
-        "harmonic": the membrane spanned over each hole (Laplace's equation, no flux through the scan's border).
-        "nearest": the value of the nearest point present. "linear": on the triangles between points present, the
-        nearest outside of them.
+        "harmonic": a membrane over each hole (Laplace's equation, no flux through the border of the scan). "nearest":
+        the value of the nearest valid point. "linear": linear interpolation on triangles between valid points, and the
+        nearest value outside them.
 
     Returns
     -------
     xarray.DataArray
-        Height without missing points; the coordinate ``filled`` over (x, y) marks those that were, the attributes
-        ``filled_points`` and ``fill_method`` say how many and how. [m]
+        Height without missing points. The coordinate ``filled`` over (x, y) marks the filled points; the attributes
+        ``filled_points`` and ``fill_method`` state their number and the method. [m]
 
     Raises
     ------
     InputError
-        If the method is another, all points are missing, or they are absent on purpose (no material there).
+        If the method is unknown, all points are missing, or they are absent on purpose (no material there).
     """
     h = checked(h, "fill")
     FILL.check("fill: method", method)

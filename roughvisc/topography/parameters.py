@@ -31,21 +31,21 @@ PARAMETERS = {
 
 
 def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
-    r"""Areal parameters about the mean height.
+    r"""Areal surface parameters about the mean height.
 
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y), NaN where missing; level it first where it is tilted. [m]
+        Height over (x, y), NaN where missing; level a tilted surface first. [m]
     periodic : bool, default False
-        Whether the differences reach across the border.
+        Whether differences are also taken across the border.
 
     Returns
     -------
     xarray.Dataset
         Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr, rms_slope, rms_slope_x, rms_slope_y [-], rms_curvature [1/m] and
-        missing_fraction [-], each with units and a name. Missing points take no part, nor do differences that would
-        need them; a parameter that no point is left for is NaN. Across a strip, one cell wide, heights do not vary.
+        missing_fraction [-], each with units and a name. Missing points and differences with them are ignored; a
+        parameter without any valid point is NaN. On a strip one cell wide, heights do not vary across it.
 
     Raises
     ------
@@ -54,8 +54,8 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
 
     Notes
     -----
-    Slopes are first differences to the next point, curvatures second differences about a point, as
-    SurfaceTopography has them. They see waves of a few cells weakened: a wave of length :math:`n` cells by
+    Slopes are first differences to the next point, curvatures second differences about a point, as in
+    SurfaceTopography. They underestimate short wavelengths: a wavelength of :math:`n` cells by the factor
     :math:`\mathrm{sinc}(1/n)`. Sdr is a ratio, not in per cent.
 
     References
@@ -101,7 +101,7 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
     h : xarray.DataArray
         Height over (x, y), NaN where missing. [m]
     periodic : bool
-        Whether the differences reach across the border.
+        Whether differences are also taken across the border.
     depth : float
         A corner of three neighbouring points counts if one of them lies no deeper. [m]
 

@@ -81,13 +81,13 @@ def read_file(
 
 
 def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArray:
-    """Plain array as a labelled grid.
+    """Convert an array to a labelled height grid.
 
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m] A matrix whose rows
-        run along x, as in the files that :func:`roughvisc.open_scan` reads, is to be transposed.
+        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m] Transpose a matrix
+        whose rows run along x, as in the files that :func:`roughvisc.open_scan` reads.
     spacing : float or pair of float
         Cell sides (dx, dy). [m]
 
@@ -99,7 +99,8 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     Raises
     ------
     InputError
-        If the array is not two-dimensional with at least two points each way, or holds no or infinite heights.
+        If the array is not two-dimensional with at least two points along each axis, or contains infinite heights or
+        no valid ones.
     """
     values = np.array(in_metres(heights, "heights"))
     if values.ndim != 2 or min(values.shape) < 2:
@@ -110,7 +111,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
 
 
 def list_channels(path: str | os.PathLike[str], *, format: str | None = None) -> tuple[Channel, ...]:
-    """What a scan file holds, without loading it.
+    """List the channels of a scan file, without loading it.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     Raises
     ------
     InputError
-        If the file is absent, damaged or of unknown format.
+        If the file is absent, damaged or of an unknown format.
     """
     path = existing(path)
     with _reading(path):
@@ -139,7 +140,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
 
 
 def supported_formats() -> dict[str, tuple[str, ...]]:
-    """Names of all formats, as ``format=`` takes them, with their usual suffixes.
+    """Names of all formats, for ``format=``, with their usual suffixes.
 
     Returns
     -------

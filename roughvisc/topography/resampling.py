@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 
 
 def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:
-    r"""Height on another number of cells over the same domain.
+    r"""Resample to another number of cells over the same domain.
 
     Parameters
     ----------
@@ -47,28 +47,28 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     shape : int or pair of int
         New number of cells ``(nx, ny)``.
     periodic : bool, optional
-        Whether the surface repeats in x and in y. Default: whether it was made to, by :func:`self_affine`,
-        :func:`wavy`, :func:`mirror` or :func:`taper`, and is still one period (attribute ``period``).
+        Whether the surface is periodic in x and in y. Default: whether :func:`self_affine`, :func:`wavy`,
+        :func:`mirror` or :func:`taper` made it periodic and it is still one period (attribute ``period``).
 
     Returns
     -------
     xarray.DataArray
-        Height at the centres of the new cells; the last line of its ``history`` says by which way. [m]
+        Height at the centres of the new cells; the last line of its ``history`` states the method. [m]
 
-        A periodic surface: by Fourier interpolation, finer as well as coarser. A coarser grid keeps the waves longer
-        than two of its cells and leaves out the others.
+        A periodic surface is resampled by Fourier interpolation. A coarser grid keeps the wavelengths longer than two
+        of its cells and removes the others.
 
-        Another surface: along an axis of more cells by the cubic spline through the old cell centres, which is held
-        beyond the outermost of them; along an axis of fewer cells by the mean over each new cell, which conserves the
-        volume. (:func:`band_limit` keeps the waves instead.)
+        Any other surface is refined by a cubic spline through the old cell centres, constant beyond the outermost ones,
+        and coarsened by the mean over each new cell, which conserves the volume, along each axis separately.
+        (:func:`band_limit` keeps the wavelengths instead.)
 
-        A surface with missing points, periodic or not: by means as above, and linear between the centres where finer.
-        A new cell is missing where less than half of it is present.
+        A surface with missing points, periodic or not, is coarsened by means as above, and refined by linear
+        interpolation between the centres. A new cell is missing if less than half of it is present.
 
     Raises
     ------
     InputError
-        If the shape is no pair of whole numbers of at least 2, or `periodic` is true and points are missing.
+        If `shape` is not a pair of whole numbers of at least 2, or `periodic` is true and points are missing.
 
     Notes
     -----
@@ -76,8 +76,8 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
 
     .. math:: h(X_j) = \frac{1}{n} \sum_{|k| < \min(n, m) / 2} h_k \, e^{2 \pi i k j / m} e^{i \pi k (1/m - 1/n)},
 
-    where the last factor is the distance between the first centres of both grids. A wave of exactly two old cells is
-    kept on a finer grid, as the sine that is largest at the old centres.
+    where the last factor accounts for the distance between the first centres of both grids. A wavelength of exactly two
+    old cells is kept on a finer grid, as the sine that is largest at the old centres.
     """
     h = checked(h, "resample")
     shape = counts("shape", shape)
@@ -95,7 +95,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
 
 
 def band_limit(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:
-    """Height on another number of cells over the same domain, with all waves that both grids hold and no others.
+    """Resample to another number of cells, with exactly the wavelengths that both grids resolve.
 
     Parameters
     ----------
@@ -109,21 +109,21 @@ def band_limit(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | N
     Returns
     -------
     xarray.DataArray
-        Height at the centres of the new cells, of the same mean; missing where less than half of a cell is present. [m]
+        Height at the centres of the new cells, with the same mean; missing where less than half of a cell is present.
+        [m]
 
     Raises
     ------
     InputError
-        If the shape is no pair of whole numbers of at least 2, or cells are absent (no material there).
+        If `shape` is not a pair of whole numbers of at least 2, or cells are absent (no material there).
 
     Notes
     -----
-    A periodic surface is a sum of waves, and this is what :func:`resample` does. Another one is a sum of cosines
-    together with its mirror images. A coarser grid keeps the waves that are longer than two of its cells, and their
-    slopes. Means, which :func:`resample` takes of a surface that does not repeat, lessen waves up to ten cells long and
-    let shorter ones through as waves that are not there: on cells twice as long the contact area is then off by 1.2 to
-    1.8 times as much, and mean gap and approach by 2 to 100 times (docs/howto/big-scans.md). Missing points are bridged
-    as :func:`fill` does.
+    A periodic surface is expanded in a Fourier series, as in :func:`resample`. Any other surface and its mirror images
+    are expanded in cosines. A coarser grid keeps the wavelengths longer than two of its cells, and their slopes. The
+    block means that :func:`resample` takes for a surface that is not periodic damp wavelengths of up to ten cells and
+    alias shorter ones: on cells twice as long the error of the contact area is then 1.2 to 1.8 times as large, and that
+    of mean gap and approach 2 to 100 times (docs/howto/big-scans.md). Missing points are bridged as :func:`fill` does.
     """
     h = checked(h, "band_limit")
     shape = counts("shape", shape)
@@ -144,22 +144,22 @@ def band_limit(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | N
 
 
 def without_short_waves(h: xr.DataArray, shortest: float, periodic: bool | None = None) -> xr.DataArray:
-    """Height without the waves that are shorter than a length, on the same cells.
+    """Remove all wavelengths below a limit, on the same cells.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y), without missing points. [m]
     shortest : float
-        Wavelength of the shortest waves that are kept; at least two cells, and shorter than the sides. [m]
+        Shortest wavelength to keep; at least two cells, and shorter than the sides. [m]
     periodic : bool, optional
         Whether the surface repeats in x and in y; default as in :func:`resample`.
 
     Returns
     -------
     xarray.DataArray
-        Of the same mean. A periodic surface is a sum of waves. Another one is a sum of cosines together with its mirror
-        images. The cut is sharp: see :func:`gaussian_filter` for a smooth one. [m]
+        Height with the same mean. A periodic surface is expanded in a Fourier series, any other surface and its mirror
+        images in cosines. The cut-off is sharp: see :func:`gaussian_filter` for a smooth one. [m]
 
     Raises
     ------

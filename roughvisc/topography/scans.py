@@ -19,40 +19,39 @@ def open_scan(
     height_unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
-    """Heights of a scanned surface, from an instrument file, a grid file or a surface card.
+    """Open a scanned surface from an instrument file, a grid file or a surface card.
 
     Parameters
     ----------
     path : path
         X3P, SDF, NetCDF, CSV, a surface card (``.toml``), or any format that SurfaceTopography reads.
     format : str, optional
-        A key of :func:`~roughvisc.supported_formats`; ``"auto"`` has the format guessed from the content. Default: by
+        A key of :func:`~roughvisc.supported_formats`, or ``"auto"`` to guess the format from the content. Default: by
         the suffix.
     channel : int or str, optional
-        Number or name of the channel, see :func:`~roughvisc.list_channels`. Default: the height channel, or the one
-        that the library prefers where there are several; the others are then listed in the attribute
-        ``other_channels``.
+        Number or name of the channel, see :func:`~roughvisc.list_channels`. Default: the height channel, or the default
+        of the library if there are several; the attribute ``other_channels`` then lists the others.
     unit : str, optional
-        Unit of length in a file that states none, as ``"um"``.
+        Unit of length in a file that states none, such as ``"um"``.
     height_unit : str, optional
-        Unit of the heights in a file that states none, where it is another than that of x and y: points in mm, mm, um
-        are read by ``unit="mm", height_unit="um"``.
+        Unit of the heights in a file that states none, if it differs from that of x and y: for points in mm, mm, um use
+        ``unit="mm", height_unit="um"``.
     spacing : float or pair of float, optional
-        Cell sides (dx, dy), in place of what the file says. [m]
+        Cell sides (dx, dy), instead of those in the file. [m]
 
     Returns
     -------
     xarray.DataArray
-        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing
-        is size over number of points. The attributes hold the file's name and checksum, format, instrument, channel,
-        orientation (whether y is known to point up, or the map may be a mirror image) and ``history``. Rows of a matrix
-        in text, CSV or NumPy run along x: row j of the file is ``y[j]``.
+        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing is
+        the size over the number of points. The attributes contain the name and checksum of the file, format,
+        instrument, channel, orientation (whether y is known to point up, or the map may be a mirror image) and
+        ``history``. Rows of a matrix in text, CSV or NumPy run along x: row j of the file is ``y[j]``.
 
     Raises
     ------
     InputError
-        If the file is absent, damaged, of unknown format, no areal height scan, without unit or size, or implausible:
-        wider than 1 m, finer than 10 pm, heights beyond 1 m.
+        If the file is absent, damaged, of an unknown format, not an areal height scan, without unit or size, or
+        implausible: wider than 1 m, cells below 10 pm, heights beyond 1 m.
 
     Warns
     -----

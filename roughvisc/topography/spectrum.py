@@ -116,36 +116,38 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None, *, bridge: bool 
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y), without missing points unless these are bridged. [m]
+        Height over (x, y), without missing points unless they are bridged. [m]
     window : {"hann"}, optional
-        None for a surface that repeats. "hann": a cosine window, for a scan that does not (its mean square is one).
+        None for a periodic surface. "hann": a cosine window with a mean square of one, for any other scan.
     bridge : bool
-        Whether to go by measured points alone. Those that are missing or were filled in are bridged smoothly, and so
-        are those left over inside a large hole or on its rim, which are wrong more often than not.
+        Whether to use measured points only. Missing and filled points are bridged smoothly, and so are isolated points
+        inside a large hole or on its rim, which are mostly wrong.
 
     Returns
     -------
     xarray.Dataset
         Over ``wavevector`` [rad/m], the mean modulus of each ring: ``psd`` [m4], the mean of the two-dimensional
-        density over the ring, and ``modes``, the number of waves in it.
+        density over the ring, and ``modes``, the number of modes in it.
 
     Raises
     ------
     InputError
-        If points are missing and not to be bridged, more than half of them are, or the window is another.
+        If points are missing and not bridged, more than half of them are missing, or the window is unknown.
 
     Notes
     -----
-    The density is :math:`C(\mathbf q) = |\tilde h|^2 / A` with :math:`\tilde h = \Delta x \Delta y \sum h\,
-    e^{-i \mathbf q \cdot \mathbf r}`, so that :math:`\langle h^2 \rangle = (2 \pi)^{-2} \int C\, d^2q`. Every wave is
-    in one ring: the sum of ``psd * modes`` over the area :math:`A` is the variance exactly (Parseval) where there is no
-    window. Rings are as wide as the coarser of the two wavevector steps; beyond the Nyquist wavevector they are parts.
+    The density is :math:`C(\mathbf q) = |\tilde h|^2 / A` with :math:`\tilde h = \Delta x \Delta y \sum h\, e^{-i
+    \mathbf q \cdot \mathbf r}`, so that :math:`\langle h^2 \rangle = (2 \pi)^{-2} \int C\, d^2q`. Every mode is in
+    exactly one ring: without a window, the sum of ``psd * modes`` over the area :math:`A` is exactly the variance
+    (Parseval). Rings are as wide as the larger of the two wavevector steps; beyond the Nyquist wavevector they are
+    incomplete.
 
-    A steep spectrum ends many orders of magnitude below where it begins. Missing points that are set to the mean, or
-    filled by a membrane (:func:`roughvisc.fill`), have steps or kinks at their rims, which raise that end: at 10 % of
-    missing points, and noise a hundredth of the rms height, to 100 times and 1.7 times what it is. Bridges go on with
-    the curvature beyond the rim: the end is then off by up to a quarter at 10 %, by 1 % at 0.4 %. A large hole holds
-    no waves shorter than it is wide: the end is too low by the share of such holes in the square of the window.
+    A steep spectrum falls by many orders of magnitude from long to short wavelengths. Missing points that are set to
+    the mean or filled by a membrane (:func:`roughvisc.fill`) have steps or kinks at their rims, which raise its
+    short-wavelength end: with 10 % of missing points and noise of a hundredth of the rms height, by a factor of 100 and
+    1.7. Bridges continue the curvature beyond the rim: the error of the end is then up to a quarter at 10 % of missing
+    points, and 1 % at 0.4 %. A large hole contains no wavelengths shorter than its width: the end is too low by the
+    share of such holes in the square of the window.
 
     References
     ----------

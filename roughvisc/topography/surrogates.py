@@ -20,7 +20,7 @@ from roughvisc.topography.synthesis import RandomWaves, make_hermitian, synthesi
 def surrogates(
     h: xr.DataArray, count: int, *, seed: int, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
 ) -> xr.DataArray:
-    r"""Random surfaces with the spectrum of a surface: what other patches of the same roughness may look like.
+    r"""Random surfaces with the spectrum of a surface, as models of other patches of the same roughness.
 
     Parameters
     ----------
@@ -29,27 +29,27 @@ def surrogates(
     count : int
         Number of surfaces.
     seed : int
-        Source of phases and amplitudes. One seed and one number are one surface, on any grid of this size.
+        Source of random phases and amplitudes. A seed and a number define one surface, on any grid of this size.
     amplitudes : {"gaussian", "fixed"}
-        As :func:`self_affine` has them. With "fixed" each surface has the rms height of the spectrum exactly, and what
-        depends on it scatters too little.
+        As in :func:`self_affine`. With "fixed" each surface has exactly the rms height of the spectrum, and quantities
+        that depend on it scatter too little.
 
     Returns
     -------
     xarray.DataArray, dims (realisation, x, y)
-        Periodic surfaces of zero mean over the same cells, numbered from 1. [m]
+        Periodic surfaces with zero mean over the same cells, numbered from 1. [m]
 
     Raises
     ------
     InputError
-        If points are missing, `count` is no positive whole number, `seed` is none, or `amplitudes` is neither word.
+        If points are missing, `count` is not a positive whole number, `seed` is not valid, or `amplitudes` is unknown.
 
     Notes
     -----
-    The spectrum is the radial average of :func:`psd`, up to the largest wave number whose ring is whole: direction and
-    shape (skewness, kurtosis, ridges) of the surface are lost. A surface that does not repeat is taken with its mirror
-    images; one that is made of mirror images gives surfaces as large as the part that is mirrored, since that part is
-    all that was measured.
+    The spectrum is the radial average of :func:`psd`, up to the largest wave number with a complete ring. Direction and
+    shape (skewness, kurtosis, ridges) of the surface are lost. A surface that is not periodic is used with its mirror
+    images. A surface made by :func:`mirror` gives surfaces as large as the original part, because only that part was
+    measured.
 
     References
     ----------
@@ -57,8 +57,9 @@ def surrogates(
 
     Examples
     --------
-    >>> scan = self_affine(1e-3, (31, 33), hurst=0.8, rms_height=1e-6, seed=1)
-    >>> surrogates(scan, 3, seed=7).sizes["realisation"]
+    >>> import roughvisc as rv
+    >>> scan = rv.self_affine(1e-3, (31, 33), hurst=0.8, rms_height=1e-6, seed=1)
+    >>> rv.surrogates(scan, 3, seed=7).sizes["realisation"]
     3
     """
     if not (isinstance(count, int | np.integer) and not isinstance(count, bool) and count >= 1):

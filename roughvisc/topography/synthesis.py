@@ -29,11 +29,11 @@ def wavy(amplitude: float, wavelength: float, size: Any, shape: Any, waves: int 
     amplitude : float
         Amplitude :math:`a`. [m]
     wavelength : float
-        Wavelength :math:`2 \pi / k`; the domain must hold a whole number of them. [m]
+        Wavelength :math:`2 \pi / k`; each side must be a whole number of wavelengths. [m]
     size : float or pair of float
         Sides of the domain. [m]
     shape : int or pair of int
-        Number of cells ``(nx, ny)``; one along y has the crests run through it.
+        Number of cells ``(nx, ny)``; with one cell along y the crests run along y.
     waves : {1, 2}, default 2
         1: :math:`a \cos kx` (Westergaard). 2: :math:`a \cos kx \cos ky` (Johnson, Greenwood and Higginson).
 
@@ -77,9 +77,10 @@ def self_affine(
     amplitudes: Literal["fixed", "gaussian"] = "fixed",
     seed: int | np.random.Generator,
 ) -> xr.DataArray:
-    r"""Periodic self-affine roughness by Fourier synthesis with random phases.
+    r"""Generate periodic self-affine roughness by Fourier synthesis with random phases.
 
-    One seed is one surface: a finer grid of the same size keeps the waves of a coarser one and adds shorter ones.
+    Each seed defines one surface: a finer grid of the same size keeps the wavelengths of a coarser one and adds shorter
+    ones.
 
     Parameters
     ----------
@@ -90,47 +91,48 @@ def self_affine(
     hurst : float
         Hurst exponent :math:`H`, in (0, 1]. [-]
     rms_slope, rms_height : float
-        Exactly one: the root mean square of the gradient [-], or of the height about its mean [m], of all waves that
-        the grid holds down to `shortcut`; with Gaussian amplitudes its mean square over all seeds. It is met to
-        rounding, as the band-limited function has it: finite differences on the grid see a little less slope.
+        Exactly one: the root mean square of the gradient [-], or of the height about its mean [m], of all wavelengths
+        that the grid resolves down to `shortcut`; with Gaussian amplitudes the root mean square over all seeds. The
+        band-limited function has this value to rounding; finite differences on the grid give a slightly smaller slope.
     rolloff : float, optional
-        Wavelength above which the spectrum is constant. [m] Default: none, the power law reaches the domain's size.
+        Wavelength above which the spectrum is constant. [m] Default: none, the power law reaches the size of the
+        domain.
     shortcut : float, optional
-        Wavelength below which there is nothing. [m] Default: two cells (the longer of the two sides). State it to
-        have the same heights on every grid that holds it. Without it a finer grid has more waves: then the common ones
-        are lower, all by one factor, so that the surface as a whole meets `rms_slope` or `rms_height`.
+        Shortest wavelength. [m] Default: two cells (the longer of the two sides). With it, the heights are the same on
+        every grid that resolves it. Without it a finer grid has more wavelengths, and the common ones are lower by one
+        factor, so that the whole surface has the given `rms_slope` or `rms_height`.
     anisotropy : float, default 1
-        How many times longer the texture is along x than along y. [-] Wavelengths then refer to the geometric mean
-        of both directions.
+        Length of the texture along x over that along y. [-] Wavelengths then refer to the geometric mean of both
+        directions.
     amplitudes : {"fixed", "gaussian"}, default "fixed"
-        "fixed": each wave has the amplitude of the spectrum, and only phases are random. Then the rms height and the
-        rms slope are the same for every seed, and what hangs on them scatters too little: the mean gap 3 to 10 times
-        less than over patches of a random surface. "gaussian": amplitudes are random too, as those of patches are.
-        Take it where the scatter over realisations matters.
+        "fixed": each mode has the amplitude of the spectrum, and only phases are random. The rms height and the rms
+        slope are then the same for every seed, and quantities that depend on them scatter too little: the mean gap 3 to
+        10 times less than over patches of a random surface. "gaussian": amplitudes are random too, as in patches. Use
+        it if the scatter over realisations matters.
     seed : int or numpy.random.Generator
-        Source of phases and amplitudes.
+        Source of random phases and amplitudes.
 
     Returns
     -------
     xarray.DataArray
-        Height over (x, y), of zero mean. [m]
+        Height over (x, y), with zero mean. [m]
 
     Raises
     ------
     InputError
-        If a parameter is out of its range, `amplitudes` is neither word, both or none of `rms_slope` and `rms_height`
-        are given, or no wave of the domain lies between roll-off and short cut-off.
+        If a parameter is out of range, `amplitudes` is unknown, both or none of `rms_slope` and `rms_height` are given,
+        or no wavelength of the domain lies between roll-off and short cut-off.
 
     Notes
     -----
     The spectrum is :math:`C \propto \max(q, q_r)^{-2 - 2H}` for :math:`q < q_s`. Phases are uniform and independent.
-    Fixed amplitudes follow the spectrum exactly. Gaussian ones are those times the modulus of a complex normal number
-    of mean square one: the height is then a Gaussian random field.
+    Fixed amplitudes follow the spectrum exactly. Gaussian amplitudes are these times the modulus of a complex normal
+    number of mean square one, so the height is a Gaussian random field.
 
-    Numbers are drawn by wavevector :math:`2 \pi (k_x / L_x, k_y / L_y)`: each :math:`k_x` has a stream of its own,
-    spawned from the seed [2]_, which is drawn from :math:`k_y = 0` upwards. The grid only decides how many streams
-    there are and how far each is drawn. Phases are those at the corner :math:`x = y = 0`. The transform is real and
-    done in place: the peak is little more than the memory of the result.
+    Random numbers belong to wavevectors :math:`2 \pi (k_x / L_x, k_y / L_y)`: each :math:`k_x` has its own stream,
+    spawned from the seed [2]_ and drawn from :math:`k_y = 0` upwards. The grid only determines the number of streams
+    and the length drawn from each. Phases are those at the corner :math:`x = y = 0`. The transform is real and in
+    place, so the peak memory is little more than that of the result.
 
     References
     ----------

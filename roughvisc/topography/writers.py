@@ -27,21 +27,21 @@ _CHUNK = 256
 
 
 def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
-    """Write heights to a file that :func:`roughvisc.open_scan` gives back.
+    """Write heights to a file that :func:`roughvisc.open_scan` can open.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y), NaN where missing. [m]
     path : path
-        ``.nc`` keeps everything: coordinates, attributes, the mask of filled points and the weights of a taper.
-        ``.x3p`` and ``.sdf`` keep heights in full precision and the spacing; their grids begin at zero. X3P keeps the
+        ``.nc`` stores everything: coordinates, attributes, the mask of filled points and the weights of a taper.
+        ``.x3p`` and ``.sdf`` store heights in full precision and the spacing; their grids begin at zero. X3P stores the
         history as its comment.
 
     Raises
     ------
     InputError
-        If the suffix is another, or `h` is no height grid.
+        If the suffix is unknown, or `h` is not a height grid.
     """
     h, path = checked(h, "save_scan"), Path(path)
     known_suffix(path)
