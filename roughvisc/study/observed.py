@@ -33,30 +33,31 @@ def observe(
     *,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Derive what a study asks for in ``[observe]`` from its finished results, and add it to their files.
+    """Compute the quantities in ``[observe]`` of a study from its finished results, and add them to the files.
 
-    ``roughvisc run`` ends with it; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the same
-    arguments. What a file holds already, asked with the same values, is not derived again. Frames are tasks of Dask: on
-    the default client if there is one and all its workers have this version of roughvisc, else in threads.
+    ``roughvisc run`` does this at the end; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the
+    same arguments. Quantities that a file already contains, for the same values, are not computed again. Frames are
+    Dask tasks: on the default client if there is one and all its workers have this version of roughvisc, otherwise in
+    threads.
 
     Parameters
     ----------
     cases : sequence of Case, or path
-        Cases, or the study file that states them. Those that are not finished are left out.
+        Cases, or their study file. Unfinished cases are skipped.
     out : path, optional
-        Folder of the results. Default: ``results/`` and the study's name, beside the study.
+        Results folder. Default: ``results/`` and the name of the study, next to the study.
     progress : callable, optional
-        Called with the number of cases that are done and that of all.
+        Called with the number of finished cases and the total number.
 
     Returns
     -------
     list of pathlib.Path
-        The files that were added to.
+        The files that were changed.
 
     Raises
     ------
     InputError
-        If a result does not allow what is asked for; its file stays as it was.
+        If a quantity cannot be computed from a result; its file is not changed.
     """
     cases = read_cases(cases) if isinstance(cases, str | Path) else cases
     distinct = {case.key: case for case in cases if case.settings.observe is not None}

@@ -115,46 +115,46 @@ def audit(
     heat_conductivity: float | str | None = None,
     volumetric_heat_capacity: float | str | None = None,
 ) -> Audit:
-    """What the model leaves out, and whether that matters in a scene.
+    """Check the assumptions of the model for a result or a case.
 
     Parameters
     ----------
     result : xarray.Dataset or Case
-        A result of one case; or a case that has not run, of which less is known.
+        A result of one case, or a case that has not run, for which less is known.
     work_of_adhesion : float or str, optional
-        Of the two surfaces. [J/m2]
+        Work of adhesion of the two surfaces. [J/m2]
     yield_strength : float or str, optional
-        In tension, of the body that yields first. [Pa]
+        Tensile yield strength of the body that yields first. [Pa]
     thickness : float or str, optional
-        True thickness of the body that was taken for a half-space. [m]
+        True thickness of the body that is modelled as a half-space. [m]
     base : {"bonded", "slipping"}, optional
-        What it lies on; bonded unless given.
+        Contact of this body with its base; default: bonded.
     density : float or str, optional
-        Of the body. [kg/m3]
+        Density of the body. [kg/m3]
     linear_strain : float, optional
-        Strain up to which the material is linear. [-]
+        Largest strain at which the material is linear. [-]
     heat_conductivity : float or str, optional
-        Of the body. [W/(m K)]
+        Heat conductivity of the body. [W/(m K)]
     volumetric_heat_capacity : float or str, optional
-        Of the body: density times specific heat. [J/(m3 K)]
+        Volumetric heat capacity of the body: density times specific heat. [J/(m3 K)]
 
     Returns
     -------
     Audit
-        For each assumption that the scene makes a number, a verdict and a sentence; what is not given is that of the
-        table ``[audit]`` of its study, if there is one. Without a value a verdict is ``not known``, and the sentence
-        says what to give, and which values would be harmless.
+        A number, a verdict and a sentence for each assumption that applies. Values that are not given come from the
+        table ``[audit]`` of the study, if there is one. Without a value the verdict is ``not known``, and the sentence
+        says what to give, and which values would do no harm.
 
     Raises
     ------
     InputError
-        If a value is of another kind or out of range, or the result is none of one case.
+        If a value has a wrong type or is out of range, or the result is not that of one case.
 
     Notes
     -----
-    The limits of the verdicts, and their sources, are :data:`roughvisc.study.audit.limits.LIMITS`. Where a modulus is
-    needed it is the softest: that of the end of the program, or of the longest wave at the lowest speed. It is the
-    least favourable to neglecting adhesion and inertia.
+    :data:`roughvisc.study.audit.limits.LIMITS` contains the limits of the verdicts and their sources. The audit uses
+    the lowest modulus: that at the end of the program, or for the longest wavelength at the lowest speed. This is the
+    least favourable choice for neglecting adhesion and inertia.
 
     Examples
     --------

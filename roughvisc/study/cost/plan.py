@@ -155,39 +155,39 @@ class Plan(xr.Dataset):
 
 
 def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None) -> Plan:
-    """What will be modelled in each case, and what it will cost on this machine; nothing is computed or written.
+    """Estimate the cost of each case on this machine; no case is computed and nothing is written.
 
     Parameters
     ----------
     cases : sequence of Case, or path
-        Cases, or the study file that states them.
+        Cases, or their study file.
     out : path, optional
-        Folder of the results, whose disk must hold them. Default: as in :func:`roughvisc.sweep`.
+        Results folder, to check the disk space. Default: as in :func:`roughvisc.sweep`.
     workers : int, optional
-        Processes side by side. Default: one a core, fewer where the memory does not hold so many.
+        Number of parallel processes. Default: one per core, or fewer if the memory is too small.
 
     Returns
     -------
     xarray.Dataset
-        One row a case along ``case``, varied parameters as coordinates; a notebook shows it as a table. Attributes:
-        ``processes`` side by side and the ``threads`` that each may use, ``wall_time`` of the whole with one thread
-        each [s], ``memory`` of all processes [byte], ``disk`` [byte], what is free of both, ``refusal``, empty if
-        all can run, and ``upgrade``, what another version has computed of it in the folder, empty if nothing.
+        One row per case along ``case``, with varied parameters as coordinates; a notebook shows it as a table.
+        Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
+        thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, ``refusal``,
+        empty if all cases can run, and ``upgrade``, results of another version in the folder, empty if there are none.
 
     Raises
     ------
     InputError
-        If a study file is wrong.
+        If the study file is invalid.
 
     Notes
     -----
-    The numbers of steps and convolutions are those of marches over grids of 17 and 33 points a side at the same
-    tolerance, carried on to the real grid by the growth between the two; seconds come from a solve on the real grid
-    that is timed for at most two seconds in all. Where the grid or its window follows the contact, the coarse grids
-    cover the one that it comes to, and each convolution counts by the cells that it will be on. Expect a quarter either
-    way, and half where a soft material makes the pressure jump with each cell that enters, or where a grid grows.
-    Other experiments are done on grids of 24 and 48 cells, a curve of friction at some of its speeds; expect a factor
-    of two. The contact fraction is that of an elastic press on 256 cells a side at most, or of the experiment on 48.
+    The numbers of steps and convolutions are extrapolated from runs on grids of 17 and 33 points a side at the same
+    tolerance. Times come from a solve on the real grid that is timed for at most two seconds. If the grid or its window
+    follows the contact, the coarse grids cover the final extent, and each convolution is weighted by its cells. The
+    estimates are accurate to about 25 %, or 50 % if the pressure of a soft material jumps with each cell that makes
+    contact, or if a grid grows. Other experiments run on grids of 24 and 48 cells, a friction curve at some of its
+    speeds; these estimates are accurate to a factor of two. The contact fraction is that of an elastic solution on at
+    most 256 cells a side, or of the experiment on 48.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)

@@ -28,40 +28,41 @@ def run(
     same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Compute one case and keep it in one file.
+    """Compute one case and store it in a file.
 
-    It is computed in this process, or by a worker of the ``dask.distributed.Client`` that you have made the default.
+    It runs in this process, or on a worker of the default ``dask.distributed.Client`` if there is one.
 
     Parameters
     ----------
     case : Case or path
-        A case, or the study file that states one.
+        A case, or its study file.
     out : path, optional
-        Folder of the result, which workers see under the same path. Default: ``results/`` and the study's name,
-        beside the study.
+        Results folder, under the same path for all workers. Default: ``results/`` and the name of the study, next to
+        the study.
     progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length. [s]
+        A progress bar, or a function called with the current time and the length of the program. [s]
     same_bits : bool
-        Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
-        digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
+        Compute again what was computed, completely or in part, with other versions of the FFTs or of NumPy, whose last
+        digits differ. Otherwise such results are used, because they also meet the tolerance, and a warning says so.
     threads : int, optional
-        Of a large grid; see :func:`roughvisc.simulate`. On a worker, by default as many as that has.
+        Number of threads for a large grid; see :func:`roughvisc.simulate`. Default on a worker: all its threads.
 
     Returns
     -------
     xarray.Dataset
-        The result, ``(time, x, y)``, whose fields are read from its file when they are asked for; the file is
-        ``ds.encoding["source"]``, named by the case's key. A case that was finished before is not computed again, one
-        that was interrupted goes on; see :func:`run_case`.
+        The result over ``(time, x, y)``; fields are read from its file when they are needed. The file is
+        ``ds.encoding["source"]``, named by the key of the case. A finished case is not computed again, and an
+        interrupted one is resumed; see :func:`run_case`.
 
     Raises
     ------
     InputError
-        If the input is wrong; nothing is written.
+        If the input is invalid; nothing is written.
     TooLargeError
-        If the case needs more memory than there is, before any is taken; nothing is recorded against it.
+        If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
+        recorded.
     ConvergenceError
-        If a step did not converge. The result is written all the same, and the message says where.
+        If a step did not converge. The result is written nevertheless, and the message names the file.
     """
     if not isinstance(case, Case):
         case = read_study(case)

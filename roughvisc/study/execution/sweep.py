@@ -45,49 +45,48 @@ def sweep(
     same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Compute many cases, one file each, and open them together.
+    """Compute many cases, store each in a file, and open the results together.
 
-    Finished cases are not computed again and cases alike are computed once, so the same call goes on after whatever
-    ended it. In a script, call it below ``if __name__ == "__main__":``, since the workers of the default cluster
-    are processes that import the script.
+    Finished cases are not computed again, and identical cases are computed once. Repeat the call to resume. In a
+    script, call it below ``if __name__ == "__main__":``, because the workers of the default cluster are processes that
+    import the script.
 
     Parameters
     ----------
     cases : sequence of Case, or path
-        Cases, or the study file that states them.
+        Cases, or their study file.
     out : path, optional
-        Folder of the results, on a file system that all workers see under the same path. Default: ``results/`` and
-        the study's name, beside the study.
+        Results folder, under the same path for all workers. Default: ``results/`` and the name of the study, next to
+        the study.
     client : distributed.Client, optional
-        Where to compute. Default: the client that you have made the default by making one (``Client()``); if there
-        is none, or `workers` is given, a cluster on this machine, and for a single case this process. One process a
-        core, or fewer with more threads each where the memory does not hold so many cases.
+        Client of the cluster. Default: the default client, which ``Client()`` sets. If there is none, or `workers` is
+        given, a cluster on this machine, or this process for a single case. It has one process per core, or fewer with
+        more threads each if the memory does not hold as many cases.
     retry_failed : bool
-        Compute cases again that failed before.
+        Compute cases that failed before again.
     progress : bool
-        Show how far it is.
+        Show a progress bar.
     workers : int, optional
-        Processes of the default cluster; 0: this process.
+        Number of processes of the default cluster; 0: this process.
     same_bits : bool
-        Compute anew what other versions of the transforms or of NumPy have computed; see :func:`roughvisc.run`.
+        Compute results of other versions of the FFTs or of NumPy again; see :func:`roughvisc.run`.
     threads : int, optional
-        Of each case on a large grid. Default: the cores that the processes leave it; on a client's workers, as many
-        as these have.
+        Number of threads of each case on a large grid. Default: its share of the cores; on the workers of a client, all
+        their threads.
 
     Returns
     -------
     xarray.Dataset
-        Results of the cases that are finished, as :func:`open_results` gives them.
+        Results of the finished cases, as from :func:`open_results`.
 
     Raises
     ------
     InputError
-        If the input is wrong and nothing ran, the call stands at the top level of a script, or the results have no
-        times and grid in common.
+        If the input is invalid (nothing runs), the call is at the top level of a script, or the results differ in times
+        or grid.
     RoughviscError
-        If no case could be finished. A case that failed beside others is recorded in the folder and logged as a
-        warning; one that needs more memory than there is where it would be computed is refused alone, and recorded
-        nowhere, since it may fit elsewhere.
+        If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
+        that needs more memory than its worker has is refused by itself and not recorded, because it may fit elsewhere.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)

@@ -33,20 +33,20 @@ __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
 @dataclass(frozen=True)
 class Case:
-    """One simulation: a surface, a material, a program or a curve of friction, and how it is computed.
+    """One simulation: a surface, a material, a program or a friction curve, and the settings of the solve.
 
-    Made by :func:`read_study`, :func:`read_cases` or :meth:`from_json`, which check it; changed by :func:`vary`.
+    :func:`read_study`, :func:`read_cases` and :meth:`from_json` make and check it; :func:`vary` changes it.
 
     Parameters
     ----------
     settings : Study
         The tables of the study file, checked, in SI.
     origin : Path or None
-        The study file that it came from.
+        The study file from which it was read.
     varied : mapping
-        What a sweep set for this case: dotted key -> value in SI.
+        Values that a sweep set for this case: dotted key -> value in SI.
     written : mapping
-        Those of them that are quantities with a unit, as they were written: dotted key -> text.
+        Those that are quantities with a unit, as written in the study: dotted key -> text.
     """
 
     settings: Study
@@ -193,7 +193,7 @@ class Case:
 
 
 def read_study(path: str | Path) -> Case:
-    """The case that a study file states.
+    """Read the case of a study file.
 
     Parameters
     ----------
@@ -207,8 +207,8 @@ def read_study(path: str | Path) -> Case:
     Raises
     ------
     InputError
-        If the file cannot be read, or anything in it is unknown, missing, impossible or in a wrong unit (all
-        problems are named, one a line), or if it holds a sweep: see :func:`read_cases`.
+        If the file cannot be read, if anything in it is unknown, missing, impossible or in a wrong unit (all problems
+        are listed, one per line), or if it contains a sweep: see :func:`read_cases`.
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
@@ -217,11 +217,11 @@ def read_study(path: str | Path) -> Case:
 
 
 def read_cases(path: str | Path) -> list[Case]:
-    """All the cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
+    """Read all cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
 
-    A table ``[[sweep]]`` holds lists of one length, taken together entry by entry; several tables follow each other.
-    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of the files that match it.
-    Without a sweep there is one case.
+    A table ``[[sweep]]`` contains lists of equal length, combined entry by entry; several tables give consecutive runs.
+    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of matching files. Without a sweep there is
+    one case.
 
     Parameters
     ----------
@@ -265,13 +265,13 @@ def read_cases(path: str | Path) -> list[Case]:
 
 
 def vary(case: Case, changes: Mapping[str, Any]) -> Case:
-    """A case with some of its values changed.
+    """Return a case with some of its values changed.
 
     Parameters
     ----------
     case : Case
     changes : mapping
-        Dotted key -> value as a study file would have it: ``{"program.0.load": "2 N", "solve.tolerance": 1e-4}``.
+        Dotted key -> value as in a study file: ``{"program.0.load": "2 N", "solve.tolerance": 1e-4}``.
 
     Returns
     -------

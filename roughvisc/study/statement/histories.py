@@ -48,50 +48,51 @@ def read_program(
     thin: float | str = THIN,
     decimal: Literal[".", ","] | None = None,
 ) -> Program:
-    """Loading program from a table of a test machine: force, motion or nominal pressure against time.
+    """Read a program from a table of a test machine: force, motion or nominal pressure against time.
 
     Parameters
     ----------
     path : path
         A text file; see Notes.
     time : str
-        Name of the column of time.
+        Name of the time column.
     load, approach, pressure : str, optional
-        Name of the column that is prescribed, one of them. Default: ``load="load"``.
+        Name of the prescribed column; give one of them. Default: ``load="load"``.
     start : float or str
-        Time in the file that is time zero of the program; earlier rows are left out. ``"first"``: that of the first
+        Time in the file that becomes time zero of the program; earlier rows are ignored. ``"first"``: time of the first
         row. [s]
     end : float or str, optional
-        Time in the file at which the program ends. Default: that of the last row. [s]
+        Time in the file at which the program ends. Default: time of the last row. [s]
     zero : float or str
-        Value in the file that counts as zero: a tare, or the position of first touch. [N, m or Pa]
+        Value in the file that becomes zero: a tare, or the position of first touch. [N, m or Pa]
     factor : float
-        The values, less `zero`, are multiplied by it: -1 where the machine counts compression negative.
+        Factor for the values after subtracting `zero`: -1 if compression is negative in the file.
     noise : float or str
-        A load below zero that is no lower than this counts as zero; a lower one is refused, since contact here has no
-        adhesion. A string with ``%`` is a part of the largest load. [N or Pa]
+        Negative loads down to this magnitude count as zero. Lower loads are refused, because the model has no adhesion.
+        A string with ``%`` is a part of the largest load. [N or Pa]
     thin : float or str
-        Rows are left out as long as the straight lines between the others pass every row within this: zero keeps them
-        all. A string with ``%`` is a part of the largest value. [N, m or Pa]
+        Rows are omitted as long as all rows are within this distance of the straight lines between the kept rows; zero
+        keeps all rows. A string with ``%`` is a part of the largest value. [N, m or Pa]
     decimal : {".", ","}, optional
-        Decimal mark. Default: told by the numbers.
+        Decimal mark. Default: found from the numbers.
 
     Returns
     -------
     Program
-        Its ``note`` says how many rows became how many segments, and what counts as zero.
+        Its ``note`` states the numbers of rows and segments, and what becomes zero.
 
     Raises
     ------
     InputError
-        If the file or a column cannot be read, times do not ascend, or loads are below zero; the line is named.
+        If the file or a column cannot be read, times do not increase, or loads are negative; the message names the
+        line.
 
     Notes
     -----
-    Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that holds both names;
-    what stands above it is passed over. Names match whatever their case, with the unit or without. The unit stands in
-    the heading (``Force [mN]``, ``Force/mN``, ``Force in mN``), in the line below it, or in the name given here.
-    Two rows at one time are a jump.
+    Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
+    names; lines above it are skipped. Upper and lower case do not matter, and the unit may be included. The unit is in
+    the heading (``Force [mN]``, ``Force/mN``, ``Force in mN``), in the line below it, or in the name given here. Two
+    rows at the same time are a jump.
     """
     chosen = {key: name for key, name in (("load", load), ("approach", approach), ("pressure", pressure)) if name}
     if len(chosen) > 1:

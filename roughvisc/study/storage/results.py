@@ -54,31 +54,31 @@ def open_results(
 
 
 def open_results(out, *, cases="last", ragged=False):
-    """Open all results of a sweep together; fields are read when they are asked for.
+    """Open all results of a sweep together; fields are read when they are needed.
 
     Parameters
     ----------
     out : path
         Folder of the results.
     cases : "last", "all", or sequence of Case
-        The finished cases of the sweep that ran last in this folder; all results in it; or those of some cases, in
-        their order. A folder that no sweep ran in has no last one, and gives all.
+        "last": the finished cases of the last sweep in this folder, or all results if there was no sweep. "all": all
+        results in the folder. A sequence: the results of these cases, in this order.
     ragged : bool
-        Give a tree with one result a node, which need not have their times, or speeds, and grids in common.
+        Return a tree with one result per node. The results may have different times or speeds, and different grids.
 
     Returns
     -------
     xarray.Dataset or xarray.DataTree
-        Variables as in a single result, over ``time`` or ``speed``, with a dimension ``case`` in front; ``height`` only
-        where it differs. Varied parameters are coordinates on ``case``, numbers in SI or strings, each under two names:
-        its dotted key, and the identifier that it has in the files, ``program_0_load``. The coordinate
-        ``roughvisc_version`` says which version computed each case; where several did, a warning names them. A tree
-        has the parameters as scalar coordinates of each node, whose name is the case's key.
+        Variables as in a single result, over ``time`` or ``speed``, with ``case`` as first dimension; ``height`` has it
+        only if heights differ. Varied parameters are coordinates on ``case``, numbers in SI or strings, each under two
+        names: its dotted key, and its identifier in the files, ``program_0_load``. The coordinate ``roughvisc_version``
+        states which version computed each case; if they differ, a warning lists them. In a tree the parameters are
+        scalar coordinates of each node, whose name is the key of the case.
 
     Raises
     ------
     InputError
-        If there is nothing to open, or the results have not the same times and grid and `ragged` is not set.
+        If there is nothing to open, or the results differ in times or grid and `ragged` is not set.
 
     Examples
     --------

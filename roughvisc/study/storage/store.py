@@ -358,29 +358,29 @@ def quarantine(path: Path, problem: str) -> None:
 
 
 def open_result(path: str | Path, *, group: str = "") -> xr.Dataset:
-    """Open a result; its fields are read when they are asked for, in whatever thread or process.
+    """Open a result; its fields are read when they are needed, in any thread or process.
 
-    Its bytes are held against the checksum that they were written with first, which takes some 0.3 s for 1 GB. A file
-    without a checksum, since another program has changed it, is opened with a warning in the log, once a process.
+    First the checksum of the file is verified, which takes about 0.3 s for 1 GB. A file without a checksum, because
+    another program has changed it, is opened with a warning in the log, once per process.
 
     Parameters
     ----------
     path : path
         A file written by :func:`write_result`.
     group : {"", "steps", "accuracy", "cost"}
-        What of it: the root, which holds surface, fields and histories at the kept times; every accepted step, over
-        ``step``; stated errors with their parts, and bounds of the area; what the rows have cost. A root carries the
+        Group to open: the root with surface, fields and histories at the kept times; every accepted step, over
+        ``step``; the parts of the stated error and bounds of the area; the computing cost of the rows. The root has the
         others as ``ds.roughvisc.steps``, ``ds.roughvisc.accuracy`` and ``ds.roughvisc.cost``.
 
     Returns
     -------
     xarray.Dataset
-        Times are plain numbers in seconds. Files of former versions have the names and groups of today.
+        Times are plain numbers in seconds. Files of earlier versions get the current names and groups.
 
     Raises
     ------
     InputError
-        If the file is absent, is no NetCDF file, is damaged, or holds something else; or if there is no such group.
+        If the file is absent, not a NetCDF file, damaged, or not a result; or if there is no such group.
     """
     root = _stored(path)
     return group_of(root, group) if group else root

@@ -29,27 +29,26 @@ CASES = "cases.csv"
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
-    """Cases of the sweep that ran last in a folder as a table: a row a case, those too that failed.
+    """Table of the cases of the last sweep in a folder, one row per case, including failed ones.
 
     Parameters
     ----------
     out : path
-        Folder of the results. A folder that no sweep ran in gives all results in it. Cases that have not been computed
-        yet are left out.
+        Results folder. If no sweep ran in it, all its results are included. Cases that have not been computed yet are
+        omitted.
 
     Returns
     -------
     pandas.DataFrame
-        Indexed by the number of the case. Columns: title; what was varied, under its dotted key, in the unit that the
-        study states; at the last kept time force, approach, contact area with its bounds, contact fraction, mean gap,
-        friction where the profile slides, and what was observed; of a curve of friction the same where friction is
-        largest, with that speed; the largest stated error and its parts; status, message and file.
-        Units stand in brackets.
+        The index is the number of the case. Columns: title; varied parameters under their dotted keys, in the units of
+        the study; at the last kept time force, approach, contact area with its bounds, contact fraction, mean gap,
+        friction if the profile slides, and observables; for a friction curve the same at the speed of largest friction,
+        and this speed; the largest stated error and its parts; status, message and file. Units are in brackets.
 
     Raises
     ------
     InputError
-        If the folder holds no result.
+        If the folder contains no result.
 
     Examples
     --------

@@ -36,45 +36,45 @@ def trade(
     reference: Literal["auto", "run"] = "auto",
     progress: bool | Report = True,
 ) -> xr.Dataset:
-    """Compute one case under a ladder of settings, and measure what each costs and how wrong it is.
+    """Compute one case with a series of settings, and measure cost and error of each.
 
     Parameters
     ----------
     case : Case or path
-        A case, or the study file that states one.
+        A case, or its study file.
     settings : sequence of Setting, optional
-        What to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
-        rounded to the precision of a float32; of a program also the direct history, fixed steps, and the seed paper's
-        algorithm.
+        Settings to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
+        rounded to float32 precision; for a program also the direct history, fixed time steps, and the algorithm of the
+        seed paper.
     budget : float
-        Wall time of all runs together. A setting that would take longer than what is left is not run, and says
-        so. [s]
+        Total wall time of all runs. A setting that would exceed the remaining time is not run, which the result states.
+        [s]
     reference : {"auto", "run"}
-        Measure against a closed form where the case has one, or against its own finest run in any case.
+        "auto": compare with a closed form if there is one. "run": always compare with the finest run.
     progress : bool or callable
-        A progress bar, or a function called with a setting's name, the time reached and the program's length [s], or
-        with the speeds of a curve that are done and their number.
+        A progress bar, or a function called with the name of a setting, the current time and the length of the program
+        [s], or the number of finished speeds and the total number.
 
     Returns
     -------
     xarray.Dataset
         Along ``setting``: ``run_time``, ``transforms``, ``steps``, ``peak_memory``, ``disk_size``, and ``error`` and
-        ``coarsening_error`` of each ``quantity``. Along ``quantity``: what the ``reference`` is, and how far it may
-        be off itself, ``reference_time_uncertainty`` and ``reference_grid_uncertainty``. Attribute
-        ``recommendation``: which setting to take for which accuracy, in words. ``rv.plot.trade`` draws it.
+        ``coarsening_error`` of each ``quantity``. Along ``quantity``: the ``reference`` and its own uncertainty,
+        ``reference_time_uncertainty`` and ``reference_grid_uncertainty``. The attribute ``recommendation`` says which
+        setting to use for which accuracy. ``rv.plot.trade`` draws the result.
 
     Raises
     ------
     InputError
-        If the study is wrong or holds a sweep, or its reference would take longer than half the budget.
+        If the study is invalid or contains a sweep, or its reference would take longer than half the budget.
 
     Notes
     -----
-    The finest run is as fine as the finest grid of the settings, with a fifth of their sharpest tolerance. How far
-    it may be off itself follows from runs with that tolerance, on grids two and four times coarser, by Richardson
-    extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells.
-    In a slide the profile moves by whole cells: kept times there are those at which whole cells of every grid are
-    behind, at least its beginning and its end.
+    The finest run uses the finest grid of the settings, and a fifth of their smallest tolerance. Its own uncertainty
+    follows from runs with that tolerance, on grids two and four times coarser, by Richardson extrapolation with
+    Roache's safety factors. Pressures of two grids are compared as means over the coarser cells. In a slide the profile
+    moves by whole cells. Kept times within it are those at which it has moved by whole cells of every grid, at least
+    the beginning and the end.
     """
     if not isinstance(case, Case):
         case = read_study(case)

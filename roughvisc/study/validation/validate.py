@@ -48,21 +48,21 @@ def validate(
     cases: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Comparison]:
-    """Hold the solver on this machine against analytic solutions.
+    """Compare the solver on this machine with closed-form solutions.
 
-    Elastic, viscoelastic, free, periodic, growing, shrinking and fixed contacts, all computed as
-    :func:`roughvisc.simulate` does. The expected errors follow from the orders of the method (a cell's side over the
-    contact's radius), the tolerance, and where a closed form is a limit the next term that it leaves out.
+    The cases are elastic, viscoelastic, free, periodic, growing, shrinking and fixed contacts, computed with
+    :func:`roughvisc.simulate`. The expected errors follow from the convergence orders of the method (cell size over
+    contact radius), the tolerance, and, if a closed form is a limit, its next term.
 
     Parameters
     ----------
     cells : int
-        Cells along the grids' sides; spheres and cones under an elastic load have one more too, so that their apex
-        lies once in a cell and once between cells. [-]
+        Number of cells along the sides of the grids. Spheres and cones under an elastic load are also computed with one
+        more cell, so that the apex lies in a cell and between cells. [-]
     cases : sequence of str, optional
         Names of :data:`roughvisc.study.validation.closed_cases.CASES`; None: all.
     progress : callable, optional
-        Is told the number of cases done and of all.
+        Called with the number of finished cases and the total number.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def validate(
     Raises
     ------
     InputError
-        If a case is unknown or the grid too coarse to tell right from wrong.
+        If a case is unknown or the grid is too coarse for a meaningful comparison.
 
     Examples
     --------
