@@ -48,7 +48,7 @@ def __dir__() -> list[str]:
 
 
 def observe(dataset: xr.Dataset) -> xr.Dataset:
-    """All derived histories that the variables of a result allow.
+    """Compute all observables that the variables of a result allow.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         Clusters, percolation, gap statistics, growth exponent, secant stiffness and work over time, each with its unit;
-        ``xarray.merge([dataset, observe(dataset)])`` holds them beside the result.
+        ``xarray.merge([dataset, observe(dataset)])`` adds them to the result.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def asperity_fraction(strain: ArrayLike) -> Any:
 
 
 def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
-    r"""Contact area of a rough surface by Persson's theory and by that of asperities, while the load does not fall.
+    r"""Contact area of a rough surface by Persson's theory and by asperity theory, for a load that does not fall.
 
     Parameters
     ----------
@@ -48,7 +48,8 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing from where the load falls on. [m2]
+        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing from the time at which the load falls.
+        [m2]
 
     Raises
     ------
@@ -57,12 +58,12 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
 
     Notes
     -----
-    On an elastic half-space Persson's theory [1]_ has :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
+    On an elastic half-space Persson's theory [1]_ gives :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
     the nominal pressure :math:`p`, and asperities at low loads [2]_ :math:`A = A_0 \sqrt{2\pi} \, p / (E^* h')`; both
-    of a Gaussian surface, by its root-mean-square slope :math:`h'` on the grid. While the contact grows, a
-    viscoelastic one is an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`: under a constant
-    pressure by :math:`C(t) \, p`. The load counts as linear between accepted steps, so that a jump other than at
-    the start counts as a ramp over the step before it.
+    for a Gaussian surface with the root-mean-square slope :math:`h'` on the grid. A growing viscoelastic contact is
+    equivalent to an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`: under a constant
+    pressure by :math:`C(t) \, p`. The load is interpolated linearly between accepted steps, so a jump after the start
+    becomes a ramp over the step before it.
 
     References
     ----------

@@ -17,24 +17,24 @@ from roughvisc.study.statement.resistivity import Kind, resistivities
 
 
 def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Kind | None = None) -> xr.Dataset:
-    r"""Conductance of the contact spots at every kept time: one solution each.
+    r"""Conductance of the contact spots at every kept time.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``pressure`` or ``gap``.
     resistivity : pair of float or str
-        Resistivities of the two bodies; zero for a perfect conductor. Strings state the unit, which says whether they
-        are thermal, as ``"0.2 K m/W"``, or electrical, as ``"1.7e-8 ohm m"``. [K m/W] or [ohm m]
+        Resistivities of the two bodies; zero for a perfect conductor. The unit of a string determines whether they are
+        thermal, such as ``"0.2 K m/W"``, or electrical, such as ``"1.7e-8 ohm m"``. [K m/W] or [ohm m]
     kind : {"thermal", "electrical"}, optional
-        What flows, where the resistivities are numbers. Default: heat.
+        Kind of flow if the resistivities are numbers. Default: heat.
 
     Returns
     -------
     xarray.Dataset
-        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], its error, and beside it
-        the estimates that end in ``_holm`` and ``_greenwood``. Zero without contact; infinite where periodic
-        boundaries are in full contact. Attribute ``resistivity``: those of the two bodies.
+        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], its error, and the estimates ending
+        in ``_holm`` and ``_greenwood``. Zero without contact; infinite in full contact with periodic boundaries. The
+        attribute ``resistivity`` states those of the two bodies.
 
     Raises
     ------
@@ -44,11 +44,11 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
 
     Notes
     -----
-    All spots are at one potential, and far away each body is at another: :math:`G = 2k / (\rho_1 + \rho_2)` with the
-    stiffness :math:`k` of a flat punch of the same spots over the contact modulus [1]_; a single disc has
-    :math:`4a / (\rho_1 + \rho_2)`. Each body conducts as a half-space, also where a sheet was pressed. With periodic
-    boundaries the conductance is that of the constriction alone, of one period: what the bulk adds to
-    the resistance is counted apart. Nothing flows through the gap, and films on the spots have no resistance.
+    All spots are at one potential, and far away each body is at its own potential: :math:`G = 2k / (\rho_1 + \rho_2)`
+    with the stiffness :math:`k` of a flat punch of the same spots over the contact modulus [1]_; a single disc has
+    :math:`4a / (\rho_1 + \rho_2)`. Each body conducts like a half-space, even if it is a sheet. With periodic
+    boundaries the conductance is that of the constriction alone, for one period; the resistance of the bulk is not
+    included. Nothing flows through the gap, and films on the spots have no resistance.
 
     Of resistance over half the sum of the resistivities, with the spots' radii :math:`a_i` from their areas and
     distances :math:`s_{ij}`, Greenwood [2]_ has

@@ -19,17 +19,17 @@ _FEWEST = 8
 
 
 def cycle_energy(dataset: xr.Dataset, *, program: Any = None, closed: float = 0.01) -> xr.Dataset:
-    r"""Work done in every cycle of the program, and the energy dissipated where force and approach come back.
+    r"""Work in every cycle of the program, and the dissipated energy if force and approach return.
 
-    Over a loop that does not close the work is partly stored, or comes from what was stored before: then it is work
-    and not dissipation, which is missing there.
+    Over an open loop the work is partly stored, or comes from energy stored before. The dissipated energy is then
+    missing.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result.
     program : Program, optional
-        What was prescribed, with :meth:`Program.cycle` in it; by default that of the case in the attributes.
+        The program, with :meth:`Program.cycle` in it; default: that of the case in the attributes.
     closed : float
         Largest ``cycle_closure`` at which a loop counts as closed.
 

@@ -48,8 +48,8 @@ def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     dataset : xarray.Dataset
         A result with ``pressure``.
     bins : int or array_like
-        Number of even bins from zero to the largest pressure of all times (which is looked up at once), or their
-        edges. [Pa]
+        Number of equal bins from zero to the largest pressure at all times (which is read immediately), or their edges.
+        [Pa]
 
     Returns
     -------
@@ -73,8 +73,7 @@ def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     dataset : xarray.Dataset
         A result with ``gap``.
     bins : int or array_like
-        Number of even bins from zero to the largest gap of all times (which is looked up at once), or their
-        edges. [m]
+        Number of equal bins from zero to the largest gap at all times (which is read immediately), or their edges. [m]
 
     Returns
     -------
@@ -91,7 +90,7 @@ def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
 
 
 def gap_statistics(dataset: xr.Dataset) -> xr.Dataset:
-    """Mean and median gap over the present cells, those in contact included.
+    """Mean and median gap over the present cells, including those in contact.
 
     Parameters
     ----------

@@ -20,25 +20,25 @@ from roughvisc.units import quantity
 def incremental_stiffness(
     dataset: xr.Dataset, *, contact_modulus: float | str | None = None, kernel: Any = None
 ) -> xr.Dataset:
-    r"""Stiffness of the contact against a fast increment of load, its area frozen: one solution a kept time.
+    r"""Stiffness of the contact for a fast increment of load at constant contact area.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``pressure`` or ``gap``.
     contact_modulus : float or str, optional
-        Contact modulus of the increment, :math:`E^* = 2G/(1-\nu)`: the magnitude of the complex one for a small
-        oscillation, the relaxed one for a slow increment that leaves the area alone. Default: that at once,
+        Contact modulus of the increment, :math:`E^* = 2G/(1-\nu)`: its complex magnitude for a small oscillation, the
+        relaxed modulus for a slow increment that does not change the area. Default: the instantaneous modulus,
         :math:`1/C(0)`, of the material in the case of the result. [Pa]
     kernel : Kernel, optional
-        Of the body; default: that of the result, a half-space or a sheet.
+        Kernel of the body; default: that of the result, a half-space or a sheet.
 
     Returns
     -------
     xarray.Dataset
-        ``incremental_stiffness`` [N/m] and ``frozen_stiffness`` [m], which is it over the contact modulus, each with
-        its error, over time. Without contact they are zero. Where the material has no compliance at once the former
-        is missing: a jump of approach would take an infinite force, and ``frozen_stiffness`` is what is left to know.
+        ``incremental_stiffness`` [N/m] and ``frozen_stiffness`` [m], the former over the contact modulus, each with its
+        error, over time. Without contact they are zero. If the material has no instantaneous compliance, the former is
+        missing, because a jump of approach would need an infinite force.
 
     Raises
     ------
@@ -47,9 +47,9 @@ def incremental_stiffness(
 
     Notes
     -----
-    An increment of load raises the pressure as a flat punch of the contact's shape would, since at the edge, where the
-    contact grows, pressure is zero. The approach is that of results: with periodic boundaries on a half-space
-    to its mean plane. :mod:`roughvisc.mechanics.transport.spots` has what the grid leaves.
+    An increment of load increases the pressure like a flat punch with the shape of the contact, because the pressure at
+    a growing edge is zero. The approach is defined as in results: with periodic boundaries on a half-space it is
+    measured to the mean plane. :mod:`roughvisc.mechanics.transport.spots` describes the grid error.
     """
     stiffness, error = over_frames(dataset, partial(_stiffness, kernel=_kernel_of(dataset, kernel)), outputs=2)
     modulus = (

@@ -33,48 +33,48 @@ def leakage(
 ) -> xr.Dataset:
     r"""Leak rate of a fluid through the gap, from one side of the map to the opposite one.
 
-    The fluid does not push back: the gap is that of the dry contact.
+    The gap is that of the dry contact: the fluid pressure does not deform the surfaces.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``gap``, present everywhere.
     viscosity : float or str
-        Of the fluid, constant: a number [Pa s], or a text such as ``"1 mPa s"``.
+        Viscosity of the fluid, constant: a number [Pa s], or a text such as ``"1 mPa s"``.
     pressure_drop : float or str
-        Difference of the pressures on the two sides, over the whole length of the map, which is one period of a
-        periodic one: a number [Pa], or a text such as ``"1 bar"``.
+        Pressure difference between the two sides, over the whole length of the map (one period if it is periodic): a
+        number [Pa], or a text such as ``"1 bar"``.
     along : {"x", "y"}
         Direction of the flow.
     sides : {"closed", "periodic"}, optional
-        Whether the other two sides are walls, or meet. Default: they meet where the result's attribute ``boundary`` is
-        ``"periodic"``, which alone can be asked to.
+        Whether the other two sides are walls or joined. Default: joined if the attribute ``boundary`` of the result is
+        ``"periodic"``; only then may they be joined.
     flow : bool
-        Whether to give the field of the flow too.
+        Whether to return the flow field, too.
 
     Returns
     -------
     xarray.Dataset
         Over time ``leak_rate``, ``leak_rate_solver_lower`` and ``leak_rate_solver_upper`` [m3/s]; ``leak_status``, one
-        of its ``flag_values``; ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which hold for any fluid; with
-        `flow` also ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` say what it was
-        asked with.
+        of its ``flag_values``; ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which are independent of the
+        fluid; with `flow` also ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate``
+        state the arguments.
 
     Raises
     ------
     InputError
-        If the result holds no ``gap``, or lacks it in some cells, where the surface is absent: what the fluid finds
-        there is not known; if a quantity is none of its kind, or a word is unknown.
+        If the result contains no ``gap``, or the surface is absent in some cells, where the gap is unknown; if a
+        quantity has a wrong unit, or a word is unknown.
 
     Notes
     -----
     Reynolds' equation, :math:`\nabla \cdot (g^3 / 12 \eta \, \nabla P) = 0`; cells in contact are closed, and cells
-    that share only a corner are apart. See :func:`roughvisc.mechanics.transport.flow.flow`. Of the volume flow
+    that share only a corner are not connected. See :func:`roughvisc.mechanics.transport.flow.flow`. For the volume flow
     :math:`Q` through a map of length :math:`L` along the flow and width :math:`W`,
 
     .. math:: T = \frac{Q \eta L}{\Delta P \, W}, \qquad h = (12 T)^{1/3}.
 
-    The bounds tell how well the equations of the cells are solved, from above and from below.
+    The bounds enclose the exact solution of the equations on this grid.
 
     Examples
     --------

@@ -24,13 +24,13 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Force, approach, area, mean gap, work, energies and stated errors over ``time``, which holds every accepted
-        step. Of a result that holds the kept times alone, and of one that keeps every step: these.
+        Force, approach, area, mean gap, work, energies and stated errors over ``time`` at every accepted step. If the
+        result contains only the kept times, or keeps every step, these are returned.
 
     Raises
     ------
     InputError
-        If the Dataset holds many cases.
+        If the Dataset contains several cases.
     """
     need_history(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
@@ -64,7 +64,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
     dataset : xarray.Dataset
         A result.
     since : float
-        The instant from which time is counted, such as the end of a loading ramp. [s]
+        Time from which the growth is measured, such as the end of a loading ramp. [s]
 
     Returns
     -------
@@ -88,7 +88,7 @@ def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
 
 
 def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
-    """Slope of force over approach along the history, with the creep between kept times in it.
+    """Slope of force against approach along the history, including creep between kept times.
 
     The stiffness of the contact itself at a time is :func:`~roughvisc.observables.incremental_stiffness`.
 
@@ -100,8 +100,8 @@ def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``secant_stiffness`` over time: central differences where the approach runs on, the last secant where it
-        turns; missing while it stands still. [N/m]
+        ``secant_stiffness`` over time: central differences while the approach is monotone, the last secant where it
+        turns; missing while it is constant. [N/m]
 
     Raises
     ------

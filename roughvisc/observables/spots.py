@@ -31,7 +31,7 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray of bool, dims (time, x, y)
-        On Dask, a frame a block, if the result was opened and several frames of it are not read yet.
+        A Dask array with one frame per block, if the result was opened from a file and several frames are not read yet.
 
     Raises
     ------
@@ -59,8 +59,8 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        A result with ``pressure`` or ``gap``; where its attribute ``boundary`` is ``"periodic"``, a cluster goes on
-        across opposite borders.
+        A result with ``pressure`` or ``gap``. If its attribute ``boundary`` is ``"periodic"``, clusters continue across
+        opposite borders.
     connectivity : {4, 8}
         Whether cells that share only a corner are apart or together.
 
@@ -73,7 +73,7 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the result holds neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
+        If the result contains neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
     """
 
     field, touches = _telling(dataset)
@@ -96,7 +96,7 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
 
 
 def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
-    """Area of every contact cluster; computed at once, one frame in memory at a time.
+    """Area of every contact cluster; computed immediately, with one frame in memory at a time.
 
     Parameters
     ----------
@@ -128,15 +128,15 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
 
 
 def percolation(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
-    """Whether the region out of contact connects opposite sides: whether the contact leaks.
+    """Whether the region out of contact connects opposite sides, so that the contact leaks.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        A result with ``pressure`` or ``gap``; its attribute ``boundary`` says whether the map repeats itself.
-        Absent cells are out of contact.
+        A result with ``pressure`` or ``gap``; its attribute ``boundary`` states whether the map is periodic. Absent
+        cells are out of contact.
     connectivity : {4, 8}
-        4: a channel that only a corner keeps open is closed. 8: it is open.
+        4: cells out of contact that share only a corner are not connected. 8: they are connected.
 
     Returns
     -------

@@ -17,7 +17,7 @@ OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conduc
 
 
 def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None = None) -> xr.Dataset:
-    """What the study of a result asks to be observed.
+    """Compute the observables that the study of a result requests.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None =
     Returns
     -------
     xarray.Dataset
-        The new variables alone; none where nothing is asked for.
+        Only the new variables; none if nothing is requested.
 
     Raises
     ------
     InputError
-        If an observable is unknown, or as its own function does.
+        If an observable is unknown, or as in its own function.
     """
     if observe is None:
         observe = json.loads(dataset.attrs.get("case", "{}")).get("observe", {})

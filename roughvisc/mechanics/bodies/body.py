@@ -42,16 +42,16 @@ class Body:
     Parameters
     ----------
     material : Material
-        One of roughvisc's, or any object with the two functions that
-        :class:`roughvisc.mechanics.materials.models.Material` asks for.
+        A material of roughvisc, or any object with the two methods of
+        :class:`roughvisc.mechanics.materials.models.Material`.
     kernel : Kernel
-        What its surface does under unit pressure at unit contact compliance; a half-space's unless given. See
-        :class:`roughvisc.mechanics.bodies.kernel.Kernel` for one of your own.
+        Displacement of the surface under pressure at unit contact compliance; default: that of a half-space. See
+        :class:`roughvisc.mechanics.bodies.kernel.Kernel` for your own kernels.
 
     Raises
     ------
     InputError
-        If either is something else.
+        If either has a wrong type.
 
     Examples
     --------
@@ -92,22 +92,22 @@ def sheet(material: Material, thickness: float, base: Base = BASE) -> Body:
     Parameters
     ----------
     material : Material
-        Of one body, with a Poisson ratio that is constant in time.
+        Material of one body with a Poisson ratio that is constant in time.
     thickness : float
-        Infinite: a half-space. [m]
+        Thickness; infinite for a half-space. [m]
     base : {"bonded", "slipping"}
         Whether the sheet sticks to its base, or slides on it without friction.
 
     Returns
     -------
     Body
-        To be given where a material is asked for.
+        A body, which functions accept as `material`.
 
     Raises
     ------
     InputError
-        If the thickness is not positive or the base is none of those; if the material stands for two bodies, or its
-        Poisson ratio is below zero or changes in time: space and time do not separate then.
+        If the thickness is not positive or the base is unknown; if the material describes two bodies, or its Poisson
+        ratio is negative or changes in time, because space and time do not separate then.
 
     Examples
     --------

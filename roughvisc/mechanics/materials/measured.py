@@ -92,7 +92,7 @@ def from_relaxation_table(
     -------
     Prony
         Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
-        times that were measured.
+        measured times.
 
     Raises
     ------
@@ -103,11 +103,11 @@ def from_relaxation_table(
     -----
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
     ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.from_relaxation`, which is exact. Outside the
-    measured times the series says what its slowest and its fastest terms say.
+    measured times its slowest and its fastest terms determine the series.
 
     The error between rows is estimated by leaving out each inner row in turn and predicting it from the others, which
-    lie twice as far apart there: mostly too large, hardly ever too small. If it exceeds 1 %, a smooth spectrum is
-    tried, with the steps from term to term small as well, and taken if it predicts the rows twice as well.
+    lie twice as far apart there. It is mostly too large and hardly ever too small. If it exceeds 1 %, a smooth spectrum
+    with small steps between terms is also fitted, and used if it predicts the rows twice as well.
     """
     t, values = checked_rows(("time", "modulus"), times, moduli)
     for row in np.flatnonzero(values == 0)[:1]:
@@ -139,13 +139,14 @@ def from_dynamic(
     Parameters
     ----------
     frequencies : sequence of float
-        In any order: several temperatures may overlap. [`frequency_unit`]
+        Frequencies in any order; several temperatures may overlap. [`frequency_unit`]
     storage, loss : sequence of float
         ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
     frequency_unit : {"rad/s", "Hz"}
-        Angular frequency, or cycles a second; there is no default, since the wrong one shifts all times by 2 pi.
+        Angular frequency, or cycles per second. There is no default, because the wrong one changes all times by the
+        factor 2 pi.
     shift_factors : sequence of float, optional
-        ``a_T`` of each row (or one for all), which its frequency is multiplied by.
+        ``a_T`` of each row (or one for all), the factor for its frequency.
     kind : {"shear", "tensile"}
         Which moduli; ``G = E / (2 (1 + nu))``.
     poisson : float
@@ -155,7 +156,7 @@ def from_dynamic(
     -------
     Prony
         Its ``note`` states the number of terms, the misfit at the rows, an estimate of the error between them, and the
-        frequencies that were measured.
+        measured frequencies.
 
     Raises
     ------

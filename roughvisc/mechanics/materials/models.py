@@ -103,7 +103,7 @@ def maxwell(
 def kelvin_voigt(
     shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
 ) -> Prony:
-    """Kelvin-Voigt solid: a spring beside a dashpot; ``J = (1 - exp(-G t / eta)) / G``, nothing at once.
+    """Kelvin-Voigt solid: a spring parallel to a dashpot; ``J = (1 - exp(-G t / eta)) / G``.
 
     Parameters
     ----------
@@ -228,12 +228,12 @@ def pair(a: Material, b: Material) -> Prony | Pair:
     Parameters
     ----------
     a, b : Material
-        The two; which is above does not matter.
+        The two materials, in any order.
 
     Returns
     -------
     Prony or Pair
-        One series, at a Poisson ratio of a half, where both are series.
+        One series, with a Poisson ratio of 0.5, if both are series.
 
     Examples
     --------

@@ -23,7 +23,7 @@ class PowerLaw:
     Parameters
     ----------
     glassy : float
-        Instantaneous compliance ``J_0``; zero for a material that cannot jump. [1/Pa]
+        Instantaneous compliance ``J_0``; zero for a material without instantaneous response. [1/Pa]
     coefficient : float
         Creep ``c`` at the time ``T``. [1/Pa]
     exponent : float
@@ -33,7 +33,7 @@ class PowerLaw:
     poisson : float
         Poisson ratio, constant in time.
     note : str
-        Whence the numbers come. No part of the comparison.
+        Source of the numbers. Ignored in comparisons.
 
     Raises
     ------

@@ -26,7 +26,7 @@ class Prony:
     Parameters
     ----------
     glassy : float
-        Instantaneous compliance ``J_0``; zero for a material that cannot jump. [1/Pa]
+        Instantaneous compliance ``J_0``; zero for a material without instantaneous response. [1/Pa]
     fluidity : float
         Inverse of the steady shear viscosity, zero for a solid. [1/(Pa s)]
     compliances, times : sequence of float
@@ -34,9 +34,9 @@ class Prony:
     poisson : float
         Poisson ratio, constant in time.
     note : str
-        How the series was found, if not stated: number of terms, misfit. No part of the comparison.
+        How a fitted series was found: number of terms, misfit. Ignored in comparisons.
     stands_for : str
-        What the series makes contact like, if that is not one body with this Poisson ratio; empty if it is.
+        What the series represents, if it is not one body with this Poisson ratio; otherwise empty.
 
     Raises
     ------

@@ -20,38 +20,38 @@ Array = NDArray[np.float64]
 class Tabulated:
     """Measured shear creep compliance, without a fit.
 
-    Between rows the compliance is linear in the logarithm of time; from a first row at time zero it is linear in
-    time. Before a first row at a later time it goes on as the first decade of rows does, as a power of time or as its
-    logarithm, for another decade, and is linear in time then: a compliance that held until the first row and rose from
-    there would be no passive material's. Not less than a tenth of the first row is there at once. Beyond the last row
-    there is nothing.
+    Between rows the compliance is linear in the logarithm of time; from a first row at time zero it is linear in time.
+    Before a first row at a later time, the first decade of rows is extrapolated by another decade, as a power or the
+    logarithm of time, and the compliance is linear in time before that. (A compliance that is constant until the first
+    row and increases from there would not be passive.) The instantaneous compliance is at least a tenth of the first
+    row. The table is not extrapolated beyond the last row.
 
     Parameters
     ----------
     times : sequence of float
-        Ascending, the first may be zero. [s]
+        Times in increasing order; the first may be zero. [s]
     compliances : sequence of float
         ``J`` at these times. [1/Pa]
     noise : float
-        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Creep compliances
-        ascend: such decreases are evened out by isotonic regression.
+        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Creep compliances increase;
+        isotonic regression removes such decreases.
     poisson : float
         Poisson ratio, constant in time.
     remark : str
-        What the notes say further. No part of the comparison.
+        Further text for the notes. Ignored in comparisons.
 
     Attributes
     ----------
     repaired : tuple of float
-        The compliances, ascending. [1/Pa]
+        The compliances in increasing order. [1/Pa]
     notes : tuple of str
-        What was assumed or repaired, a sentence each.
+        Assumptions and repairs, one sentence each.
 
     Raises
     ------
     InputError
-        If the table has a row that is negative, not finite, not ascending in time, or lower than an earlier one
-        by more than the noise; the row is named, counted from 0. Later: if a time beyond the last row is asked for.
+        If a row is negative, not finite, not in increasing order of time, or lower than an earlier one by more than the
+        noise; the message names the row, counted from 0. Also, later, if a time beyond the last row is needed.
     """
 
     times: tuple[float, ...]

@@ -22,7 +22,7 @@ LARGEST_SHIFT = 1e30
 
 
 def wlf_shift(temperature: float, reference_temperature: float, c1: float, c2: float) -> float:
-    r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to some 100 K above it.
+    r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
 
     Parameters
     ----------
@@ -38,13 +38,13 @@ def wlf_shift(temperature: float, reference_temperature: float, c1: float, c2: f
     Returns
     -------
     float
-        ``a_T``: what all times of the material are multiplied by. [-]
+        ``a_T``, the factor for all times of the material. [-]
 
     Raises
     ------
     InputError
-        If a number is not positive and finite, or the temperature is not above ``T_r - c2``, where the formula has
-        no meaning.
+        If a number is not positive and finite, or the temperature is not above ``T_r - c2``, where the formula is not
+        defined.
 
     Notes
     -----
@@ -87,7 +87,7 @@ def arrhenius_shift(temperature: float, reference_temperature: float, activation
     Returns
     -------
     float
-        ``a_T``: what all times of the material are multiplied by. [-]
+        ``a_T``, the factor for all times of the material. [-]
 
     Raises
     ------
@@ -114,20 +114,20 @@ def arrhenius_shift(temperature: float, reference_temperature: float, activation
 
 
 def shifted(material: Material, factor: float) -> Material:
-    r"""The material at another temperature: all its times multiplied by one factor.
+    r"""Shift a material to another temperature: multiply all its times by one factor.
 
     Parameters
     ----------
     material : Material
-        At its reference temperature; of the user's own too. Both bodies of a pair are shifted.
+        Material at its reference temperature, also one of your own. Both bodies of a pair are shifted.
     factor : float
-        Shift factor ``a_T``, from :func:`wlf_shift`, :func:`arrhenius_shift` or a measurement; above one: slower, as
-        in the cold. [-]
+        Shift factor ``a_T``, from :func:`wlf_shift`, :func:`arrhenius_shift` or a measurement; above one for slower
+        response, at lower temperature. [-]
 
     Returns
     -------
     Material
-        Of the same kind. Its ``note`` says the factor.
+        A material of the same type. Its ``note`` states the factor.
 
     Raises
     ------
@@ -138,8 +138,8 @@ def shifted(material: Material, factor: float) -> Material:
     -----
     .. math:: C(t;\, T) = C(t / a_T;\, T_r)
 
-    The material is thermorheologically simple: compliances do not change with temperature, only times do. There is
-    no vertical shift.
+    The material is thermorheologically simple: temperature changes only times, not compliances. There is no vertical
+    shift.
 
     Examples
     --------

@@ -254,15 +254,15 @@ def in_words(segments: Sequence[Segment]) -> list[str]:
 class Program:
     """A loading program: segments in order, from rest at time zero.
 
-    Built as a chain; every call returns a longer program. ``over=0`` is a jump. Quantities are numbers in SI, or
-    strings with a unit.
+    Programs are built by chained calls; every call returns a longer program. ``over=0`` is a jump. Quantities are
+    numbers in SI, or strings with a unit.
 
     Parameters
     ----------
     segments : tuple of Segment
-        In order; none unless given.
+        Segments in order; default: none.
     note : str
-        What to say of its origin: how a measured history became segments.
+        Origin of the program, for example the conversion of a measured history.
 
     Examples
     --------
@@ -308,7 +308,7 @@ class Program:
         return Program(self.segments + other.segments, " ".join(filter(None, (self.note, other.note))))
 
     def load(self, value: float | str, *, over: float | str) -> Program:
-        """Go to a load, linearly.
+        """Ramp linearly to a load.
 
         Parameters
         ----------
@@ -334,10 +334,10 @@ class Program:
         return self._to("load", value, over)
 
     def pressure(self, value: float | str, *, over: float | str) -> Program:
-        """Go to a nominal pressure, linearly: the load over the nominal area of the surface.
+        """Ramp linearly to a nominal pressure, the load over the nominal area of the surface.
 
-        :func:`roughvisc.simulate` takes the whole area of the grid of heights, absent cells included, as it is given;
-        of a tapered surface the integral of the taper's weight.
+        :func:`roughvisc.simulate` uses the whole area of the given grid, absent cells included, or for a tapered
+        surface the integral of the taper's weight.
 
         Parameters
         ----------
@@ -364,7 +364,7 @@ class Program:
         return self._to("pressure", value, over)
 
     def approach(self, value: float | str, *, over: float | str) -> Program:
-        """Go to an approach, linearly.
+        """Ramp linearly to an approach.
 
         Parameters
         ----------
@@ -385,16 +385,16 @@ class Program:
         return self._to("approach", value, over)
 
     def hold(self, duration: float | str, control: Control | None = None) -> Program:
-        """Keep the load or the approach at the value that it has.
+        """Hold the load or the approach at its current value.
 
         Parameters
         ----------
         duration : float or str
             How long. [s]
         control : {"load", "approach", "pressure"}, optional
-            Which of them; that of the segment before unless given. The other one then follows from the contact: a load,
-            then ``hold(..., control="approach")``, is stress relaxation. To hold the nominal pressure is to hold the
-            load.
+            The quantity to hold; default: that of the previous segment. The other one follows from the contact: a load,
+            then ``hold(..., control="approach")``, is stress relaxation. Holding the nominal pressure is the same as
+            holding the load.
 
         Returns
         -------
@@ -419,14 +419,14 @@ class Program:
         over: float | str | None = None,
         direction: Direction = "x",
     ) -> Program:
-        """Slide the profile along the surface at constant speed; what is controlled keeps the value that it has.
+        """Slide the profile along the surface at constant speed; the controlled quantity keeps its value.
 
         Parameters
         ----------
         distance : float or str
-            How far; the profile moves by whole cells of its grid, one a time step, to the nearest one. [m]
+            Sliding distance, rounded to whole cells; the profile moves by one cell per time step. [m]
         speed, over : float or str
-            Speed [m/s], or how long it takes [s]: one of them.
+            Speed [m/s] or duration [s]; give one of them.
         direction : {"x", "-x", "y", "-y"}
             In which the profile moves.
 
@@ -460,12 +460,12 @@ class Program:
     def table(
         cls, times: Sequence[float | str], values: Sequence[float | str], control: Control = "load", note: str = ""
     ) -> Program:
-        """Linear between the rows of a table; two rows at one time are a jump.
+        """Linear interpolation between the rows of a table; two rows at the same time are a jump.
 
         Parameters
         ----------
         times : sequence of float or str
-            Ascending from zero; a value other than zero at time zero is a jump. [s]
+            Times in increasing order from zero; a nonzero value at time zero is a jump. [s]
         values : sequence of float or str
             Load [N], approach [m] or nominal pressure [Pa] at these times.
         control : {"load", "approach", "pressure"}
@@ -476,7 +476,7 @@ class Program:
         Raises
         ------
         InputError
-            If the lengths differ, or the times do not ascend from zero; the offending row is named.
+            If the lengths differ, or the times do not increase from zero; the message names the row.
         """
         unit = UNITS[known_control(control, "control")]
         if len(times) != len(values) or not len(times):
@@ -506,25 +506,25 @@ class Program:
         cycles: float,
         control: Control = "load",
     ) -> Program:
-        """A sine wave about a mean, after a jump to that mean.
+        """Sine wave about a mean, after a jump to this mean.
 
-        To reach the mean otherwise, add: ``Program().load(1.0, over=0.1) + Program.cycle(1.0, 0.5, 2.0, 5)``.
+        To ramp to the mean instead, add programs: ``Program().load(1.0, over=0.1) + Program.cycle(1.0, 0.5, 2.0, 5)``.
 
         Parameters
         ----------
         mean, amplitude : float or str
-            Of the load [N], the approach [m] or the nominal pressure [Pa].
+            Mean and amplitude of the load [N], the approach [m] or the nominal pressure [Pa].
         period : float or str
             Length of a cycle. [s]
         cycles : float
             How many.
         control : {"load", "approach", "pressure"}
-            What oscillates.
+            The oscillating quantity.
 
         Raises
         ------
         InputError
-            If a quantity is of another kind, or load or pressure fall below zero.
+            If a quantity has a wrong type or unit, or load or pressure become negative.
         """
         unit, instead = UNITS[known_control(control, "control")], INSTEAD[control]
         middle = stated_quantity(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
@@ -534,7 +534,7 @@ class Program:
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     def on_area(self, area: float) -> Program:
-        """The program whose nominal pressures are the loads that they are on a surface.
+        """Convert nominal pressures to loads on a surface.
 
         Parameters
         ----------
@@ -544,7 +544,7 @@ class Program:
         Returns
         -------
         Program
-            This one where it prescribes no nominal pressure.
+            The same program if it prescribes no nominal pressure.
         """
         if not self.prescribes_pressure:
             return self
