@@ -38,14 +38,14 @@ _LEAST_DENSE, _DENSEST = 1.0, 22_600.0
 def yielding(evidence: Evidence, given: AuditInputs) -> Finding:
     """The largest pressure over the yield strength."""
     if not evidence.ran:
-        return unknown("yielding", "Known after the run, by the largest pressure.")
+        return unknown("yielding", "Known after the run, from the largest pressure.")
     if evidence.contact is None:
         return unknown("yielding", 'Keep the pressure, fields = ["pressure"], for the largest.')
     peak = evidence.contact.peak
     about = f"the largest pressure is {as_text(peak, 'Pa')}"
     if given.yield_strength is None:
         least = as_text(peak / LIMITS["yielding"].doubtful, "Pa")
-        return unknown("yielding", f"Give yield_strength: {about}; above {least} nothing yields.")
+        return unknown("yielding", f"Give yield_strength: {about}; above {least} neither body yields.")
     shown = as_text(given.yield_strength, "Pa")
     return Finding("yielding", peak / given.yield_strength, f"T{about[1:]}, on a body that yields at {shown}.")
 
@@ -55,16 +55,16 @@ def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
     if evidence.sheet is not None:
         return _modelled(evidence.sheet, given)
     if len(evidence.bodies) != 1:
-        return unknown("thickness", "Two bodies, or a Poisson ratio that changes: no sheet to compare with is known.")
+        return unknown("thickness", "Two bodies, or a Poisson ratio that changes: there is no sheet to compare with.")
     poisson = evidence.bodies[0].poisson
     if poisson < 0:
-        return unknown("thickness", "Poisson's ratio is negative: no sheet to compare with is known.")
+        return unknown("thickness", "Poisson's ratio is negative: there is no sheet to compare with.")
     if given.thickness is None:
         return unknown("thickness", f"Give thickness{_enough(evidence, Sheet(1.0, poisson))}.")
     sheet = Sheet(given.thickness, poisson, given.base or BASE)
     excess, shortfall = _excess(evidence, sheet), _shortfall(evidence, sheet)
     if math.isnan(excess):
-        return unknown("thickness", _WITHOUT_LOAD if evidence.ran else "Known after the run, by the pressure.")
+        return unknown("thickness", _WITHOUT_LOAD if evidence.ran else "Known after the run, from the pressure.")
     sentence = f"On a {sheet.base} sheet of {as_text(sheet.thickness, 'm', 3)} the approach would be {percent(excess)}"
     sentence += " smaller at the same load"
     if shortfall > excess:
@@ -75,7 +75,7 @@ def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
 def _modelled(sheet: Sheet, given: AuditInputs) -> Finding:
     if given.thickness is not None and not math.isclose(given.thickness, sheet.thickness, rel_tol=1e-9):
         other = f"{as_text(sheet.thickness, 'm', 3)}, and {as_text(given.thickness, 'm', 3)} is stated"
-        return unknown("thickness", f"The sheet that was pressed is one of {other}: press that one.")
+        return unknown("thickness", f"The result is for a sheet of {other}: run the study with that thickness.")
     return Finding("thickness", 0.0, f"Modelled: a sheet of {as_text(sheet.thickness, 'm', 3)}, {sheet.base}.")
 
 
@@ -119,22 +119,22 @@ def _enough(evidence: Evidence, sheet: Sheet) -> str:
         return off(evidence, replace(sheet, thickness=math.exp(log))) - LIMITS["thickness"].doubtful
 
     if beyond(math.log(low)) <= 0:
-        return f": from {as_text(low, 'm')} on a half-space does, if not before"
+        return f": from {as_text(low, 'm')} on a half-space is accurate enough"
     least = math.log(low)
     if beyond(least, _excess) > 0:
         least = brentq(beyond, least, math.log(high), args=(_excess,), xtol=1e-3)
     if beyond(least) > 1e-3:  # of the force it takes more, by less than four times
         least = brentq(beyond, least, least + math.log(4), xtol=1e-2)
-    return f": from {as_text(math.exp(least), 'm')} on a half-space does, even if bonded"
+    return f": from {as_text(math.exp(least), 'm')} on a half-space is accurate enough, even if bonded"
 
 
 def inertia(evidence: Evidence, given: AuditInputs) -> Finding:
     """What waves change: by their lag over the time scale of the program, and by the speed of slides against theirs."""
     width, scale, limit = evidence.half_width, evidence.time_scale, LIMITS["inertia"].doubtful
     if math.isnan(evidence.late) or math.isnan(scale):
-        return unknown("inertia", "The result does not say its material and program.")
+        return unknown("inertia", "The result does not state its material and program.")
     if not width > 0 or not evidence.late > 0:
-        return unknown("inertia", "The width of the contact is not known, or nothing has crept.")
+        return unknown("inertia", "The width of the contact is not known, or there is no creep.")
     if math.isnan(evidence.speed):
         return unknown("inertia", "The speed of the slides is not known: audit the result with all of its steps.")
     bodies = [(one.late, one.poisson) for one in evidence.bodies] or [(evidence.late, _SOFTEST)]
@@ -155,25 +155,24 @@ def inertia(evidence: Evidence, given: AuditInputs) -> Finding:
             most = math.exp(bisect(lambda log: max(lag_and_excess(math.exp(log))) - limit, *ends, xtol=1e-4))
             return unknown("inertia", f"Give density: up to {float(f'{most:.2g}'):g} kg/m^3 the motion is slow.")
         density = _LEAST_DENSE if fast[0] else _DENSEST
-        any_solid = f"of any solid ({'from' if fast[0] else 'up to'} {density:g} kg/m^3{' on' if fast[0] else ''}) "
+        any_solid = f" in any solid ({'from' if fast[0] else 'up to'} {density:g} kg/m^3{' on' if fast[0] else ''})"
     lag, excess = lag_and_excess(density)
     number = max(lag, excess)
     if excess > lag:
-        waves = f"{any_solid}shear waves go at {as_text(math.sqrt(shear / density), 'm/s')}"
+        waves = f"Shear waves{any_solid} travel at {as_text(math.sqrt(shear / density), 'm/s')}"
         more = "faster than waves along the surface"
         if math.isfinite(excess):
-            more = f"which adds {percent(excess)} to what a load displaces"
+            more = f"which increases the displacement by {percent(excess)}"
         return Finding(
             "inertia",
             number,
-            f"{waves[0].upper()}{waves[1:]}, and it slides at {as_text(evidence.speed, 'm/s')}, {more}.",
+            f"{waves}, and the profile slides at {as_text(evidence.speed, 'm/s')}, {more}.",
         )
     takes = f"the program changes within {as_text(scale, 's')}" if math.isfinite(scale) else "nothing changes"
-    of = f"{any_solid}waves lag"
     return Finding(
         "inertia",
         number,
-        f"{of[0].upper()}{of[1:]} by {as_text(lag * scale, 's')} over {as_text(2 * width, 'm')}; {takes}.",
+        f"Waves{any_solid} lag by {as_text(lag * scale, 's')} over {as_text(2 * width, 'm')}; {takes}.",
     )
 
 
@@ -183,7 +182,7 @@ def heating(evidence: Evidence, given: AuditInputs) -> Finding | None:
     if speed == 0:
         return None
     if not evidence.ran:
-        return unknown("heating", "Known after the run, by the friction.")
+        return unknown("heating", "Known after the run, from the friction.")
     if math.isnan(power):
         return unknown("heating", "The speed of the slides is not known: audit the result with all of its steps.")
     if not spots or not area > 0:
@@ -216,9 +215,9 @@ def coupling(evidence: Evidence, given: AuditInputs) -> Finding:
         if sum(compliances) > 0
     ]
     if not found:
-        return unknown("coupling", "Nothing has crept by the end of the program.")
+        return unknown("coupling", "There is no creep by the end of the program.")
     number = max(found)
-    told = "Incompressible: friction at rest changes nothing." if number == 0 else ""
+    told = "The body is incompressible: static friction does not change the pressure." if number == 0 else ""
     return Finding(
-        "coupling", number, told or "Friction at rest would tilt the pressure a little, as the body is compressible."
+        "coupling", number, told or "The body is compressible: static friction would change the pressure slightly."
     )

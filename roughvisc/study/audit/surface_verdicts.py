@@ -21,22 +21,22 @@ from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STATED, STIFF
 _MERGED = 0.5
 #: A profile is flat where its radius of curvature exceeds so many times the width of the contact.
 _FLAT = 1e4
-_NO_MATERIAL = "The result does not say its material: audit the file that run wrote, or what simulate gave."
+_NO_MATERIAL = "The result does not state its material: audit the file from run, or the Dataset from simulate."
 
 
 def adhesion(evidence: Evidence, given: AuditInputs) -> Finding:
     """Pull-off force of the spots in contact over the largest load."""
     contact, w = evidence.contact, given.work_of_adhesion
     if not evidence.ran:
-        return unknown("adhesion", "Known after the run, by the spots in contact.")
+        return unknown("adhesion", "Known after the run, from the spots in contact.")
     if not evidence.force > 0:
-        return unknown("adhesion", "No load was ever carried: there is no contact to judge.")
+        return unknown("adhesion", "There was no load, and so no contact to judge.")
     if contact is None:
         return unknown("adhesion", 'Keep the pressure, fields = ["pressure"], for the spots in contact.')
     flat = not contact.curvature * _FLAT * contact.half_width > 1
     if evidence.boundary == "periodic" and (flat or evidence.fraction > _MERGED):
         merged = f"{percent(evidence.fraction)} of the area is in contact"
-        return unknown("adhesion", f"{merged}: no spots that stick one by one; stickiness says more.")
+        return unknown("adhesion", f"{merged}, without separate spots: see stickiness.")
     if flat:
         return _flat(evidence, w)
     radius = 1 / contact.curvature
@@ -67,27 +67,25 @@ def _flat(evidence: Evidence, w: float | None) -> Finding:
     """Of a flat punch, by its largest modulus, which holds it best."""
     radius = math.sqrt(evidence.area / math.pi)
     if not evidence.early > 0:
-        return unknown(
-            "adhesion", "The contact is flat, and the material has no modulus at once by which it would hold."
-        )
+        return unknown("adhesion", "The contact is flat, and the material has no instantaneous modulus.")
     unit = punch_pull_off(radius, 1 / evidence.early, 1.0)
     if w is None:
         least = (LIMITS["adhesion"].doubtful * evidence.force / unit) ** 2
         return unknown("adhesion", f"Give work_of_adhesion: a flat contact may have up to {as_text(least, 'J/m^2')}.")
     pull = unit * math.sqrt(w)
     held = f"A flat contact would hold {as_text(pull, 'N')} when pulled off fast (Kendall)"
-    return Finding("adhesion", pull / evidence.force, f"{held}; its area stays.")
+    return Finding("adhesion", pull / evidence.force, f"{held}; its area does not change.")
 
 
 def stickiness(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Whether a rough surface sticks without a load; None of a smooth body in free space."""
     texture, w = evidence.texture, given.work_of_adhesion
     if texture is None:
-        return unknown("stickiness", "The result holds no heights.")
+        return unknown("stickiness", "The result contains no heights.")
     if texture.smooth and evidence.boundary == "free":
         return None
     if not texture.slope > 0:
-        return unknown("stickiness", "The surface is flat: it has no roughness to judge by.")
+        return unknown("stickiness", "The surface is flat: it has no roughness.")
     if math.isnan(evidence.modulus):
         return unknown("stickiness", _NO_MATERIAL)
     energy = conformal_energy(texture.roughness, evidence.modulus)
@@ -111,14 +109,14 @@ def stickiness(evidence: Evidence, given: AuditInputs) -> Finding | None:
         "stickiness",
         ratio,
         f"Soft spots (Tabor parameter {as_text(tabor, '1')}): full contact stores {as_text(energy, 'J/m^2')} of "
-        f"elastic energy at the last modulus, and adhesion yields {as_text(w, 'J/m^2')} (Persson, Tosatti).",
+        f"elastic energy at the last modulus, and adhesion gains {as_text(w, 'J/m^2')} (Persson, Tosatti).",
     )
 
 
 def slope(evidence: Evidence, given: AuditInputs) -> Finding:
     """The rms slope of the loaded surface."""
     if math.isnan(evidence.slope):
-        return unknown("slope", "The result holds no heights that were loaded.")
+        return unknown("slope", "The result contains no loaded heights.")
     number = evidence.slope
     where = "surface" if evidence.boundary == "periodic" else "part of the surface that may touch"
     return Finding("slope", number, f"The {where} has {percent(number**2 / 2)} more area than its projection.")
@@ -127,9 +125,9 @@ def slope(evidence: Evidence, given: AuditInputs) -> Finding:
 def strain(evidence: Evidence, given: AuditInputs) -> Finding:
     """The rms slope of the loaded surface over the linear range."""
     if math.isnan(evidence.slope):
-        return unknown("strain", "The result holds no heights that were loaded.")
+        return unknown("strain", "The result contains no loaded heights.")
     largest = evidence.slope
-    about = f"strains come to about {percent(largest)}, on average {percent(0.2 * largest)}"
+    about = f"strains are at most about {percent(largest)}, and on average {percent(0.2 * largest)}"
     if given.linear_strain is None:
         return unknown("strain", f"Give linear_strain: {about}.")
     return Finding("strain", largest / given.linear_strain, f"{about[0].upper()}{about[1:]}.")
@@ -139,33 +137,33 @@ def resolution(evidence: Evidence, given: AuditInputs) -> Finding:
     """Cells in the shortest wave that a generator states; of others what the last octave adds to the rms slope."""
     texture = evidence.texture
     if texture is None:
-        return unknown("resolution", "The result holds no heights.")
+        return unknown("resolution", "The result contains no heights.")
     if texture.stated is not None:
         wave, cells = texture.stated.wavelength, texture.stated.cells
         number = 1 / cells
-        few = "" if number < LIMITS[STATED].doubtful else ". Take finer cells, or longer waves"
+        few = "" if number < LIMITS[STATED].doubtful else ". Use smaller cells, or longer wavelengths"
         return Finding(
             "resolution",
             number,
-            f"Stated by the generator: the shortest wave is {as_text(wave, 'm')} long, and has {cells:.3g} cells{few}.",
+            f"The shortest wavelength of the generator, {as_text(wave, 'm')}, has {cells:.3g} cells{few}.",
             STATED,
         )
     if texture.analytic:
-        return Finding("resolution", 0.0, "The profile is analytic: it has no shorter waves.")
+        return Finding("resolution", 0.0, "The profile is analytic: it has no shorter wavelengths.")
     if texture.smooth:
         return Finding(
             "resolution",
             0.005,
-            f"Form alone: 99 % of the slope's square lie above {as_text(texture.shortest / 2, 'm')}.",
+            f"Only form: 99 % of the squared slope lies above {as_text(texture.shortest / 2, 'm')}.",
         )
     if math.isnan(texture.last_octave):
         why = "The surface is flat" if texture.slope == 0 else "Points are absent"
-        return unknown("resolution", f"{why}: its shortest waves are not known.")
+        return unknown("resolution", f"{why}: its shortest wavelengths are not known.")
     return Finding(
         "resolution",
         texture.last_octave,
-        f"Waves below {as_text(texture.shortest, 'm')} add {percent(texture.last_octave)} of the slope, and take away "
-        "as much of the area; the next octave may do so again.",
+        f"Wavelengths below {as_text(texture.shortest, 'm')} add {percent(texture.last_octave)} of the slope, and "
+        "remove as much of the area; the next octave may do so again.",
     )
 
 
@@ -174,9 +172,9 @@ def border(evidence: Evidence, given: AuditInputs) -> Finding | None:
     if evidence.boundary != "periodic":
         return None
     if evidence.texture is None:
-        return unknown("border", "The result holds no heights.")
+        return unknown("border", "The result contains no heights.")
     number = evidence.texture.mismatch
-    seam = "Opposite borders meet" if number < LIMITS["border"].doubtful else "The surface repeats with a step"
+    seam = "Opposite borders match" if number < LIMITS["border"].doubtful else "The surface repeats with a step"
     advice = "" if number < LIMITS["border"].doubtful else " Use mirror = true under [surface]."
     return Finding("border", number, f"{seam}: they differ {number:.2g} times as much as neighbouring rows.{advice}")
 
@@ -186,12 +184,11 @@ def window(evidence: Evidence, given: AuditInputs) -> Finding | None:
     if evidence.texture is None or not evidence.texture.taper > 0:
         return None
     number = evidence.texture.taper
-    advice = "" if number < LIMITS["window"].doubtful else " Use mirror = true in place of taper."
+    advice = "" if number < LIMITS["window"].doubtful else " Use mirror = true instead of taper."
     return Finding(
         "window",
         number,
-        f"A taper takes the roughness off a margin of {percent(number)} of the side along each border; what touches "
-        f"there is smooth.{advice}",
+        f"A taper removes the roughness from a margin of {percent(number)} of the side along each border.{advice}",
     )
 
 

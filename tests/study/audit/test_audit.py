@@ -285,7 +285,7 @@ def test_resolution__of_a_ball_that_was_measured_is_that_of_its_form(ball):
     ds = rv.simulate(measured, RUBBER, rv.Program().load(1e-3, over=1.0), **QUICK)
     found = rv.audit(ds, work_of_adhesion=0.05)
     assert found["resolution"].verdict == "holds"
-    assert "Form alone" in found["resolution"].sentence
+    assert "Only form" in found["resolution"].sentence
     assert "stickiness" not in [one.name for one in found]
 
 
@@ -319,8 +319,8 @@ def test_resolution__of_a_generated_surface_is_by_cells_in_its_shortest_wave(cel
     found = rv.audit(pressed(generated(cells and cells * 1e-5), boundary))["resolution"]
     assert found.verdict == verdict
     assert found.number == pytest.approx(1 / (cells or 2), rel=1e-12)
-    assert found.sentence.startswith(f"Stated by the generator: the shortest wave is {(cells or 2) * 10:g} µm long")
-    assert ("finer cells" in found.sentence) == (verdict != "holds")
+    assert found.sentence.startswith(f"The shortest wavelength of the generator, {(cells or 2) * 10:g} µm, has")
+    assert ("smaller cells" in found.sentence) == (verdict != "holds")
 
 
 def test_resolution__of_a_texture_is_along_the_axis_of_its_shortest_waves():
