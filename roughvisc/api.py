@@ -19,6 +19,7 @@ from roughvisc.problem import Problem
 from roughvisc.settings import Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
+from roughvisc.units import Quantity, quantities
 
 Progress = Callable[[float, float], None]
 
@@ -135,13 +136,14 @@ def simulate(
 
 
 @former_arguments(**_FORMER)
+@quantities(speeds="m/s", load="N", pressure="Pa")
 def friction(
     height: xr.DataArray,
     material: Material | Body,
     *,
-    speeds: Sequence[float] | float,
-    load: float | None = None,
-    pressure: float | None = None,
+    speeds: Sequence[Quantity] | Quantity,
+    load: Quantity | None = None,
+    pressure: Quantity | None = None,
     direction: Direction = "x",
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] = (),
@@ -160,9 +162,9 @@ def friction(
         Of a half-space, or a body as :func:`roughvisc.simulate` has it: one with a finite compliance after endless
         creep, unless the profile is the same all across the motion. Shift factors of a temperature act as factors of
         the speed.
-    speeds : float or sequence of float
+    speeds : float or str, or sequence of them
         [m/s]
-    load, pressure : float
+    load, pressure : float or str
         Load [N] or nominal pressure [Pa]: one of them.
     direction : {"x", "-x", "y", "-y"}
         In which the profile moves.

@@ -9,21 +9,33 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 
+if TYPE_CHECKING:
+    # mypy cannot say that text ends at the decorator: to it a quantity inside a function is a number
+    Quantity = float | Any
+else:
+    #: What an argument that :func:`quantities` converts may be: a number in SI, or text with a unit.
+    Quantity = float | str
+
+_Taking = TypeVar("_Taking", bound=Callable[..., Any])
+
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
 # A grammar of our own in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would never come back.
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
+_PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
+# of "0.31/MPa" the number is 0.31: the 1 of an inverse stands apart
+_INVERSE = rf"(?:(?<=\s)1\s*)?/\s*(?:{_FACTOR}|\({_PRODUCT}\))"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_PRODUCT}|{_INVERSE})?\s*")
 # pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
 _ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradian"}
 
@@ -75,6 +87,8 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     (1e-05, 100000.0, 2.0)
     >>> quantity("25 degC", "K"), quantity("25 °C", "K")
     (298.15, 298.15)
+    >>> quantity("0.3 1/MPa", "1/Pa"), quantity("0.31/MPa", "1/Pa"), quantity("2 1/(kPa s)", "1/(Pa s)")
+    (3e-07, 3.1e-07, 0.002)
     """
     label = f"{name} is {shown(value)}" if name else f"found {shown(value)}"
     wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
@@ -123,6 +137,50 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     ):
         return value
     return type(value)([in_si(one, unit, f"{name}[{number}]") for number, one in enumerate(value)])
+
+
+def quantities(**units: str) -> Callable[[_Taking], _Taking]:
+    """Decorator of a function or a dataclass: the arguments named are numbers in SI, or text with a unit.
+
+    Text becomes a number before the function sees it; numbers and all else are handed on.
+
+    Parameters
+    ----------
+    **units : str
+        Name of the argument -> its unit, as :func:`quantity` takes it.
+
+    Examples
+    --------
+    >>> @quantities(radius="m")
+    ... def area(radius):
+    ...     return 3.0 * radius**2
+    >>> area("10 mm") == area(0.01)
+    True
+    >>> area("2 s")  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    InputError: radius is '2 s', which is in second: expected a number in m, or a string with a unit of its kind
+    """
+
+    def decorate(function: Any) -> Any:
+        if isinstance(function, type):
+            function.__init__ = decorate(function.__init__)  # type: ignore[misc]
+            return function
+        code = function.__code__
+        names = code.co_varnames[: code.co_argcount]
+
+        @wraps(function)
+        def called(*args: Any, **given: Any) -> Any:
+            for name in units.keys() & given.keys():
+                given[name] = in_si(given[name], units[name], name)
+            known = [
+                in_si(one, units[name], name) if name in units else one for name, one in zip(names, args, strict=False)
+            ]
+            return function(*known, *args[len(names) :], **given)
+
+        called.quantities = units  # type: ignore[attr-defined]
+        return called
+
+    return decorate
 
 
 def number_and_unit(text: str) -> tuple[float, str]:
@@ -294,7 +352,7 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
 
     expected = _registry().Unit("" if dimensionless else unit)
     try:
-        names = _registry().parse_units_as_container("percent" if found == "%" else found.replace("·", "*"))
+        names = _registry().parse_units_as_container(_for_pint(found))
         given = _registry().Unit(names)
         same_kind = given.dimensionality == expected.dimensionality
         converted, begins = (
@@ -310,6 +368,13 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
     if difference and begins:
         raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
     return float(f"{converted:.15g}")
+
+
+def _for_pint(unit: str) -> str:
+    """A unit as pint reads it."""
+    if unit.startswith("/"):
+        return f"1{unit}"
+    return "percent" if unit == "%" else unit.replace("·", "*")
 
 
 def _prefixed(number: str, found: str, unit: str) -> float | None:

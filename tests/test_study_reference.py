@@ -9,7 +9,7 @@ from test_docs import BASE, DOCS, there  # noqa: F401  a fixture
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.statement.schema.material import COLUMNS, MODELS
+from roughvisc.study.statement.schema.material import COLUMNS, MODELS, SPRINGS
 from roughvisc.study.statement.schema.meanings import meanings
 from roughvisc.study.statement.schema.surface import RECIPES
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
@@ -131,6 +131,7 @@ def materials(study_keys, name, key, example, folder):
             (folder / "plain.csv").write_text("time, modulus\n0.01, 3\n0.1, 2\n1, 1\n")
         columns = {"file": "plain.csv"}
     base = {} if key == "file" or "file" in columns else base
+    base = {k: v for k, v in base.items() if SPRINGS.get(k) != key}
     return {"model": model, **needed, **base, **columns, key: example}
 
 

@@ -9,6 +9,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.topography.blocks import count_of, mean_of, median_of, row_blocks
+from roughvisc.units import quantities
 
 
 def _bin_edges(field: xr.DataArray, bins) -> np.ndarray:
@@ -40,6 +41,7 @@ def _density(field: xr.DataArray, bins, name: str) -> xr.Dataset:
     )
 
 
+@quantities(bins="Pa")
 def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     """Probability density of the pressure over the cells in contact.
 
@@ -47,7 +49,7 @@ def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset
         A result with ``pressure``.
-    bins : int or array_like
+    bins : int, or array_like of float or str
         Number of equal bins from zero to the largest pressure at all times (which is read immediately), or their edges.
         [Pa]
 
@@ -65,6 +67,7 @@ def pressure_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     return _density(dataset["pressure"], bins, "pressure")
 
 
+@quantities(bins="m")
 def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     """Probability density of the gap over the present cells out of contact.
 
@@ -72,7 +75,7 @@ def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset
         A result with ``gap``.
-    bins : int or array_like
+    bins : int, or array_like of float or str
         Number of equal bins from zero to the largest gap at all times (which is read immediately), or their edges. [m]
 
     Returns

@@ -11,6 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.groups import group_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import along_time, need_history
+from roughvisc.units import Quantity, quantities
 
 
 def history(dataset: xr.Dataset) -> xr.Dataset:
@@ -56,14 +57,15 @@ def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:
     return slope
 
 
-def area_growth(dataset: xr.Dataset, *, since: float = 0.0) -> xr.Dataset:
+@quantities(since="s")
+def area_growth(dataset: xr.Dataset, *, since: Quantity = 0.0) -> xr.Dataset:
     """Growth exponent of the contact area, ``d ln(area) / d ln(time - since)``.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result.
-    since : float
+    since : float or str
         Time from which the growth is measured, such as the end of a loading ramp. [s]
 
     Returns

@@ -13,6 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.arguments import KEEP, ORDER
 from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
+from roughvisc.units import Quantity, quantities
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
@@ -68,8 +69,9 @@ def off_plane(h: xr.DataArray) -> xr.DataArray:
         return like(h, less_polynomial(h.values, 0))
 
 
+@quantities(cutoff="m")
 def gaussian_filter(
-    h: xr.DataArray, cutoff: float, keep: Literal["long", "short"] = "long", periodic: bool = False
+    h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "short"] = "long", periodic: bool = False
 ) -> xr.DataArray:
     r"""Apply an areal Gaussian filter by normalised convolution.
 
@@ -77,7 +79,7 @@ def gaussian_filter(
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
-    cutoff : float
+    cutoff : float or str
         Wavelength at which half the amplitude passes; at least three cells. [m]
     keep : {"long", "short"}, default "long"
         "long": wavelengths above the cut-off (an S-filter). "short": the rest (an L-filter, the roughness).

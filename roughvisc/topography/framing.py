@@ -23,16 +23,20 @@ from roughvisc.topography.grid import (
     with_taper_weights,
 )
 from roughvisc.topography.laying import laid_on
+from roughvisc.units import Quantity, quantities
 
 
-def crop(h: xr.DataArray, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> xr.DataArray:
+@quantities(x="m", y="m")
+def crop(
+    h: xr.DataArray, x: tuple[Quantity, Quantity] | None = None, y: tuple[Quantity, Quantity] | None = None
+) -> xr.DataArray:
     """Crop a scan to the cells whose centres lie within limits.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
-    x, y : pair of float, optional
+    x, y : pair of float or str, optional
         Lower and upper limit of each coordinate; default: all. [m]
 
     Returns
@@ -111,13 +115,14 @@ def invert(h: xr.DataArray) -> xr.DataArray:
     return noted(like(h, -h.values), "inverted")
 
 
+@quantities(offset="m")
 def combine(
     h1: xr.DataArray,
     h2: xr.DataArray,
     flip: Literal["x", "y"] | None = None,
     *,
     align: Literal["grid", "centre"] = "grid",
-    offset: tuple[float, float] = (0.0, 0.0),
+    offset: tuple[Quantity, Quantity] = (0.0, 0.0),
 ) -> xr.DataArray:
     """Combine two scanned faces in contact to one rigid profile, the sum of their heights.
 
@@ -133,7 +138,7 @@ def combine(
         that of the first; the sum is on the cells of the first that the second covers completely. If the cells of the
         second are smaller, it is averaged by area. If they are larger, it is interpolated between its cell centres by a
         cubic spline, or linearly if points of it are missing.
-    offset : pair of float
+    offset : pair of float or str
         Position of the second centre relative to the first, along x and y; with `align` "centre". [m]
 
     Returns
@@ -222,14 +227,15 @@ def _filled(h: xr.DataArray) -> np.ndarray:
     return h["filled"].transpose("x", "y").values if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
 
 
-def taper(h: xr.DataArray, width: float | tuple[float, float]) -> xr.DataArray:
+@quantities(width="m")
+def taper(h: xr.DataArray, width: Quantity | tuple[Quantity, Quantity]) -> xr.DataArray:
     """Let heights fall to their mean at the border, so that the surface repeats without a step.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
-    width : float or pair of float
+    width : float or str, or pair of them
         Width of the margin along each border, at most half a side. [m]
 
     Returns

@@ -17,16 +17,18 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, noted, number, pair, spacing, with_coordinates
+from roughvisc.units import Quantity, quantities
 
 
-def sphere(radius: float, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
+@quantities(radius="m", size="m")
+def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
     r"""Spherical indenter, centred, apex at height zero.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius of curvature. [m]
-    size : float or pair of float
+    size : float or str, or pair of them
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
@@ -48,6 +50,7 @@ def sphere(radius: float, size: Any, shape: Any, exact: bool = False) -> xr.Data
     return _indenter("sphere", {"radius": number("radius", radius, "m"), "exact": bool(exact)}, size, shape)
 
 
+@quantities(size="m")
 def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     """Conical indenter of height ``-slope * r``, centred, apex at height zero.
 
@@ -55,7 +58,7 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     ----------
     slope : float
         Tangent of the angle between the flank and the plane. [-]
-    size : float or pair of float
+    size : float or str, or pair of them
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
@@ -73,14 +76,15 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     return _indenter("cone", {"slope": number("slope", slope, "-")}, size, shape)
 
 
-def flat_punch(radius: float, size: Any, shape: Any) -> xr.DataArray:
+@quantities(radius="m", size="m")
+def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     """Flat-ended cylindrical punch, centred: height zero inside the radius, absent (NaN) outside.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius of the punch. [m]
-    size : float or pair of float
+    size : float or str, or pair of them
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.

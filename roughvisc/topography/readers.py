@@ -28,7 +28,7 @@ from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.instruments import Channel, Opened, brief, forget
 from roughvisc.topography.orientation import orientation
-from roughvisc.units import quantity
+from roughvisc.units import Quantity, quantities, quantity
 
 #: No scan is wider, no spacing finer, no height in a file further from zero. [m] Scans of 150 mm exist; absolute
 #: heights of 76 mm too.
@@ -80,7 +80,8 @@ def read_file(
     return h
 
 
-def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArray:
+@quantities(spacing="m")
+def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> xr.DataArray:
     """Convert an array to a labelled height grid.
 
     Parameters
@@ -88,7 +89,7 @@ def from_array(heights: Any, spacing: float | tuple[float, float]) -> xr.DataArr
     heights : array_like, shape (nx, ny)
         Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m] Transpose a matrix
         whose rows run along x, as in the files that :func:`roughvisc.open_scan` reads.
-    spacing : float or pair of float
+    spacing : float or str, or pair of them
         Cell sides (dx, dy). [m]
 
     Returns

@@ -30,6 +30,7 @@ from roughvisc.topography.grid import (
     with_taper_weights,
 )
 from roughvisc.topography.missing_points import fill
+from roughvisc.units import Quantity, quantities
 
 Along = Callable[[np.ndarray, int], np.ndarray]
 
@@ -143,14 +144,15 @@ def band_limit(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | N
     return _on_cells(h, heights, marked(h, *cells), "band-limited", way, periodic)
 
 
-def without_short_waves(h: xr.DataArray, shortest: float, periodic: bool | None = None) -> xr.DataArray:
+@quantities(shortest="m")
+def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | None = None) -> xr.DataArray:
     """Remove all wavelengths below a limit, on the same cells.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y), without missing points. [m]
-    shortest : float
+    shortest : float or str
         Shortest wavelength to keep; at least two cells, and shorter than the sides. [m]
     periodic : bool, optional
         Whether the surface repeats in x and in y; default as in :func:`resample`.

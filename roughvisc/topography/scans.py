@@ -8,8 +8,10 @@ import xarray as xr
 
 from roughvisc.topography.cards import is_card, open_card
 from roughvisc.topography.readers import existing, finite, read_file
+from roughvisc.units import Quantity, quantities
 
 
+@quantities(spacing="m")
 def open_scan(
     path: str | os.PathLike[str],
     *,
@@ -17,7 +19,7 @@ def open_scan(
     channel: int | str | None = None,
     unit: str | None = None,
     height_unit: str | None = None,
-    spacing: float | tuple[float, float] | None = None,
+    spacing: Quantity | tuple[Quantity, Quantity] | None = None,
 ) -> xr.DataArray:
     """Open a scanned surface from an instrument file, a grid file or a surface card.
 
@@ -36,7 +38,7 @@ def open_scan(
     height_unit : str, optional
         Unit of the heights in a file that states none, if it differs from that of x and y: for points in mm, mm, um use
         ``unit="mm", height_unit="um"``.
-    spacing : float or pair of float, optional
+    spacing : float or str, or pair of them, optional
         Cell sides (dx, dy), instead of those in the file. [m]
 
     Returns

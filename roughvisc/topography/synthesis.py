@@ -17,20 +17,22 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, grown, recipe_of, sphere
+from roughvisc.units import Quantity, quantities
 
 __all__ = ["cone", "flat_punch", "grown", "is_analytic", "self_affine", "sphere", "wavy"]
 
 
-def wavy(amplitude: float, wavelength: float, size: Any, shape: Any, waves: int = 2) -> xr.DataArray:
+@quantities(amplitude="m", wavelength="m", size="m")
+def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves: int = 2) -> xr.DataArray:
     r"""Regular waves, periodic over the domain, with a crest at the corner ``x = y = 0``.
 
     Parameters
     ----------
-    amplitude : float
+    amplitude : float or str
         Amplitude :math:`a`. [m]
-    wavelength : float
+    wavelength : float or str
         Wavelength :math:`2 \pi / k`; each side must be a whole number of wavelengths. [m]
-    size : float or pair of float
+    size : float or str, or pair of them
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; with one cell along y the crests run along y.
@@ -64,15 +66,16 @@ def wavy(amplitude: float, wavelength: float, size: Any, shape: Any, waves: int 
     return labelled(heights, cell_of(size, shape), attrs)
 
 
+@quantities(size="m", rms_slope="1", rms_height="m", rolloff="m", shortcut="m")
 def self_affine(
     size: Any,
     shape: Any,
     *,
     hurst: float,
-    rms_slope: float | None = None,
-    rms_height: float | None = None,
-    rolloff: float | None = None,
-    shortcut: float | None = None,
+    rms_slope: Quantity | None = None,
+    rms_height: Quantity | None = None,
+    rolloff: Quantity | None = None,
+    shortcut: Quantity | None = None,
     anisotropy: float = 1.0,
     amplitudes: Literal["fixed", "gaussian"] = "fixed",
     seed: int | np.random.Generator,
@@ -84,20 +87,20 @@ def self_affine(
 
     Parameters
     ----------
-    size : float or pair of float
+    size : float or str, or pair of them
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``.
     hurst : float
         Hurst exponent :math:`H`, in (0, 1]. [-]
-    rms_slope, rms_height : float
+    rms_slope, rms_height : float or str
         Exactly one: the root mean square of the gradient [-], or of the height about its mean [m], of all wavelengths
         that the grid resolves down to `shortcut`; with Gaussian amplitudes the root mean square over all seeds. The
         band-limited function has this value to rounding; finite differences on the grid give a slightly smaller slope.
-    rolloff : float, optional
+    rolloff : float or str, optional
         Wavelength above which the spectrum is constant. [m] Default: none, the power law reaches the size of the
         domain.
-    shortcut : float, optional
+    shortcut : float or str, optional
         Shortest wavelength. [m] Default: two cells (the longer of the two sides). With it, the heights are the same on
         every grid that resolves it. Without it a finer grid has more wavelengths, and the common ones are lower by one
         factor, so that the whole surface has the given `rms_slope` or `rms_height`.

@@ -10,6 +10,7 @@ import xarray as xr
 from roughvisc.groups import whole_of
 from roughvisc.labels import heading
 from roughvisc.study.storage.store import atomic_write
+from roughvisc.units import Quantity, quantities
 from roughvisc.variables import FLAGS
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import frame_at, require, row_text, rows_of
@@ -55,14 +56,15 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     return Path(path)
 
 
-def deformed(dataset: xr.Dataset, time: float = -1) -> xr.DataArray:
+@quantities(time="s")
+def deformed(dataset: xr.Dataset, time: Quantity = -1) -> xr.DataArray:
     """Heights of the half-space's deformed surface, as any surface over (x, y).
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result with ``height``, and ``gap`` or ``displacement``.
-    time : float
+    time : float or str
         The nearest kept time [s] is taken, or place of another axis; a negative whole number counts rows from the end.
 
     Returns

@@ -216,6 +216,7 @@ DEFAULTS = {
     "fields": ["pressure", "gap"],
     "times": "all",
     "poisson": 0.5,
+    "modulus_factor": 1.0,
     "kind": "shear",
     "glassy": 0.0,
     "fluidity": 0.0,

@@ -297,7 +297,7 @@ def test_grown__accepts_what_leaves_the_profile_alone():
     ("call", "fragments"),
     [
         (lambda: sphere(0.0, 1.0, 5), ("radius is 0.0", "[m]")),
-        (lambda: sphere("1 mm", 1.0, 5), ("radius is '1 mm'",)),
+        (lambda: sphere("1 s", 1.0, 5), ("radius is '1 s'", "second")),
         (lambda: sphere(1.0, (1.0, math.nan), 5), ("size is nan",)),
         (lambda: sphere(1.0, (1.0, 1.0, 1.0), 5), ("size is (1.0, 1.0, 1.0)", "pair")),
         (lambda: sphere(1.0, 1.0, 5.0), ("shape is 5.0", "whole")),

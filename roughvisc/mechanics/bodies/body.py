@@ -14,6 +14,7 @@ from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.materials.protocol import Material, complete
+from roughvisc.units import Quantity, quantities
 
 #: Unless a base is given with a thickness.
 BASE: Base = "bonded"
@@ -86,14 +87,15 @@ def body_of(material: Any) -> Body:
     return material if isinstance(material, Body) else Body(material)
 
 
-def sheet(material: Material, thickness: float, base: Base = BASE) -> Body:
+@quantities(thickness="m")
+def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     """A sheet of a material on a rigid base.
 
     Parameters
     ----------
     material : Material
         Material of one body with a Poisson ratio that is constant in time.
-    thickness : float
+    thickness : float or str
         Thickness; infinite for a half-space. [m]
     base : {"bonded", "slipping"}
         Whether the sheet sticks to its base, or slides on it without friction.

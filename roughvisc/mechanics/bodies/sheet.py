@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import love_kernel, rectangle_displacement
 from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 # With this kappa the response to long waves is right to 1e-3 of 4/3 q^2 on cells of any length (measured).
@@ -118,13 +119,14 @@ _LONG, _LONGEST = 0.5, 50.0
 _SERIES_BELOW = 0.5
 
 
+@quantities(thickness="m")
 @dataclass(frozen=True)
 class Sheet(Kernel):
     r"""A homogeneous sheet on a rigid base.
 
     Parameters
     ----------
-    thickness : float
+    thickness : float or str
         [m]
     poisson : float
         Poisson's ratio, from 0 to 1/2. A slipping base does not depend on it.
@@ -153,7 +155,7 @@ class Sheet(Kernel):
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.8.
     """
 
-    thickness: float
+    thickness: Quantity
     poisson: float = 0.5
     base: Base = "bonded"
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -18,18 +19,21 @@ _MAUGIS = 1.1570
 _REPULSION = 2.0
 
 
-def tabor_parameter(radius: float, contact_modulus: float, work_of_adhesion: float, attraction_range: float) -> float:
+@quantities(radius="m", contact_modulus="Pa", work_of_adhesion="J/m^2", attraction_range="m")
+def tabor_parameter(
+    radius: Quantity, contact_modulus: Quantity, work_of_adhesion: Quantity, attraction_range: Quantity
+) -> float:
     r"""Tabor parameter of a sphere: how far its adhesive neck stands out, over the range of the attraction.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``R`` of the sphere. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    work_of_adhesion : float
+    work_of_adhesion : float or str
         ``w``. [J/m2]
-    attraction_range : float
+    attraction_range : float or str
         Distance ``z`` over which the surfaces attract each other. [m]
 
     Returns
@@ -52,14 +56,15 @@ def tabor_parameter(radius: float, contact_modulus: float, work_of_adhesion: flo
     return float(np.cbrt(radius * (work_of_adhesion / contact_modulus) ** 2) / attraction_range)
 
 
-def pull_off_force(radius: float, work_of_adhesion: float, tabor: float = math.inf) -> float:
+@quantities(radius="m", work_of_adhesion="J/m^2")
+def pull_off_force(radius: Quantity, work_of_adhesion: Quantity, tabor: float = math.inf) -> float:
     r"""Force that separates a sphere from a flat half-space.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``R`` of the sphere. [m]
-    work_of_adhesion : float
+    work_of_adhesion : float or str
         ``w``. [J/m2]
     tabor : float
         Tabor parameter; infinite: JKR, 0: DMT.
@@ -90,16 +95,17 @@ def pull_off_force(radius: float, work_of_adhesion: float, tabor: float = math.i
     return math.pi * work_of_adhesion * radius * (7 - share) / 4
 
 
-def punch_pull_off(radius: float, contact_modulus: float, work_of_adhesion: float) -> float:
+@quantities(radius="m", contact_modulus="Pa", work_of_adhesion="J/m^2")
+def punch_pull_off(radius: Quantity, contact_modulus: Quantity, work_of_adhesion: Quantity) -> float:
     r"""Force that separates a round flat punch from a half-space.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    work_of_adhesion : float
+    work_of_adhesion : float or str
         ``w``. [J/m2]
 
     Returns
@@ -121,14 +127,15 @@ def punch_pull_off(radius: float, contact_modulus: float, work_of_adhesion: floa
     return math.sqrt(8 * math.pi * radius**3 * contact_modulus * work_of_adhesion)
 
 
+@quantities(force="N", pull_off="N")
 def adhesive_load(force: ArrayLike, pull_off: ArrayLike) -> Array:
     r"""Load that would press a sphere as far without adhesion (JKR).
 
     Parameters
     ----------
-    force : array_like
+    force : array_like of float or str
         Load ``F``. [N]
-    pull_off : array_like
+    pull_off : array_like of float or str
         Force of separation :math:`P = \frac32 \pi w R`. [N]
 
     Returns
@@ -149,8 +156,13 @@ def adhesive_load(force: ArrayLike, pull_off: ArrayLike) -> Array:
     return np.asarray(force + 2 * pull_off + 2 * np.sqrt(pull_off * force + pull_off**2))
 
 
+@quantities(rms_laplacian="1/m", contact_modulus="Pa", work_of_adhesion="J/m^2", attraction_range="m")
 def rough_attraction(
-    rms_slope: float, rms_laplacian: float, contact_modulus: float, work_of_adhesion: float, attraction_range: float
+    rms_slope: float,
+    rms_laplacian: Quantity,
+    contact_modulus: Quantity,
+    work_of_adhesion: Quantity,
+    attraction_range: Quantity,
 ) -> float:
     r"""Attraction around the spots of a stiff rough contact over the repulsion within them.
 
@@ -158,13 +170,13 @@ def rough_attraction(
     ----------
     rms_slope : float
         Root mean square slope ``h'``. [-]
-    rms_laplacian : float
+    rms_laplacian : float or str
         Root mean square ``h''`` of the Laplacian of the heights, twice that of the mean curvature. [1/m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    work_of_adhesion : float
+    work_of_adhesion : float or str
         ``w``. [J/m2]
-    attraction_range : float
+    attraction_range : float or str
         Distance ``z`` over which the surfaces attract each other. [m]
 
     Returns
@@ -202,14 +214,15 @@ def rough_attraction(
     return math.pi * (3 / 16) ** (2 / 3) * pulled * width
 
 
-def conformal_energy(roughness: float, contact_modulus: float) -> float:
+@quantities(roughness="m", contact_modulus="Pa")
+def conformal_energy(roughness: Quantity, contact_modulus: Quantity) -> float:
     r"""Elastic energy, an area, of a half-space that follows a rough surface everywhere.
 
     Parameters
     ----------
-    roughness : float
+    roughness : float or str
         :math:`\sum |q| |h_q|^2` over all waves of the surface, with the mean square height :math:`\sum |h_q|^2`. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
 
     Returns

@@ -27,6 +27,7 @@ from scipy.special import ive, kve
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.indenters import positive
 from roughvisc.mechanics.materials.models import Prony
+from roughvisc.units import Quantity, quantities
 
 # exp of minus that is nothing.
 _NEGLIGIBLE = 40.0
@@ -54,18 +55,19 @@ class SlidingCylinder:
     friction_coefficient: float
 
 
-def sliding_cylinder(radius: float, material: Prony, load: float, speed: float) -> SlidingCylinder:
+@quantities(radius="m", load="N/m", speed="m/s")
+def sliding_cylinder(radius: Quantity, material: Prony, load: Quantity, speed: Quantity) -> SlidingCylinder:
     r"""Steady sliding or rolling of a rigid cylinder, without shear.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Of the cylinder. [m]
     material : Prony
         A solid of one retardation time, with a compliance at once.
-    load : float
+    load : float or str
         Per length of the cylinder. [N/m]
-    speed : float
+    speed : float or str
         [m/s]
 
     Returns

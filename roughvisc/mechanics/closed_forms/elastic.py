@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -59,16 +60,17 @@ def _elastic(indenter: Indenter, contact_modulus: float, force: float) -> Axisym
     return AxisymmetricContact(indenter, contact_modulus, radius, float(indenter.reduced(radius)), force)
 
 
-def hertz(sphere_radius: float, contact_modulus: float, force: float) -> AxisymmetricContact:
+@quantities(sphere_radius="m", contact_modulus="Pa", force="N")
+def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -> AxisymmetricContact:
     r"""Elastic contact of a paraboloid ``r^2 / (2 R)`` (Hertz).
 
     Parameters
     ----------
-    sphere_radius : float
+    sphere_radius : float or str
         Radius of curvature ``R``. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    force : float
+    force : float or str
         Normal force ``W``. [N]
 
     Returns
@@ -101,16 +103,17 @@ def hertz(sphere_radius: float, contact_modulus: float, force: float) -> Axisymm
     return _elastic(Paraboloid(sphere_radius), contact_modulus, force)
 
 
-def sneddon_cone(slope: float, contact_modulus: float, force: float) -> AxisymmetricContact:
+@quantities(contact_modulus="Pa", force="N")
+def sneddon_cone(slope: float, contact_modulus: Quantity, force: Quantity) -> AxisymmetricContact:
     r"""Elastic contact of a cone ``m r`` (Sneddon).
 
     Parameters
     ----------
     slope : float
         Slope ``m`` of the cone's side. [-]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    force : float
+    force : float or str
         Normal force ``W``. [N]
 
     Returns
@@ -162,16 +165,17 @@ class FlatPunchContact:
         return np.asarray(2 / np.pi * self.approach * np.arcsin(ratio))
 
 
-def flat_punch(radius: float, contact_modulus: float, force: float) -> FlatPunchContact:
+@quantities(radius="m", contact_modulus="Pa", force="N")
+def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> FlatPunchContact:
     r"""Elastic contact of a rigid cylinder with a flat end (Boussinesq).
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    force : float
+    force : float or str
         Normal force ``W``. [N]
 
     Returns
@@ -232,18 +236,21 @@ class WavyContact:
         return np.asarray(crest * np.sqrt(np.maximum(inside, 0.0)))
 
 
-def westergaard(amplitude: float, wavelength: float, contact_modulus: float, mean_pressure: float) -> WavyContact:
+@quantities(amplitude="m", wavelength="m", contact_modulus="Pa", mean_pressure="Pa")
+def westergaard(
+    amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, mean_pressure: Quantity
+) -> WavyContact:
     r"""Elastic contact of the profile ``amplitude cos(2 pi x / wavelength)``, plane strain (Westergaard).
 
     Parameters
     ----------
-    amplitude : float
+    amplitude : float or str
         Amplitude ``a`` of the cosine: half its height from trough to crest. [m]
-    wavelength : float
+    wavelength : float or str
         Period ``l``. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
-    mean_pressure : float
+    mean_pressure : float or str
         Force over nominal area. [Pa]
 
     Returns
@@ -281,14 +288,17 @@ def westergaard(amplitude: float, wavelength: float, contact_modulus: float, mea
     return WavyContact(wavelength, float(full), mean_pressure, float(wavelength / np.pi * np.arcsin(sine)))
 
 
-def full_contact_pressure(amplitude: float, wavelength: float, contact_modulus: float, waves: int = 2) -> float:
+@quantities(amplitude="m", wavelength="m", contact_modulus="Pa")
+def full_contact_pressure(
+    amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, waves: int = 2
+) -> float:
     """Mean pressure ``p*`` that closes the gap under a wavy surface.
 
     Parameters
     ----------
-    amplitude, wavelength : float
+    amplitude, wavelength : float or str
         Of ``a cos(kx)`` (``waves=1``) or ``a cos(kx) cos(ky)`` (``waves=2``), ``k = 2 pi / wavelength``. [m]
-    contact_modulus : float
+    contact_modulus : float or str
         ``E*``. [Pa]
     waves : {1, 2}
         How many directions are wavy.

@@ -9,6 +9,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, hereditary_integral
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -18,18 +19,19 @@ def _control(program: Program, control: str) -> None:
         raise InputError(f"expected a program of {control}")
 
 
-def punch_approach(radius: float, material: Material, program: Program, t: ArrayLike) -> Array:
+@quantities(radius="m", t="s")
+def punch_approach(radius: Quantity, material: Material, program: Program, t: ArrayLike) -> Array:
     r"""Approach of a flat round punch under a history of load, which never falls to zero once it acts.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
     material : Material
         The half-space.
     program : Program
         Ramps, holds and jumps of load.
-    t : array_like
+    t : array_like of float or str
         Times. [s]
 
     Returns
@@ -47,18 +49,19 @@ def punch_approach(radius: float, material: Material, program: Program, t: Array
     return hereditary_integral(material.contact_compliance, material.contact_integral, program, t) / (2 * radius)
 
 
-def punch_force(radius: float, material: Prony, program: Program, t: ArrayLike) -> Array:
+@quantities(radius="m", t="s")
+def punch_force(radius: Quantity, material: Prony, program: Program, t: ArrayLike) -> Array:
     r"""Force on a flat round punch under a history of approach, as long as it stays in contact.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
     material : Prony
         Exponential series with an instantaneous compliance.
     program : Program
         Ramps, holds and jumps of approach.
-    t : array_like
+    t : array_like of float or str
         Times. [s]
 
     Returns
@@ -75,18 +78,19 @@ def punch_force(radius: float, material: Prony, program: Program, t: ArrayLike) 
     return 2 * radius * hereditary_integral(relaxation, relaxation.integral, program, t)
 
 
-def punch_dissipation(radius: float, material: Prony, amplitude: float, period: float) -> float:
+@quantities(radius="m", amplitude="m", period="s")
+def punch_dissipation(radius: Quantity, material: Prony, amplitude: Quantity, period: Quantity) -> float:
     r"""Energy lost in a settled cycle of a flat round punch that stays in contact.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
     material : Prony
         Exponential series with an instantaneous compliance.
-    amplitude : float
+    amplitude : float or str
         Amplitude ``d`` of the approach, a sine about any mean. [m]
-    period : float
+    period : float or str
         Period. [s]
 
     Returns
@@ -97,18 +101,19 @@ def punch_dissipation(radius: float, material: Prony, amplitude: float, period: 
     return 2 * np.pi * radius * ContactRelaxation.of(material).loss(2 * np.pi / period) * amplitude**2
 
 
-def full_contact_wave(amplitude: float, wavenumber: float, material: Prony, t: ArrayLike) -> Array:
+@quantities(amplitude="m", wavenumber="rad/m", t="s")
+def full_contact_wave(amplitude: Quantity, wavenumber: Quantity, material: Prony, t: ArrayLike) -> Array:
     r"""Amplitude of the pressure that holds a wave of the surface flat, after full contact was made at once.
 
     Parameters
     ----------
-    amplitude : float
+    amplitude : float or str
         Of the profile, a cosine. [m]
-    wavenumber : float
+    wavenumber : float or str
         Length of the wave vector, ``2 pi / wavelength``. [rad/m]
     material : Prony
         Exponential series with an instantaneous compliance.
-    t : array_like
+    t : array_like of float or str
         Times since then. [s]
 
     Returns
@@ -125,20 +130,21 @@ def full_contact_wave(amplitude: float, wavenumber: float, material: Prony, t: A
     return ContactRelaxation.of(material)(t) * wavenumber * amplitude / 2
 
 
+@quantities(amplitude="m", wavelength="m", t="s")
 def westergaard_half_width(
-    amplitude: float, wavelength: float, material: Material, program: Program, t: ArrayLike
+    amplitude: Quantity, wavelength: Quantity, material: Material, program: Program, t: ArrayLike
 ) -> Array:
     r"""Half-width of the contacts of ``amplitude cos(2 pi x / wavelength)`` under a mean pressure that never falls.
 
     Parameters
     ----------
-    amplitude, wavelength : float
+    amplitude, wavelength : float or str
         Of the profile. [m]
     material : Material
         The half-space.
     program : Program
         Rising ramps, holds and jumps of "load", here the mean pressure. [Pa]
-    t : array_like
+    t : array_like of float or str
         Times. [s]
 
     Returns

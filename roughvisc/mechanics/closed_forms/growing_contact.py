@@ -13,6 +13,7 @@ from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, pun
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -120,16 +121,17 @@ class StepLoad:
         return np.where(r < self.radius(t), relaxation(t - entry) * final + memory, 0.0)
 
 
-def lee_radok_step(sphere_radius: float, material: Material, force: float) -> StepLoad:
+@quantities(sphere_radius="m", force="N")
+def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity) -> StepLoad:
     r"""A sphere on a viscoelastic half-space under a load applied at once and kept (Lee and Radok).
 
     Parameters
     ----------
-    sphere_radius : float
+    sphere_radius : float or str
         Radius of curvature ``R``. [m]
     material : Material
         The half-space; the pressure needs an exponential series with an instantaneous compliance.
-    force : float
+    force : float or str
         The load ``W``. [N]
 
     Returns
@@ -181,16 +183,17 @@ class KelvinVoigtStep(StepLoad):
         return viscous + modulus * self.indenter.scaled_pressure(r, radius)
 
 
-def kelvin_voigt_step(sphere_radius: float, material: Prony, force: float) -> KelvinVoigtStep:
+@quantities(sphere_radius="m", force="N")
+def kelvin_voigt_step(sphere_radius: Quantity, material: Prony, force: Quantity) -> KelvinVoigtStep:
     r"""A sphere on a Kelvin-Voigt half-space under a load applied at once and kept.
 
     Parameters
     ----------
-    sphere_radius : float
+    sphere_radius : float or str
         Radius of curvature ``R``. [m]
     material : Prony
         One retarded compliance and nothing else; see :func:`roughvisc.mechanics.materials.models.kelvin_voigt`.
-    force : float
+    force : float or str
         The load ``W``. [N]
 
     Returns
@@ -217,6 +220,7 @@ def kelvin_voigt_step(sphere_radius: float, material: Prony, force: float) -> Ke
     return KelvinVoigtStep(Paraboloid(sphere_radius), material, force)
 
 
+@quantities(t="s")
 def hereditary_integral(
     kernel: Callable[[Array], Array], antiderivative: Callable[[Array], Array], program: Program, t: ArrayLike
 ) -> Array:
@@ -228,7 +232,7 @@ def hereditary_integral(
         A function of time and its integral from zero, such as ``contact_compliance`` and ``contact_integral``.
     program : Program
         All of load or all of approach; no cycles.
-    t : array_like
+    t : array_like of float or str
         Times; at a jump, the state after it. [s]
 
     Returns
@@ -367,14 +371,17 @@ class PowerLawRamp:
         return np.where(r < radius, 2 / (np.pi * self.indenter.radius) * modulus * radius * total, 0.0)
 
 
-def power_law_ramp(sphere_radius: float, loading_rate: float, coefficient: float, exponent: float) -> PowerLawRamp:
+@quantities(sphere_radius="m", loading_rate="N/s")
+def power_law_ramp(
+    sphere_radius: Quantity, loading_rate: Quantity, coefficient: float, exponent: float
+) -> PowerLawRamp:
     r"""A sphere pressed at a constant loading rate on a material of contact compliance ``C = c t^alpha``.
 
     Parameters
     ----------
-    sphere_radius : float
+    sphere_radius : float or str
         Radius of curvature ``R``. [m]
-    loading_rate : float
+    loading_rate : float or str
         ``dW/dt``. [N/s]
     coefficient, exponent : float
         ``c`` [1/(Pa s^alpha)] and ``0 < alpha < 1`` of the contact compliance.

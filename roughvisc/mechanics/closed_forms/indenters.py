@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -58,17 +59,18 @@ def positive(name: str, value: float, unit: str) -> None:
         raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
 
 
+@quantities(radius="m")
 @dataclass(frozen=True)
 class Paraboloid:
     """Paraboloid ``f = r^2 / (2 R)``, the small-slope form of a sphere.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius of curvature ``R``. [m]
     """
 
-    radius: float
+    radius: Quantity
 
     def __post_init__(self) -> None:
         positive("radius", self.radius, "m")
@@ -161,16 +163,17 @@ class Cone:
         return np.asarray(self.slope * np.where(r <= a, np.pi / 2 * a - r, outside))
 
 
+@quantities(r="m", radius="m", force="N")
 def punch_pressure(r: ArrayLike, radius: ArrayLike, force: ArrayLike) -> Array:
     """Pressure under a flat round punch, ``W / (2 pi a sqrt(a^2 - r^2))``: no modulus in it.
 
     Parameters
     ----------
-    r : array_like
+    r : array_like of float or str
         Distance from the axis. [m]
-    radius : array_like
+    radius : array_like of float or str
         ``a`` of the punch. [m]
-    force : array_like
+    force : array_like of float or str
         ``W``. [N]
 
     Returns

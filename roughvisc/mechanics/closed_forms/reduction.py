@@ -31,6 +31,7 @@ from roughvisc.mechanics.closed_forms.instants import fastest_change, instants_o
 from roughvisc.mechanics.closed_forms.sheet import OnSheet
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.units import quantities
 
 Array = NDArray[np.float64]
 
@@ -198,6 +199,7 @@ def _growing_row(run: Callable[..., tuple[Array, float]], outermost: float) -> t
     raise ConvergenceError("the contact radius grows beyond all bounds")
 
 
+@quantities(times="s")
 def reduced_contact(
     indenter: Indenter,
     material: Material,
@@ -219,7 +221,7 @@ def reduced_contact(
         Anything with ``contact_compliance(t)`` and ``contact_integral(t)``.
     program : Program
         Loads and approaches, with ramps, jumps, holds, cycles and changes of control.
-    times : array_like, optional
+    times : array_like of float or str, optional
         Ascending instants to keep, stepped onto exactly; the corners of the program if not given. [s]
     steps : int
         Steps for each segment of the program, and for each period of a cycle, at the coarsest resolution.

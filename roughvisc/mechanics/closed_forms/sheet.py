@@ -24,6 +24,7 @@ from scipy.special import j0
 
 from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, complement, panels
 from roughvisc.mechanics.closed_forms.indenters import Indenter, positive, punch_pressure
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -122,13 +123,14 @@ class OnSheet:
         return np.array(found)[back].reshape(value.shape)
 
 
+@quantities(radius="m")
 @dataclass(frozen=True)
 class PunchOnSheet:
     """A flat round punch on a sheet.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Radius ``a`` of the punch. [m]
     sheet : Sheet
         What it is pressed on.
@@ -140,7 +142,7 @@ class PunchOnSheet:
     0.002002
     """
 
-    radius: float
+    radius: Quantity
     sheet: Sheet
 
     def __post_init__(self) -> None:

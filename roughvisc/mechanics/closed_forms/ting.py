@@ -16,6 +16,7 @@ from roughvisc.mechanics.closed_forms.indenters import Indenter
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
@@ -226,7 +227,8 @@ def _creep_rate(material: Prony, t: Array) -> Array:
     return np.asarray(0.5 * (1 - material.poisson) * total)
 
 
-def ting(indenter: Indenter, material: Prony, force: Program | Function, end: float | None = None) -> SingleMaximum:
+@quantities(end="s")
+def ting(indenter: Indenter, material: Prony, force: Program | Function, end: Quantity | None = None) -> SingleMaximum:
     r"""Contact under a load that makes it grow to one maximum and then shrink (Ting, Graham).
 
     Parameters
@@ -238,7 +240,7 @@ def ting(indenter: Indenter, material: Prony, force: Program | Function, end: fl
     force : Program or callable
         Ramps, holds and jumps of load; or a smooth function of an array of times, which starts at zero or at a
         jump. [N]
-    end : float, optional
+    end : float or str, optional
         Where a function of time ends. [s]
 
     Returns

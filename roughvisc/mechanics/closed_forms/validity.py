@@ -12,21 +12,23 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms.indenters import Paraboloid, positive
 from roughvisc.mechanics.closed_forms.sheet import OnSheet
+from roughvisc.units import Quantity, quantities
 
 #: Contact radii in thicknesses up to which the equation of a sheet is solved to its precision.
 _WIDEST = 10.0
 
 
-def half_space_excess(sheet: Sheet, compliance: float, force: float, approach: float) -> float:
+@quantities(compliance="1/Pa", force="N", approach="m")
+def half_space_excess(sheet: Sheet, compliance: Quantity, force: Quantity, approach: Quantity) -> float:
     r"""By how much the approach is too large that a contact has on a half-space, in place of the sheet that there is.
 
     Parameters
     ----------
     sheet : Sheet
         What is there.
-    compliance : float
+    compliance : float or str
         Contact compliance, ``1 / E*``. [1/Pa]
-    force, approach : float
+    force, approach : float or str
         Of the contact on a half-space of the same material. [N], [m]
 
     Returns
@@ -57,16 +59,17 @@ def half_space_excess(sheet: Sheet, compliance: float, force: float, approach: f
     return first / (1 + first)
 
 
-def half_space_shortfall(sheet: Sheet, compliance: float, force: float, approach: float) -> float:
+@quantities(compliance="1/Pa", force="N", approach="m")
+def half_space_shortfall(sheet: Sheet, compliance: Quantity, force: Quantity, approach: Quantity) -> float:
     r"""Part of the force that is missing on a half-space at a given approach, in place of the sheet that there is.
 
     Parameters
     ----------
     sheet : Sheet
         What is there.
-    compliance : float
+    compliance : float or str
         Contact compliance, ``1 / E*``. [1/Pa]
-    force, approach : float
+    force, approach : float or str
         Of the contact on a half-space of the same material, which is taken for that of a paraboloid. [N], [m]
 
     Returns
@@ -94,12 +97,13 @@ def half_space_shortfall(sheet: Sheet, compliance: float, force: float, approach
     return 1 - compliance * force / float(on_sheet.scaled_force(on_sheet.radius_at_approach(approach)))
 
 
-def dundurs_coupling(compliances: Sequence[float], poissons: Sequence[float]) -> float:
+@quantities(compliances="1/Pa")
+def dundurs_coupling(compliances: Sequence[Quantity], poissons: Sequence[float]) -> float:
     r"""How far the pressure on one or two bodies displaces their interface sideways: Dundurs' second constant.
 
     Parameters
     ----------
-    compliances : sequence of float
+    compliances : sequence of float or str
         Contact compliance of each deformable body, one or two. [1/Pa]
     poissons : sequence of float
         Poisson's ratio of each.
@@ -155,16 +159,17 @@ def sticking_stiffness(poisson: float) -> float:
     return 1.0 if x == 0 else (1 - poisson) * math.log1p(2 * x) / x
 
 
-def radiation_lag(radius: float, shear_modulus: float, density: float) -> float:
+@quantities(radius="m", shear_modulus="Pa", density="kg/m^3")
+def radiation_lag(radius: Quantity, shear_modulus: Quantity, density: Quantity) -> float:
     r"""Time by which the force on a round punch runs ahead of its approach, as waves carry energy away.
 
     Parameters
     ----------
-    radius : float
+    radius : float or str
         Contact radius ``a``. [m]
-    shear_modulus : float
+    shear_modulus : float or str
         ``G`` of the half-space. [Pa]
-    density : float
+    density : float or str
         :math:`\rho` of the half-space. [kg/m3]
 
     Returns
@@ -192,16 +197,17 @@ def radiation_lag(radius: float, shear_modulus: float, density: float) -> float:
     return 3.4 / 4 * radius * math.sqrt(density / shear_modulus)
 
 
-def moving_load_excess(speed: float, shear_modulus: float, density: float, poisson: float) -> float:
+@quantities(speed="m/s", shear_modulus="Pa", density="kg/m^3")
+def moving_load_excess(speed: Quantity, shear_modulus: Quantity, density: Quantity, poisson: float) -> float:
     r"""Part by which waves add to the displacement under a load that moves along a half-space.
 
     Parameters
     ----------
-    speed : float
+    speed : float or str
         ``V`` of the load. [m/s]
-    shear_modulus : float
+    shear_modulus : float or str
         ``G`` of the half-space. [Pa]
-    density : float
+    density : float or str
         :math:`\rho` of the half-space. [kg/m3]
     poisson : float
         Poisson's ratio :math:`\nu`. [-]
@@ -244,22 +250,27 @@ def moving_load_excess(speed: float, shear_modulus: float, density: float, poiss
     return first * (4 * first * second + (2 - square) ** 2) / ((1 - poisson) * cubic) - 1
 
 
+@quantities(heat_flux="W/m^2", radius="m", speed="m/s", heat_conductivity="W/m/K", volumetric_heat_capacity="J/m^3/K")
 def flash_temperature(
-    heat_flux: float, radius: float, speed: float, heat_conductivity: float, volumetric_heat_capacity: float
+    heat_flux: Quantity,
+    radius: Quantity,
+    speed: Quantity,
+    heat_conductivity: Quantity,
+    volumetric_heat_capacity: Quantity,
 ) -> float:
     r"""Mean rise of temperature of a round spot that slides on a half-space and heats it evenly.
 
     Parameters
     ----------
-    heat_flux : float
+    heat_flux : float or str
         ``q``, into the half-space. [W/m2]
-    radius : float
+    radius : float or str
         ``a`` of the spot. [m]
-    speed : float
+    speed : float or str
         ``V`` of the spot along the half-space. [m/s]
-    heat_conductivity : float
+    heat_conductivity : float or str
         ``k`` of the half-space. [W/(m K)]
-    volumetric_heat_capacity : float
+    volumetric_heat_capacity : float or str
         :math:`\rho c` of the half-space. [J/(m3 K)]
 
     Returns
@@ -290,7 +301,7 @@ def flash_temperature(
         raise InputError(f"heat_flux is {heat_flux!r}: expected a number >= 0 [W/m2]")
     positive("radius", radius, "m")
     positive("speed", speed, "m/s")
-    positive("heat_conductivity", heat_conductivity, "W/(m K)")
+    positive("heat_conductivity", heat_conductivity, "W/m/K")
     positive("volumetric_heat_capacity", volumetric_heat_capacity, "J/(m3 K)")
     peclet = speed * radius * volumetric_heat_capacity / heat_conductivity
     # int (1 - t^2)^(3/4) dt over (-1, 1) is B(1/2, 7/4)

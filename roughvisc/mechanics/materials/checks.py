@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
+#: How a modulus or a compliance was measured.
+Kind = Literal["shear", "tensile"]
 
 
 def check_poisson(poisson: float) -> None:
@@ -17,10 +20,20 @@ def check_poisson(poisson: float) -> None:
         raise InputError(f"poisson is {poisson!r}: expected a number above -1 and up to 0.5")
 
 
-def check_number(name: str, value: float, unit: str, *, zero: bool = False) -> None:
+def tensile_to_shear(kind: Kind, poisson: float) -> float:
+    """Shear compliance over the compliance measured, ``2 (1 + nu)`` in tension; so the modulus measured over ``G``."""
+    check_poisson(poisson)
+    if kind not in ("shear", "tensile"):
+        raise InputError(f"kind is {kind!r}: expected 'shear' or 'tensile'")
+    return 2 * (1 + poisson) if kind == "tensile" else 1.0
+
+
+def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> float:
+    """The value, if it is a positive number, or zero where that is allowed."""
     good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
     if not good:
         raise InputError(f"{name} is {value!r}: expected a {'non-negative' if zero else 'positive'} number [{unit}]")
+    return value
 
 
 def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_poisson, checked_rows
+from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 from roughvisc.mechanics.materials.tabulated import Tabulated
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
-Kind = Literal["shear", "tensile"]
 
 #: terms offered to a fit, in a decade of times
 _PER_DECADE = (1, 1.5, 2, 3, 4, 6)
@@ -36,9 +36,10 @@ _ROUGH, _SMOOTH_PER_DECADE, _STEPS = 0.01, 3, 0.01
 _LEFT_OUT = 40
 
 
+@quantities(times="s", compliances="1/Pa")
 def from_creep_table(
-    times: Sequence[float],
-    compliances: Sequence[float],
+    times: Sequence[Quantity],
+    compliances: Sequence[Quantity],
     kind: Kind = "shear",
     noise: float = 0.0,
     poisson: float = 0.5,
@@ -47,9 +48,9 @@ def from_creep_table(
 
     Parameters
     ----------
-    times : sequence of float
+    times : sequence of float or str
         Ascending, the first may be zero. [s]
-    compliances : sequence of float
+    compliances : sequence of float or str
         ``J`` or ``D`` at these times. [1/Pa]
     kind : {"shear", "tensile"}
         Which of them.
@@ -68,20 +69,21 @@ def from_creep_table(
     InputError
         As :class:`~roughvisc.mechanics.materials.tabulated.Tabulated`.
     """
-    values = np.asarray(compliances, dtype=float) * _tensile_to_shear(kind, poisson)
+    values = np.asarray(compliances, dtype=float) * tensile_to_shear(kind, poisson)
     return Tabulated(tuple(times), tuple(values.tolist()), noise, poisson)
 
 
+@quantities(times="s", moduli="Pa")
 def from_relaxation_table(
-    times: Sequence[float], moduli: Sequence[float], kind: Kind = "shear", poisson: float = 0.5
+    times: Sequence[Quantity], moduli: Sequence[Quantity], kind: Kind = "shear", poisson: float = 0.5
 ) -> Prony:
     """Material from a relaxation test, by a positive series of exponentials.
 
     Parameters
     ----------
-    times : sequence of float
+    times : sequence of float or str
         Ascending, the first may be zero. [s]
-    moduli : sequence of float
+    moduli : sequence of float or str
         ``G`` or ``E`` at these times. [Pa]
     kind : {"shear", "tensile"}
         Which of them; ``G = E / (2 (1 + nu))``.
@@ -112,7 +114,7 @@ def from_relaxation_table(
     t, values = checked_rows(("time", "modulus"), times, moduli)
     for row in np.flatnonzero(values == 0)[:1]:
         raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
-    shear = values / _tensile_to_shear(kind, poisson)
+    shear = values / tensile_to_shear(kind, poisson)
     known = t[t > 0]
     spectrum = _sparsest(
         lambda theta: np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)]),
@@ -124,10 +126,11 @@ def from_relaxation_table(
     return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
 
 
+@quantities(storage="Pa", loss="Pa")
 def from_dynamic(
     frequencies: Sequence[float],
-    storage: Sequence[float],
-    loss: Sequence[float],
+    storage: Sequence[Quantity],
+    loss: Sequence[Quantity],
     *,
     frequency_unit: Literal["rad/s", "Hz"],
     shift_factors: ArrayLike | None = None,
@@ -140,7 +143,7 @@ def from_dynamic(
     ----------
     frequencies : sequence of float
         Frequencies in any order; several temperatures may overlap. [`frequency_unit`]
-    storage, loss : sequence of float
+    storage, loss : sequence of float or str
         ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
     frequency_unit : {"rad/s", "Hz"}
         Angular frequency, or cycles per second. There is no default, because the wrong one changes all times by the
@@ -179,7 +182,7 @@ def from_dynamic(
     omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
     for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
-    factor = _tensile_to_shear(kind, poisson)
+    factor = tensile_to_shear(kind, poisson)
     elastic, viscous = elastic / factor, viscous / factor
     target = np.append(elastic, viscous)
 
@@ -196,14 +199,6 @@ def from_dynamic(
         np.tile(omega, 2),
     )
     return spectrum.material(omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", poisson)
-
-
-def _tensile_to_shear(kind: Kind, poisson: float) -> float:
-    """Shear compliance over the compliance measured."""
-    check_poisson(poisson)
-    if kind not in ("shear", "tensile"):
-        raise InputError(f"kind is {kind!r}: expected 'shear' or 'tensile'")
-    return 2 * (1 + poisson) if kind == "tensile" else 1.0
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.bulk import in_volume
-from roughvisc.mechanics.materials.checks import check_number
+from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
 from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
 from roughvisc.mechanics.materials.power_law import PowerLaw
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
@@ -23,6 +24,7 @@ from roughvisc.mechanics.materials.protocol import Material, complete
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tabulated import Tabulated
 from roughvisc.notebook import table
+from roughvisc.units import Quantity, quantities
 
 __all__ = [
     "Material",
@@ -45,16 +47,50 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus: float | None = None) -> Prony:
+def _spring(
+    shear: float | None, young: float | None, poisson: float | None, bulk_modulus: float | None, part: str = ""
+) -> float:
+    """Shear modulus of a spring that is stated by it or by its Young's modulus: ``G = E / (2 (1 + nu))``. [Pa]
+
+    Parameters
+    ----------
+    shear, young : float or None
+        One of them. [Pa]
+    poisson, bulk_modulus : float or None
+        Behaviour in volume of the material.
+    part : str
+        First letters of the arguments' names, of a spring that is not the first.
+    """
+    of_shear, of_young = (f"{part or 'shear_'}modulus", f"{part}young_modulus")
+    if (shear is None) == (young is None):
+        raise InputError(f"{of_shear} is {shear!r} and {of_young} is {young!r}: expected one of them")
+    if young is None:
+        return check_number(of_shear, shear, "Pa")
+    young = check_number(of_young, young, "Pa")
+    if bulk_modulus is not None:
+        raise InputError(
+            f"{of_young} is {young!r} and bulk_modulus is {bulk_modulus!r}: expected {of_shear}, or a Poisson ratio"
+        )
+    return young / tensile_to_shear("tensile", 0.5 if poisson is None else poisson)
+
+
+@quantities(shear_modulus="Pa", young_modulus="Pa", bulk_modulus="Pa")
+def elastic(
+    shear_modulus: Quantity | None = None,
+    poisson: float | None = None,
+    *,
+    young_modulus: Quantity | None = None,
+    bulk_modulus: Quantity | None = None,
+) -> Prony:
     """Elastic half-space: no memory.
 
     Parameters
     ----------
-    shear_modulus : float
-        ``G``. [Pa]
+    shear_modulus, young_modulus : float or str
+        Exactly one: ``G``, or ``E = 2 G (1 + nu)``. [Pa]
     poisson : float, optional
         Poisson ratio, constant in time; a half unless given. [-]
-    bulk_modulus : float, optional
+    bulk_modulus : float or str, optional
         Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
 
     Returns
@@ -64,26 +100,38 @@ def elastic(shear_modulus: float, poisson: float | None = None, *, bulk_modulus:
     Raises
     ------
     InputError
-        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+        If a number is not positive and finite; if both or none of `shear_modulus` and `young_modulus` are given, or
+        `young_modulus` with a bulk modulus; or if both a Poisson ratio and a bulk modulus are given.
+
+    Examples
+    --------
+    >>> elastic(young_modulus="210 GPa", poisson=0.3)
+    elastic(shear_modulus=80.7692 GPa, poisson=0.3)
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    return in_volume(Prony(1 / shear_modulus), poisson, bulk_modulus)
+    modulus = _spring(shear_modulus, young_modulus, poisson, bulk_modulus)
+    return in_volume(Prony(1 / modulus), poisson, bulk_modulus)
 
 
+@quantities(shear_modulus="Pa", viscosity="Pa s", young_modulus="Pa", bulk_modulus="Pa")
 def maxwell(
-    shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
+    shear_modulus: Quantity | None = None,
+    viscosity: Quantity | None = None,
+    poisson: float | None = None,
+    *,
+    young_modulus: Quantity | None = None,
+    bulk_modulus: Quantity | None = None,
 ) -> Prony:
     """Maxwell fluid: a spring in series with a dashpot; ``J = 1/G + t/eta``.
 
     Parameters
     ----------
-    shear_modulus : float
-        ``G`` of the spring. [Pa]
-    viscosity : float
-        ``eta`` of the dashpot. [Pa s]
+    shear_modulus, young_modulus : float or str
+        Exactly one: ``G`` of the spring, or its ``E = 2 G (1 + nu)``. [Pa]
+    viscosity : float or str
+        ``eta`` of the dashpot, in shear. [Pa s]
     poisson : float, optional
         Poisson ratio, constant in time; a half unless given. [-]
-    bulk_modulus : float, optional
+    bulk_modulus : float or str, optional
         Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
 
     Returns
@@ -93,27 +141,34 @@ def maxwell(
     Raises
     ------
     InputError
-        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+        If a number is not positive and finite; if both or none of `shear_modulus` and `young_modulus` are given, or
+        `young_modulus` with a bulk modulus; or if both a Poisson ratio and a bulk modulus are given.
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("viscosity", viscosity, "Pa s")
-    return in_volume(Prony(1 / shear_modulus, fluidity=1 / viscosity), poisson, bulk_modulus)
+    modulus = _spring(shear_modulus, young_modulus, poisson, bulk_modulus)
+    viscosity = check_number("viscosity", viscosity, "Pa s")
+    return in_volume(Prony(1 / modulus, fluidity=1 / viscosity), poisson, bulk_modulus)
 
 
+@quantities(shear_modulus="Pa", viscosity="Pa s", young_modulus="Pa", bulk_modulus="Pa")
 def kelvin_voigt(
-    shear_modulus: float, viscosity: float, poisson: float | None = None, *, bulk_modulus: float | None = None
+    shear_modulus: Quantity | None = None,
+    viscosity: Quantity | None = None,
+    poisson: float | None = None,
+    *,
+    young_modulus: Quantity | None = None,
+    bulk_modulus: Quantity | None = None,
 ) -> Prony:
     """Kelvin-Voigt solid: a spring parallel to a dashpot; ``J = (1 - exp(-G t / eta)) / G``.
 
     Parameters
     ----------
-    shear_modulus : float
-        ``G`` of the spring. [Pa]
-    viscosity : float
-        ``eta`` of the dashpot. [Pa s]
+    shear_modulus, young_modulus : float or str
+        Exactly one: ``G`` of the spring, or its ``E = 2 G (1 + nu)``. [Pa]
+    viscosity : float or str
+        ``eta`` of the dashpot, in shear. [Pa s]
     poisson : float, optional
         Poisson ratio, constant in time; a half unless given. [-]
-    bulk_modulus : float, optional
+    bulk_modulus : float or str, optional
         Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
 
     Returns
@@ -123,21 +178,32 @@ def kelvin_voigt(
     Raises
     ------
     InputError
-        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+        If a number is not positive and finite; if both or none of `shear_modulus` and `young_modulus` are given, or
+        `young_modulus` with a bulk modulus; or if both a Poisson ratio and a bulk modulus are given.
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("viscosity", viscosity, "Pa s")
-    shear = Prony(0.0, compliances=(1 / shear_modulus,), times=(viscosity / shear_modulus,))
+    modulus = _spring(shear_modulus, young_modulus, poisson, bulk_modulus)
+    viscosity = check_number("viscosity", viscosity, "Pa s")
+    shear = Prony(0.0, compliances=(1 / modulus,), times=(viscosity / modulus,))
     return in_volume(shear, poisson, bulk_modulus)
 
 
+@quantities(
+    shear_modulus="Pa",
+    kelvin_modulus="Pa",
+    kelvin_viscosity="Pa s",
+    young_modulus="Pa",
+    kelvin_young_modulus="Pa",
+    bulk_modulus="Pa",
+)
 def zener(
-    shear_modulus: float,
-    kelvin_modulus: float,
-    kelvin_viscosity: float,
+    shear_modulus: Quantity | None = None,
+    kelvin_modulus: Quantity | None = None,
+    kelvin_viscosity: Quantity | None = None,
     poisson: float | None = None,
     *,
-    bulk_modulus: float | None = None,
+    young_modulus: Quantity | None = None,
+    kelvin_young_modulus: Quantity | None = None,
+    bulk_modulus: Quantity | None = None,
 ) -> Prony:
     """Zener (standard linear) solid: a spring in series with a Kelvin element.
 
@@ -145,15 +211,15 @@ def zener(
 
     Parameters
     ----------
-    shear_modulus : float
-        ``G`` of the spring: the modulus at once. [Pa]
-    kelvin_modulus : float
-        ``G_K`` of the Kelvin element. [Pa]
-    kelvin_viscosity : float
-        ``eta_K`` of the Kelvin element. [Pa s]
+    shear_modulus, young_modulus : float or str
+        Exactly one: ``G`` of the spring, the modulus at once, or its ``E = 2 G (1 + nu)``. [Pa]
+    kelvin_modulus, kelvin_young_modulus : float or str
+        Exactly one: ``G_K`` of the Kelvin element's spring, or its ``E_K = 2 G_K (1 + nu)``. [Pa]
+    kelvin_viscosity : float or str
+        ``eta_K`` of the Kelvin element, in shear. [Pa s]
     poisson : float, optional
         Poisson ratio, constant in time; a half unless given. [-]
-    bulk_modulus : float, optional
+    bulk_modulus : float or str, optional
         Elastic bulk modulus instead, with which the Poisson ratio changes in time. [Pa]
 
     Returns
@@ -163,12 +229,18 @@ def zener(
     Raises
     ------
     InputError
-        If a number is not positive and finite, or both a Poisson ratio and a bulk modulus are given.
+        If a number is not positive and finite; if both or none of the two moduli of a spring are given, or a Young's
+        modulus with a bulk modulus; or if both a Poisson ratio and a bulk modulus are given.
+
+    Examples
+    --------
+    >>> zener(young_modulus="9 MPa", kelvin_young_modulus="3 MPa", kelvin_viscosity="0.1 MPa s")  # nu is a half
+    zener(shear_modulus=3 MPa, kelvin_modulus=1 MPa, kelvin_viscosity=100 kPa s)
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("kelvin_modulus", kelvin_modulus, "Pa")
-    check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
-    shear = Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,))
+    modulus = _spring(shear_modulus, young_modulus, poisson, bulk_modulus)
+    retarded = _spring(kelvin_modulus, kelvin_young_modulus, poisson, bulk_modulus, "kelvin_")
+    kelvin_viscosity = check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
+    shear = Prony(1 / modulus, 0.0, (1 / retarded,), (kelvin_viscosity / retarded,))
     return in_volume(shear, poisson, bulk_modulus)
 
 

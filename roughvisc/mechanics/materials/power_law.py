@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
+@quantities(glassy="1/Pa", coefficient="1/Pa", time_scale="s")
 @dataclass(frozen=True)
 class PowerLaw:
     r"""Power-law creep.
@@ -22,13 +24,13 @@ class PowerLaw:
 
     Parameters
     ----------
-    glassy : float
+    glassy : float or str
         Instantaneous compliance ``J_0``; zero for a material without instantaneous response. [1/Pa]
-    coefficient : float
+    coefficient : float or str
         Creep ``c`` at the time ``T``. [1/Pa]
     exponent : float
         ``alpha``, between 0 (elastic) and 1 (a dashpot), both excluded.
-    time_scale : float
+    time_scale : float or str
         ``T``. [s]
     poisson : float
         Poisson ratio, constant in time.
@@ -47,10 +49,10 @@ class PowerLaw:
     5e-05
     """
 
-    glassy: float
-    coefficient: float
+    glassy: Quantity
+    coefficient: Quantity
     exponent: float
-    time_scale: float = 1.0
+    time_scale: Quantity = 1.0
     poisson: float = 0.5
     note: str = field(default="", compare=False)
 

@@ -13,10 +13,12 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.secular import merged, secular_roots
 from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
+@quantities(glassy="1/Pa", fluidity="1/(Pa s)", compliances="1/Pa", times="s")
 @dataclass(frozen=True)
 class Prony:
     r"""Exponential (Prony) series of the shear creep compliance.
@@ -25,11 +27,11 @@ class Prony:
 
     Parameters
     ----------
-    glassy : float
+    glassy : float or str
         Instantaneous compliance ``J_0``; zero for a material without instantaneous response. [1/Pa]
-    fluidity : float
+    fluidity : float or str
         Inverse of the steady shear viscosity, zero for a solid. [1/(Pa s)]
-    compliances, times : sequence of float
+    compliances, times : sequence of float or str
         Retarded compliances ``J_i`` [1/Pa] and retardation times ``tau_i`` [s].
     poisson : float
         Poisson ratio, constant in time.
@@ -45,10 +47,10 @@ class Prony:
         outside (-1, 0.5], or the material is rigid.
     """
 
-    glassy: float
-    fluidity: float = 0.0
-    compliances: tuple[float, ...] = ()
-    times: tuple[float, ...] = ()
+    glassy: Quantity
+    fluidity: Quantity = 0.0
+    compliances: tuple[Quantity, ...] = ()
+    times: tuple[Quantity, ...] = ()
     poisson: float = 0.5
     note: str = field(default="", compare=False)
     stands_for: str = field(default="", compare=False)

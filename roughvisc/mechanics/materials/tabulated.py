@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
 from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
+@quantities(times="s", compliances="1/Pa")
 @dataclass(frozen=True)
 class Tabulated:
     """Measured shear creep compliance, without a fit.
@@ -28,9 +30,9 @@ class Tabulated:
 
     Parameters
     ----------
-    times : sequence of float
+    times : sequence of float or str
         Times in increasing order; the first may be zero. [s]
-    compliances : sequence of float
+    compliances : sequence of float or str
         ``J`` at these times. [1/Pa]
     noise : float
         Largest relative decrease below an earlier row that counts as noise, such as 0.01. Creep compliances increase;
@@ -54,8 +56,8 @@ class Tabulated:
         noise; the message names the row, counted from 0. Also, later, if a time beyond the last row is needed.
     """
 
-    times: tuple[float, ...]
-    compliances: tuple[float, ...]
+    times: tuple[Quantity, ...]
+    compliances: tuple[Quantity, ...]
     noise: float = 0.0
     poisson: float = 0.5
     remark: str = field(default="", compare=False)

@@ -14,6 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated, pair
 from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.units import Quantity, quantities, quantity
 
 Array = NDArray[np.float64]
 
@@ -21,19 +22,20 @@ Array = NDArray[np.float64]
 LARGEST_SHIFT = 1e30
 
 
-def wlf_shift(temperature: float, reference_temperature: float, c1: float, c2: float) -> float:
+@quantities(temperature="K", reference_temperature="K")
+def wlf_shift(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: float | str) -> float:
     r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
 
     Parameters
     ----------
-    temperature : float
+    temperature : float or str
         Temperature ``T`` of the contact. [K]
-    reference_temperature : float
+    reference_temperature : float or str
         Temperature ``T_r`` at which the compliance was measured. [K]
     c1 : float
         First constant, with the decimal logarithm. [-]
-    c2 : float
-        Second constant. [K]
+    c2 : float or str
+        Second constant, a difference of temperatures. [K]
 
     Returns
     -------
@@ -62,6 +64,7 @@ def wlf_shift(temperature: float, reference_temperature: float, c1: float, c2: f
     check_number("temperature", temperature, "K")
     check_number("reference_temperature", reference_temperature, "K")
     check_number("c1", c1, "1")
+    c2 = quantity(c2, "K", "c2", difference=True)
     check_number("c2", c2, "K")
     above = temperature - reference_temperature
     if not c2 + above > 0:
@@ -72,16 +75,17 @@ def wlf_shift(temperature: float, reference_temperature: float, c1: float, c2: f
     return _power(10.0, -c1 * above / (c2 + above))
 
 
-def arrhenius_shift(temperature: float, reference_temperature: float, activation_energy: float) -> float:
+@quantities(temperature="K", reference_temperature="K", activation_energy="J/mol")
+def arrhenius_shift(temperature: Quantity, reference_temperature: Quantity, activation_energy: Quantity) -> float:
     r"""Shift factor of a thermally activated process, after Arrhenius.
 
     Parameters
     ----------
-    temperature : float
+    temperature : float or str
         Temperature ``T`` of the contact. [K]
-    reference_temperature : float
+    reference_temperature : float or str
         Temperature ``T_r`` at which the compliance was measured. [K]
-    activation_energy : float
+    activation_energy : float or str
         ``E_a``. [J/mol]
 
     Returns

@@ -18,7 +18,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.notebook import table
-from roughvisc.units import said, shown, stated_quantity
+from roughvisc.units import Quantity, quantities, said, shown, stated_quantity
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
@@ -533,12 +533,13 @@ class Program:
         duration = length * stated_quantity(cycles, "1", "cycle.cycles", above=0)
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
-    def on_area(self, area: float) -> Program:
+    @quantities(area="m^2")
+    def on_area(self, area: Quantity) -> Program:
         """Convert nominal pressures to loads on a surface.
 
         Parameters
         ----------
-        area : float
+        area : float or str
             Nominal area. [m2]
 
         Returns

@@ -24,15 +24,17 @@ from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
 from roughvisc.study.trade.recommend import recommendation
 from roughvisc.study.trade.reference import ClosedForm, closed_form
 from roughvisc.topography.grid import spacing
+from roughvisc.units import Quantity, quantities
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.axes import AXES
 
 
+@quantities(budget="s")
 def trade(
     case: Case | str | Path,
     settings: Sequence[Setting] | None = None,
     *,
-    budget: float = 300.0,
+    budget: Quantity = 300.0,
     reference: Literal["auto", "run"] = "auto",
     progress: bool | Report = True,
 ) -> xr.Dataset:
@@ -46,7 +48,7 @@ def trade(
         Settings to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
         rounded to float32 precision; for a program also the direct history, fixed time steps, and the algorithm of the
         seed paper.
-    budget : float
+    budget : float or str
         Total wall time of all runs. A setting that would exceed the remaining time is not run, which the result states.
         [s]
     reference : {"auto", "run"}

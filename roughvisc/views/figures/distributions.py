@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
+from roughvisc.units import quantities
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -51,6 +52,7 @@ def _colours(count: int) -> np.ndarray:
 
 
 @styled
+@quantities(times="s")
 def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> Figure:
     """Probability densities of the contact pressure and of the gap at chosen times.
 
@@ -58,7 +60,7 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     ----------
     dataset : xarray.Dataset
         One case's result with ``pressure`` or ``gap``.
-    times : float or list of float, optional
+    times : float or str, or list of them, optional
         The nearest kept times are drawn; negative whole numbers count frames from the end. By default up to five over
         the time in contact. [s]
     bins : int, optional
@@ -135,6 +137,7 @@ def has_clusters(dataset: xr.Dataset) -> bool:
 
 
 @styled
+@quantities(times="s")
 def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     """Number of contact clusters and their largest and mean area over time, and the distribution of their areas.
 
@@ -144,7 +147,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     ----------
     dataset : xarray.Dataset
         One case's result with ``pressure`` or ``gap``.
-    times : float or list of float, optional
+    times : float or str, or list of them, optional
         Where the distribution is drawn; negative whole numbers count frames from the end. By default up to four over
         the time in contact. [s]
 

@@ -15,6 +15,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import cell_edges
+from roughvisc.units import quantities
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     ABSENT,
@@ -165,6 +166,7 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
 
 
 @styled
+@quantities(times="s")
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
     """Maps of fields at chosen times, with the outline of the contact; one colour scale a field for all times.
 
@@ -178,7 +180,7 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
     ----------
     dataset : xarray.Dataset
         One case's result; with fields on Dask only the frames drawn are loaded.
-    times : float or list of float, optional
+    times : float or str, or list of them, optional
         The nearest kept times are drawn; negative whole numbers count frames from the end, -1 the last.
         By default up to four over the time in contact, that of the largest contact area among them. [s]
     fields : sequence of str

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.observables import history
+from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures.axes import (
@@ -37,14 +38,15 @@ _MOST_MAPS = 12
 
 
 @styled
-def friction_maps(dataset: xr.Dataset, speeds: float | Sequence[float] | None = None) -> Figure:
+@quantities(speeds="m/s")
+def friction_maps(dataset: xr.Dataset, speeds: Quantity | Sequence[Quantity] | None = None) -> Figure:
     """Maps of the pressure in the frame of the profile, on one colour scale; an arrow shows where the profile moves.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of :func:`roughvisc.friction` with ``pressure`` among the fields, or of a study of friction.
-    speeds : float or sequence of float, optional
+    speeds : float or str, or sequence of them, optional
         The nearest ones are drawn. By default the lowest, the one of the largest friction, and the highest. [m/s]
 
     Returns

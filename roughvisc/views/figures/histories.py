@@ -20,6 +20,7 @@ from roughvisc.observables.area_theories import asperity_fraction, nominal_area_
 from roughvisc.observables.cycles import cycle_energy, has_cycles
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.units import quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
@@ -368,6 +369,7 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
 
 
 @styled
+@quantities(contact_modulus="Pa")
 def area_against_load(results, *, contact_modulus=None) -> Figure:
     r"""Contact area, corrected for the grid, against force at every accepted step, one line a case.
 
@@ -375,7 +377,7 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     ----------
     results : xarray.Dataset, list or mapping of them
         Results; the keys of a mapping, or else their titles, name the lines.
-    contact_modulus : float or mapping, optional
+    contact_modulus : float or str, or mapping of them, optional
         Contact modulus, or several by name such as ``{"glassy": 4e6, "rubbery": 1e6}``, for which to draw the lines
         of the theories; ``{}`` for none. By default, where all cases state one material and a rough surface with
         periodic boundaries: that at once and that after the last kept time. [Pa]

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
+from roughvisc.units import Quantity, quantities
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
@@ -96,18 +97,19 @@ def _parts(frame_of: xr.Dataset, name: str) -> Iterator[np.ndarray]:
 
 
 @styled
-def section(dataset: xr.Dataset, time: float = -1, axis: str = "x", at: float | None = None) -> Figure:
+@quantities(time="s", at="m")
+def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quantity | None = None) -> Figure:
     """A cut through the contact: pressure above, below it the profile and the deformed surface that rests on it.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result with ``height``, ``pressure`` or ``gap``.
-    time : float
+    time : float or str
         The nearest kept time is drawn; a negative whole number counts frames from the end. [s]
     axis : {"x", "y"}
         Direction of the cut.
-    at : float, optional
+    at : float or str, optional
         Coordinate of the cut along the other axis; by default the line that carries most. [m]
 
     Returns

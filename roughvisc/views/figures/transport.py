@@ -15,7 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.observables import asked
 from roughvisc.observables import leakage as derived
 from roughvisc.observables.leakage import closing_times
-from roughvisc.units import unit_for
+from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
@@ -46,7 +46,8 @@ _SPANS = 30.0
 
 
 @styled
-def leakage(dataset: xr.Dataset, time: float | None = None) -> Figure:
+@quantities(time="s")
+def leakage(dataset: xr.Dataset, time: Quantity | None = None) -> Figure:
     """Leak rate over time, with the time at which the contact closes, and a map of the flow at one time.
 
     The flux is drawn on a logarithmic scale of three decades: cells in contact grey, fluid that stands still white.
@@ -56,7 +57,7 @@ def leakage(dataset: xr.Dataset, time: float | None = None) -> Figure:
     dataset : xarray.Dataset
         One case's result with ``gap``. What of the leakage it does not hold is derived here, as the study's
         ``[observe]`` asks for it, or with the defaults of :func:`roughvisc.observables.leakage`.
-    time : float, optional
+    time : float or str, optional
         The nearest kept time is mapped; a negative whole number counts frames from the end. Default: the last at
         which the fluid flows. [s]
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
+from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import (
     frame_at,
@@ -41,11 +42,12 @@ _MOST_TIMES = 200
 
 
 @styled
+@quantities(times="s")
 def sweep(
     results: Any,
     quantity: str | None = None,
     *,
-    times: float | Sequence[float] | None = None,
+    times: Quantity | Sequence[Quantity] | None = None,
     along: str | Sequence[str] | None = None,
     kind: Literal["auto", "lines", "map"] = "auto",
 ) -> Figure:
@@ -61,7 +63,7 @@ def sweep(
     quantity : str, optional
         A history of every case, such as ``"approach"`` or ``"wall_time"``; by default the contact area, or the
         contact fraction where the surfaces differ in size.
-    times : float or sequence of float, optional
+    times : float or str, or sequence of them, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Where one parameter was varied,
         by default up to four, a line each; else by default the last, or where the cases differ most if they differ
         by less than half of that at the end, which the title then says. Where several were varied, a panel each. [s]

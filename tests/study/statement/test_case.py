@@ -403,9 +403,16 @@ REFUSED = r"""
     of its kind
 
 kelvin_modulus  =>  kelvin_modlus
-| 2 problems
-| - material.kelvin_modulus: missing: expected a number in Pa, or a string with a unit of its kind, above 0
-| - material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?
+| material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?
+
+kelvin_modulus = "1 MPa"  =>  # gone
+| material.kelvin_modulus: missing: expected it, or kelvin_young_modulus
+
+kelvin_modulus = "1 MPa"  =>  kelvin_modulus = "1 MPa"\nkelvin_young_modulus = "3 MPa"
+| material.kelvin_young_modulus: found beside kelvin_modulus: expected one of them
+
+shear_modulus = "3 MPa"  =>  young_modulus = "9 MPa"\nbulk_modulus = "2 GPa"
+| material: young_modulus is 9000000.0 and bulk_modulus is 2000000000.0: expected shear_modulus, or a Poisson ratio
 
 over = "50 ms"  =>  # gone
 | program.0.over: missing: expected a number in s, or a string with a unit of its kind, at least 0

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, crea
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.materials import models as materials
+from roughvisc.mechanics.materials.checks import tensile_to_shear
 from roughvisc.mechanics.materials.stiffness import stiffened
 from roughvisc.mechanics.materials.temperature import shifted
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
@@ -33,23 +34,29 @@ POISSON = measured("1", above=-1, most=0.5)
 
 #: a behaviour in volume: one or the other
 _VOLUME = {"poisson": POISSON, "bulk_modulus": MODULUS}
+#: shear modulus of a spring -> Young's modulus, which stands in its place
+SPRINGS = {"shear_modulus": "young_modulus", "kelvin_modulus": "kelvin_young_modulus"}
+_SPRING = {"shear_modulus": MODULUS, "young_modulus": MODULUS}
+_KELVIN = {"kelvin_modulus": MODULUS, "kelvin_young_modulus": MODULUS}
+#: keys that a study may leave out although their model's constructor names no value for them
+_OPTIONAL = {*_VOLUME, *_SPRING, *_KELVIN}
+#: model and key -> usual value of a key that came later: it does not count then, so that the keys of former cases stay
+_LATER = {("from_relaxation", "kind"): "shear"}
 _KIND = choice("shear", "tensile")
 
 #: name of a model -> what builds it, and the kind of each of its keys; the constructor's defaults hold here too
 MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
-    "elastic": (materials.elastic, {"shear_modulus": MODULUS, **_VOLUME}),
-    "maxwell": (materials.maxwell, {"shear_modulus": MODULUS, "viscosity": VISCOSITY, **_VOLUME}),
-    "kelvin_voigt": (materials.kelvin_voigt, {"shear_modulus": MODULUS, "viscosity": VISCOSITY, **_VOLUME}),
-    "zener": (
-        materials.zener,
-        {"shear_modulus": MODULUS, "kelvin_modulus": MODULUS, "kelvin_viscosity": VISCOSITY, **_VOLUME},
-    ),
+    "elastic": (materials.elastic, {**_SPRING, **_VOLUME}),
+    "maxwell": (materials.maxwell, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
+    "kelvin_voigt": (materials.kelvin_voigt, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
+    "zener": (materials.zener, {**_SPRING, **_KELVIN, "kelvin_viscosity": VISCOSITY, **_VOLUME}),
     "from_relaxation": (
         materials.from_relaxation,
         {
             "equilibrium": measured("Pa", least=0),
             "moduli": listed(MODULUS, "moduli [Pa]"),
             "times": TIMES,
+            "kind": _KIND,
             **_VOLUME,
         },
     ),
@@ -190,8 +197,11 @@ class MaterialSection(Section):
         stated: dict[str, Any] = {"model": self.model}
         for key in kinds:
             value = getattr(self, key)
-            if value is not None:
+            if value is not None and value != _LATER.get((self.model, key)):
                 stated[key] = value.content() if isinstance(value, MaterialSection) else value
+        for of_shear, of_young in SPRINGS.items():
+            if of_young in stated:
+                stated[of_shear] = stated.pop(of_young) / tensile_to_shear("tensile", stated.get("poisson", 0.5))
         if "bulk_modulus" in kinds and "bulk_modulus" not in stated:
             stated.setdefault("poisson", 0.5)
         if self.shift != 1:  # however it was stated
@@ -204,6 +214,12 @@ class MaterialSection(Section):
 
     @model_validator(mode="after")
     def _builds(self) -> MaterialSection:
+        for of_shear, of_young in SPRINGS.items():
+            given = [key for key in (of_shear, of_young) if getattr(self, key, None) is not None]
+            if len(given) == 2:
+                raise refuse(of_young, f"found beside {of_shear}: expected one of them")
+            if not given and of_shear in MODELS[self.model][1]:
+                raise refuse(of_shear, f"missing: expected it, or {of_young}")
         material = self.build()
         try:
             self._body_of(material)
@@ -224,7 +240,7 @@ def _section(name: str) -> type[MaterialSection]:
         default = parameters[key].default
         if key in columns:
             default = None  # missing with a file, and asked for by _with_columns without one
-        elif default is inspect.Parameter.empty:
+        elif default is inspect.Parameter.empty or (default is None and key not in _OPTIONAL):
             default = ...
         fields[key] = (nullable(kind) if default is None else kind, default)
     if columns:
