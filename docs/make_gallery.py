@@ -2,8 +2,8 @@
 
     python docs/make_gallery.py [STUDY ...]
 
-writes gallery.md, small PNG files and the README's second picture; the page is written whole, figures only of the studies named (default: all). The
-notebook ``first_contact`` is run as well, if it is named or nothing is.
+writes gallery.md, small PNG files, and with ``quickstart`` the README's picture. It draws only the studies named (default: all),
+and runs the notebook ``first_contact`` if it is named or nothing is.
 """
 
 import sys
@@ -106,23 +106,15 @@ def draw(name, folder):
 
 
 def draw_readme(study="quickstart"):
-    """The second picture of the README: maps and histories of the study that it begins with."""
+    """The first picture of the README: maps of the study that it begins with."""
+    path = HERE / "figures" / f"{study}.png"
     with tempfile.TemporaryDirectory() as folder:
         ds = rv.run(WORKFLOWS / f"{study}.toml", folder, progress=False)
-        pictures = []
-        for kind, figure in {"maps": rv.plot.maps(ds), "history": rv.plot.history(ds)}.items():
-            path = Path(folder, f"{kind}.png")
-            figure.savefig(path, dpi=110)
-            with Image.open(path) as picture:
-                pictures.append(picture.convert("RGB"))
+        rv.plot.maps(ds).savefig(path, dpi=120)
         ds.close()
     xr.backends.file_manager.FILE_CACHE.clear()
-    width, height = max(p.width for p in pictures), sum(p.height for p in pictures)
-    whole, top = Image.new("RGB", (width, height), "white"), 0
-    for picture in pictures:
-        whole.paste(picture, ((width - picture.width) // 2, top))
-        top += picture.height
-    whole.save(HERE / "figures" / f"{study}.png", optimize=True)
+    with Image.open(path) as picture:
+        picture.convert("RGB").save(path, optimize=True)
 
 
 def page():
@@ -130,7 +122,7 @@ def page():
     lines = [
         "# Gallery",
         "",
-        "Made by `docs/make_gallery.py`, which runs the studies of `workflows/`.",
+        "Every study of `workflows/`, with its figures. `docs/make_gallery.py` runs the studies and draws them.",
         "",
     ]
     lines += [

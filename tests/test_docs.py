@@ -50,8 +50,11 @@ MEASURED = {
 NAMES_FILES = ("how-a-solve-runs", "add-a-variable", "add-an-experiment", "add-your-own", "development")
 
 
+README = ROOT / "README.md"
+
+
 def named(path):
-    return str(path.relative_to(DOCS))
+    return str(path.relative_to(ROOT))
 
 
 def blocks(path, language):
@@ -98,7 +101,7 @@ def completed(text):
     return text + "\n" + study_text(lacking)
 
 
-@pytest.mark.parametrize("path", [p for p in PAGES if blocks(p, "toml")], ids=named)
+@pytest.mark.parametrize("path", [README, *(p for p in PAGES if blocks(p, "toml"))], ids=named)
 def test_studies__are_accepted(path, there):
     for number, text in enumerate(blocks(path, "toml")):
         file = there / ("workflows" if path.stem == "gallery" else ".") / f"study{number}.toml"
@@ -151,12 +154,28 @@ def test_commands__exist_with_their_options():
     assert tried > 10
 
 
-def test_readme__has_the_speeds_of_the_page_about_them():
-    _, said = (ROOT / "README.md").read_text(encoding="utf-8").split("## Is it fast?")
-    rows = re.findall(r"^\| .* \|$", said.split("\n## ")[0], re.M)
-    measured = (DOCS / "performance.md").read_text(encoding="utf-8").splitlines()
-    assert len(rows) > 3
-    assert set(rows) <= set(measured)
+def test_readme__is_short_and_has_the_numbers_of_the_pages_that_it_links():
+    text = README.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 110
+    said = text.split("## Accuracy and speed\n")[1].split("\n\n")[0]
+    bullets = re.findall(r"^- \*\*(.*?)\*\*.*\]\((.*?)\)\)\.$", said, re.M)
+    assert len(bullets) == len(said.splitlines()) == 3
+    for number, page in bullets:
+        assert number in (ROOT / page).read_text(encoding="utf-8"), f"{page} has no {number}"
+
+
+def test_readme__runs_and_explains_eight_variables_of_its_dataset(there):
+    text = README.read_text(encoding="utf-8")
+    table = text.split("## What you get\n")[1].split("\n\n")[0]
+    names = [name for row in table.splitlines()[2:] for name in re.findall(r"^\| `(\w+)`", row)]
+    assert len(names) == 8
+    space = {}
+    with matplotlib.rc_context({"backend": "agg"}):
+        (code,) = blocks(README, "python")
+        exec(compile(code, str(README), "exec"), space)
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
+    assert set(names) <= set(space["ds"].data_vars)
 
 
 def test_reference__names_everything_public():
@@ -287,7 +306,7 @@ def test_lines__are_not_taken_for_comments():
 
 
 def test_links__lead_somewhere():
-    for path in PAGES:
+    for path in [README, *PAGES]:
         for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):
             assert (path.parent / target).exists(), f"{named(path)}: {target}"
 
