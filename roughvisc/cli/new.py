@@ -15,32 +15,41 @@ from roughvisc.errors import InputError, printable
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="The study. [default: FILE's name-study.toml, here]")
+@click.option(
+    "--contact",
+    metavar="PART",
+    default="5 %",
+    show_default=True,
+    help="Part of the area to be in contact in the end: the pressure is chosen for it.",
+)
 @reading_options
-def new(file: Path | None, out: Path | None, **given: str | None) -> None:
+def new(file: Path | None, out: Path | None, contact: str, **given: str | None) -> None:
     """Write a first study for a scan, to be run and to be changed.
 
     The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
-    on a rubber with a pressure that brings about 5 per cent of its area into contact, found by pressing it. FILE is an
-    instrument file or a surface card; without one a scan is written here to try things with, focus_variation.x3p.
+    on a rubber with a pressure that brings about 5 per cent of its area into contact, or the part that --contact says;
+    it is found by pressing the scan. FILE is an instrument file or a surface card; without one a scan is written here
+    to try things with, focus_variation.x3p.
 
     \b
     Example:
       roughvisc new
       roughvisc plan focus_variation-study.toml
       roughvisc run focus_variation-study.toml
-      roughvisc new focus_variation.x3p --out other.toml
+      roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
     from rich.console import Console
 
     from roughvisc.study.cost.first_pressure import first_pressure
     from roughvisc.study.statement.starter import starter_study
     from roughvisc.study.storage.store import atomic_write
+    from roughvisc.study.trade.files import part_of_one
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.scans import open_scan
     from roughvisc.views.console.scan_advice import advice_table
 
-    options = read_options(**given)
+    options, part = read_options(**given), part_of_one(contact, "--contact")
     wanted = file or Path(EXAMPLE)
     out = out or Path(f"{wanted.stem}-study.toml")
     if out.suffix.lower() != ".toml":
@@ -53,7 +62,7 @@ def new(file: Path | None, out: Path | None, **given: str | None) -> None:
         _write_example(wanted)
     scan = open_scan(wanted, **options)
     found = inspect_scan(scan)
-    text = starter_study(wanted, out, options, found, first_pressure(scan, found))
+    text = starter_study(wanted, out, options, found, first_pressure(scan, found, part))
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()

@@ -29,8 +29,8 @@ _PRESSES, _NEAR, _FARTHEST = 12, 0.01, 100.0
 _ON_FLAT = 1e3
 
 
-def first_pressure(scan: xr.DataArray, found: Inspection) -> FirstPressure:
-    """The nominal pressure that brings about 5 % of a scan into contact with the rubber of a first study, in the end.
+def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTACT) -> FirstPressure:
+    """The nominal pressure that brings a part of a scan into contact with the rubber of a first study, in the end.
 
     A scan of many cells is pressed on fewer. These have a lower root mean square slope, and light contact is as the
     pressure over the slope (:func:`~roughvisc.study.statement.starter.pressure_for`): they are pressed less, by the
@@ -42,6 +42,8 @@ def first_pressure(scan: xr.DataArray, found: Inspection) -> FirstPressure:
         As read. [m]
     found : Inspection
         What is seen in it, and how it is going to be conditioned.
+    contact : float
+        Contact fraction to aim at, above 0 and below 1. [-]
     """
     steps = {name: value for name, value in found.steps.items() if name != "mirror"}
     few = copy_to_press(condition(scan, steps), "free", MOST_PRESSED)
@@ -56,12 +58,12 @@ def first_pressure(scan: xr.DataArray, found: Inspection) -> FirstPressure:
         load = share * pressure * nominal_area(few) * compliance
         return press(few, Push(load=load), "periodic", HALF_SPACE).fraction
 
-    guess = pressure = pressure_for(CONTACT, 1 / late, found.rms_slope) or _ON_FLAT
+    guess = pressure = pressure_for(contact, 1 / late, found.rms_slope) or _ON_FLAT
     for _ in range(_PRESSES if found.rms_slope > 0 else 0):
-        ratio = min(CONTACT / max(touching(pressure, late), CONTACT / 10), 10.0)
+        ratio = min(contact / max(touching(pressure, late), contact / 10), 10.0)
         if abs(ratio - 1) < _NEAR:
             break
         pressure = min(max(pressure * ratio, guess / _FARTHEST), guess * _FARTHEST)
     pressure = float(f"{pressure:.2g}")
     shape = (few.sizes["x"], few.sizes["y"])
-    return FirstPressure(pressure, touching(pressure, late), touching(pressure, early), shape, slope)
+    return FirstPressure(pressure, contact, touching(pressure, late), touching(pressure, early), shape, slope)

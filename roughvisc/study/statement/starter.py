@@ -15,7 +15,7 @@ from roughvisc.topography.writers import surface_table, written_quantity
 
 #: The material of a first study: a rubber. [Pa, Pa, Pa s]
 SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY = 3e6, 1e6, 1e5
-#: Share of the area that is to be in contact in the end.
+#: Contact fraction that is aimed at in the end, unless another is asked for.
 CONTACT = 0.05
 #: Points from which a coarser grid is proposed for the first run.
 _LARGE = 400_000
@@ -29,6 +29,8 @@ class FirstPressure:
     ----------
     pressure : float
         Nominal. [Pa]
+    contact : float
+        Contact fraction that was aimed at, in the end. [-]
     late, early : float
         Contact fractions in the end and at once. [-]
     shape : tuple of int
@@ -38,6 +40,7 @@ class FirstPressure:
     """
 
     pressure: float
+    contact: float
     late: float
     early: float
     shape: tuple[int, int]
@@ -97,6 +100,7 @@ def starter_study(
         shear=written_quantity(SHEAR_MODULUS, "Pa"),
         kelvin=written_quantity(KELVIN_MODULUS, "Pa"),
         viscosity=written_quantity(KELVIN_VISCOSITY, "Pa") + " s",
+        contact=f"{100 * first.contact:.3g}",
         late=f"{100 * first.late:.2g}",
         early=f"{100 * first.early:.2g}",
         pressed=f"{first.shape[0]} x {first.shape[1]}",
@@ -182,8 +186,9 @@ kelvin_modulus = "{kelvin}"            # softer in the end ...
 kelvin_viscosity = "{viscosity}"      # ... after some 0.1 s: viscosity over modulus
 poisson = 0.5
 
-# The pressure brings about {late} % of the area into contact in the end; at once it would be {early} %. That was found
-# by pressing the surface, on {pressed} cells, on elastic bodies as soft as the rubber is then.{copy}
+# The pressure aims at {contact} % of the area in contact in the end (roughvisc new --contact "{contact} %"). Elastic
+# presses on {pressed} cells, with the stiffness that the rubber has then, give {late} % in the end and {early} % at
+# once.{copy}
 [[program]]
 {program}
 over = "50 ms"                      # within this time, linearly

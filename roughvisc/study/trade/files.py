@@ -68,7 +68,7 @@ def is_trade(path: str | Path) -> bool:
 
 
 def part_of_one(text: str, name: str) -> float:
-    """A relative error from ``1%``, ``0.1 %`` or ``0.01``.
+    """A part of one from ``1%``, ``0.1 %`` or ``0.01``.
 
     Examples
     --------

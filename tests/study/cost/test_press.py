@@ -83,6 +83,17 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     assert touching(surface, first.pressure, 1 / 12e6) == pytest.approx(first.early, rel=2 * near)
 
 
+@pytest.mark.parametrize("contact", [0.02, 0.3, 0.8])
+def test_first_pressure__aims_at_the_contact_that_is_asked_for(contact):
+    scan = rv.self_affine((1e-3, 1e-3), (64, 60), hurst=0.8, rms_slope=0.1, shortcut=5e-5, seed=3)
+    found = inspect_scan(scan)
+    first = first_pressure(scan, found, contact)
+    assert first.contact == contact
+    assert first.late == pytest.approx(contact, rel=0.1), "the pressure has two digits, and cells are whole"
+    surface = rv.level(scan, found.steps["level"])
+    assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(contact, rel=0.1)
+
+
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
     first = first_pressure(flat, inspect_scan(flat))
