@@ -12,11 +12,10 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.groups import root_of
 from roughvisc.mechanics.bodies.body import Body, body_of
-from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
 from roughvisc.problem import Problem
-from roughvisc.settings import Edge, Missing, Numerics, Settings
+from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
 from roughvisc.units import Quantity, quantities
@@ -62,8 +61,10 @@ def simulate(
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
         grid of heights as it is given, absent cells included; of a tapered surface, over the integral of the taper's
         weight.
-    boundary : {"free", "periodic"}
-        ``free`` for an indenter, ``periodic`` for a nominally flat scan.
+    boundary : {"auto", "free", "periodic"}
+        ``free`` for an indenter, ``periodic`` for a nominally flat scan. ``auto`` is ``free`` for the indenters of
+        this package, and ``periodic`` for its waves, its self-affine roughness and any surface with its mirror images
+        (:func:`roughvisc.mirror`), as long as their heights are those that were made; any other surface must say.
     tolerance : float
         Asked of ``stated_error`` at every kept time: the error that time steps, contact solver and series leave of
         pressure (L1), force and approach, over the largest force and approach so far. Rows that miss it state by how
@@ -214,7 +215,6 @@ def friction(
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, last_octave=last_octave)
     settings = Settings(
-        boundary="periodic",
         tolerance=tolerance,
         fields=fields,
         grid_error=grid_error,

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
+from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.settings import Settings
+from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing
 
 if TYPE_CHECKING:
@@ -34,6 +37,20 @@ class Problem:
     def on(self, height: xr.DataArray, **settings: Any) -> Problem:
         """The same with another surface [m], and with some settings changed."""
         return replace(self, height=height, settings=replace(self.settings, **settings))
+
+    def with_known_boundary(self, only: Literal["free", "periodic"] | None) -> Problem:
+        """The same with what ``auto`` stands for, see :func:`known_boundary`.
+
+        Raises
+        ------
+        InputError
+            If that has to be said.
+        """
+        found = known_boundary(self.settings, only, partial(boundary_of, self.height))
+        if found is None:
+            name = self.height.attrs.get("source_file", "height")
+            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.format(mirror='rv.mirror').replace(' = ', '=')}")
+        return self.on(self.height, boundary=found)
 
     def check_cells(self) -> None:
         """Refuse a surface on whose cells the body's kernel is not accurate in free space.

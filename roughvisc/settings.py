@@ -17,10 +17,11 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.units import in_si, quantity, range_in_words, within
 from roughvisc.variables import FIELDS
 
+#: ``auto`` becomes one of the others by :func:`known_boundary`
+Boundary = Literal["auto", "free", "periodic"]
 Method = Literal["fast", "seed"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
@@ -188,12 +189,12 @@ class Settings(Numerics):
     >>> Settings(tolerance=1e-2, times=[1.0, 0.5]).times
     (0.5, 1.0)
     >>> Settings().to_attributes()
-    {'method': 'fast', 'boundary': 'free', 'tolerance': 0.001}
+    {'method': 'fast', 'boundary': 'auto', 'tolerance': 0.001}
     """
 
     boundary: Boundary = setting(
-        "free",
-        "free space, for an indenter; or periodic, for a nominally flat scan",
+        "auto",
+        "free space, for an indenter; periodic, for a nominally flat scan; auto: the one that the surface was made for",
         '"periodic"',
         in_attributes=True,
         always_in_key=True,
@@ -253,6 +254,34 @@ WORD_OR_NUMBER: dict[str, str] = {
     for word in get_args(kind)
     if float in get_args(kind) and get_origin(word) is Literal
 }
+
+
+#: What is said of ``auto`` where nothing tells the boundary, as a study file has it; in Python ``=`` has no spaces.
+OPEN_BOUNDARY = """\
+is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
+  a nominally flat scan that stands for a larger surface: boundary = "periodic"; if opposite borders differ much, \
+mirror it first ({mirror})
+  an indenter or a single bump whose contact stays inside: boundary = "free"
+  a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
+
+
+def known_boundary(
+    stated: Any, only: Literal["free", "periodic"] | None, made_for: Callable[[], Literal["free", "periodic"] | None]
+) -> Literal["free", "periodic"] | None:
+    """Boundary of a solve: the one that is stated, or what ``auto`` stands for; None where it has to be stated.
+
+    Parameters
+    ----------
+    stated : Settings, or anything with ``boundary`` and ``edge``
+        An edge that is accepted is one in free space.
+    only : {"free", "periodic"} or None
+        The one that the experiment has, if it has but one.
+    made_for : callable
+        Gives the one that the surface was made for, or None; asked last.
+    """
+    if stated.boundary != "auto":
+        return stated.boundary
+    return only or ("free" if stated.edge == "accept" else made_for())
 
 
 def _checked(name: str, entry: Entry, value: Any) -> Any:

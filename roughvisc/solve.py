@@ -65,7 +65,9 @@ def solve(
     ConvergenceError
         If there is no row.
     """
-    problem = replace(problem, height=checked(problem.height, "height", least=1))
+    problem = replace(problem, height=checked(problem.height, "height", least=1)).with_known_boundary(
+        experiment.boundary
+    )
     for name, found, why in experiment.unsupported(problem.settings):
         raise InputError(f"{name} is {found!r}: {why}")
     problem.check_cells()

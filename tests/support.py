@@ -54,6 +54,8 @@ load = "5 mN"
 over = 0
 [[program]]
 hold = "0.2 s"
+[solve]
+boundary = "free"
 [keep]
 fields = ["pressure", "displacement"]
 times = [0, "0.1 s", "200 ms"]
@@ -61,7 +63,7 @@ times = [0, "0.1 s", "200 ms"]
 
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
 #: Takes some seconds a case, in steps of milliseconds.
-LONG = BALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
+LONG = BALL.replace("[keep]", 'time_step = "100 us"\n[keep]')
 
 
 def numbers(folder):

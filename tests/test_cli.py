@@ -112,6 +112,22 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     assert status == 2
 
 
+@pytest.mark.parametrize("verb", ["plan", "run", "trade"])
+def test_study_of_a_scan_without_a_boundary__is_asked_for_it_and_nothing_is_written(invoke, tmp_path, scan_file, verb):
+    surface = BALL[BALL.index("generate") : BALL.index("[material]")]
+    text = BALL.replace(surface, f'file = "{scan_file}"\n').replace('[solve]\nboundary = "free"\n', "")
+    status, out, err = invoke(verb, write_study(text))
+    assert (status, out) == (2, "")
+    first, *rows = err.strip().split("\n")
+    assert first.startswith(
+        "roughvisc: ball.toml: solve.boundary: is 'auto', the default, and the surface does not tell"
+    )
+    answers = [row.partition(": ")[2].partition(" with")[0].partition(";")[0] for row in rows]
+    assert answers == ['boundary = "periodic"', 'boundary = "free"', 'boundary = "free"']
+    assert rows[-1].endswith('edge = "accept"')
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.toml", "tilted.nc"]
+
+
 def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
     study = write_study(BALL, ("level = 0", "crop = { x = ['2 mm', '3 mm'] }"))
     status, out, err = invoke("plan", study)
@@ -233,12 +249,29 @@ def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(inv
         assert float(ds.contact_fraction[0]) < float(ds.contact_fraction[-1])
 
 
+def test_new__presses_to_the_contact_that_is_asked_for(invoke, tmp_path, scan_file):
+    pressures = {}
+    for contact in ("5 %", "20%"):
+        study = tmp_path / f"{contact[:-1].strip()}.toml"
+        assert invoke("new", scan_file, "--contact", contact, "-o", study)[0] == 0
+        text = study.read_text()
+        assert f'aims at {contact[:-1].strip()} % of the area in contact in the end (roughvisc new --contact "' in text
+        (case,) = read_cases(study)
+        pressures[contact] = case.settings.program[0].pressure
+    ds = rv.run(case, progress=False)
+    assert float(ds.contact_fraction[-1]) == pytest.approx(0.2, rel=0.05)
+    assert invoke("new", scan_file, "-o", tmp_path / "usual.toml")[0] == 0
+    assert read_cases(tmp_path / "usual.toml")[0].settings.program[0].pressure == pressures["5 %"] < pressures["20%"]
+
+
 def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan_file):
     (tmp_path / "mine.toml").write_text("# mine\n")
     for arguments, words in (
         ([scan_file, "-o", "mine.toml"], "mine.toml: exists already"),
         ([scan_file, "-o", "mine.txt"], "expected the name of a study, .toml"),
         ([scan_file, "--channel", "7"], "--channel is 7"),
+        ([scan_file, "--contact", "5 um"], "--contact: found '5 um': expected a part such as 1% or 0.01"),
+        ([scan_file, "--contact", "120 %"], "--contact: found '120 %': expected a part such as 1% or 0.01"),
     ):
         status, _, err = invoke("new", *arguments)
         assert status == 2

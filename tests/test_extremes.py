@@ -215,7 +215,7 @@ def test_load_beyond_the_surface__is_refused_where_rounding_is_all_that_is_left(
 
 def test_load_beyond_the_grid__is_refused():
     with pytest.raises(rv.EdgeContactError, match="reaches the border"):
-        simulate(rv.from_array(BALL.values, 0.1), ZENER, rv.Program().load(1e12, over=0))
+        simulate(rv.from_array(BALL.values, 0.1), ZENER, rv.Program().load(1e12, over=0), boundary="free")
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e3, pytest.param(1e-6, marks=pytest.mark.thorough)])
@@ -393,7 +393,7 @@ def test_scan_with_nine_tenths_missing(boundary):
 
 def test_single_cell_left__carries_all():
     height = cells(np.where((X == 5) & (Y == 6), 0.0, np.nan), 1 / 32)
-    ds = simulate(height, ZENER, rv.Program().load(1.0, over=0.1).hold(1.0), missing="absent")
+    ds = simulate(height, ZENER, rv.Program().load(1.0, over=0.1).hold(1.0), boundary="free", missing="absent")
     assert_a_contact_state(ds)
     assert ds.pressure.values[1:, 5, 6] == pytest.approx(32**2, rel=1e-12)
 

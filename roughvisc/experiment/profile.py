@@ -17,30 +17,11 @@ from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
 from roughvisc.mechanics.bodies.window import Window, whole_domain, window_around
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Missing, Settings
+from roughvisc.topography.borders import is_mirrored
 from roughvisc.topography.grid import checked, nominal_area, spacing, taper_weights
 from roughvisc.topography.indenters import grown, highest
 
 Array = NDArray[np.float64]
-#: Rounding that two mirror images may differ by, relative to the largest height.
-_ROUNDING = 16 * float(np.finfo(float).eps)
-
-
-def is_mirrored(height: Array) -> bool:
-    """Whether a surface is its own mirror image in both axes, between the cells: an even number of them each way."""
-    nx, ny = (n // 2 for n in height.shape)
-    if height.shape != (2 * nx, 2 * ny):
-        return False
-    allowed = _ROUNDING * max(float(np.fmax.reduce(height, axis=None)), -float(np.fmin.reduce(height, axis=None)))
-    # the second half of the rows stands for the first, once they are known to be alike
-    return _alike(height[nx - 1 :: -1], height[nx:], allowed) and _alike(
-        height[nx:, ny - 1 :: -1], height[nx:, ny:], allowed
-    )
-
-
-def _alike(a: Array, b: Array, allowed: float) -> bool:
-    difference = a - b
-    near = np.abs(difference, out=difference) <= allowed
-    return bool(near.all() or (near | (np.isnan(a) & np.isnan(b))).all())
 
 
 def quarter(shape: tuple[int, ...]) -> tuple[slice, slice]:

@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import ENTRIES, Settings
@@ -119,6 +120,8 @@ class Experiment(Protocol):
         What is going on meanwhile, as a progress bar says it.
     states : tuple of type
         Dataclasses that the state of its rows is made of, beside plain values, tuples and arrays: for checkpoints.
+    boundary : {"free", "periodic"} or None
+        The only one that it can be done with: then ``auto`` is that. None: it has both.
     states_grid_error : bool
         Whether its rows state the error of the grid themselves; that of any other is found by doing all of it again
         on coarser grids.
@@ -128,6 +131,7 @@ class Experiment(Protocol):
     table: ClassVar[str]
     called: ClassVar[str]
     doing: ClassVar[str] = "solving"
+    boundary: ClassVar[Boundary | None] = None
     states: ClassVar[tuple[type, ...]] = ()
     states_grid_error: ClassVar[bool] = False
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import TooLargeError
-from roughvisc.experiment.profile import is_mirrored, uses_window
+from roughvisc.experiment.profile import uses_window
 from roughvisc.experiment.resources import Available, curve_bytes, march_bytes, memory_available
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import choose_memory
@@ -19,6 +19,7 @@ from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.settings import Settings
+from roughvisc.topography.borders import is_mirrored
 
 #: Cells from which it is asked what memory there is: on fewer a march takes less than 100 MB.
 WORTH_ASKING = 512**2

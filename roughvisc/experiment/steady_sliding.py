@@ -28,6 +28,7 @@ from roughvisc.experiment.refusal import require_memory_of_curve
 from roughvisc.experiment.resources import curve_bytes
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.materials.frequency import over_frequencies
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.persson import persson
@@ -87,6 +88,7 @@ class SteadySliding(Experiment):
     table: ClassVar[str] = "friction"
     called: ClassVar[str] = "steady sliding"
     doing: ClassVar[str] = "sliding"
+    boundary: ClassVar[Boundary] = "periodic"
     states_grid_error: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -118,7 +120,7 @@ class SteadySliding(Experiment):
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """What has no meaning where a whole surface slides, repeats without end, and never started."""
-        if settings.boundary != "periodic":
+        if settings.boundary != self.boundary:
             yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic'"
         if "displacement" in settings.fields:
             yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"

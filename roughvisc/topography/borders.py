@@ -1,18 +1,26 @@
-"""Surfaces that repeat: whether one was made to, and whether its opposite borders meet."""
+"""Borders of surfaces: which boundary one was made for, whether it repeats, and whether its opposite borders meet."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from roughvisc.topography.blocks import deviation_of, row_blocks
 from roughvisc.topography.grid import spacing
+from roughvisc.topography.indenters import grown
+from roughvisc.topography.synthesis import is_made_by, self_affine, wavy
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
 JUMP = 2.0
+#: Line of the history of a surface that was given its mirror images.
+MIRRORED = "mirrored along x and y"
+#: Rounding that two mirror images may differ by, relative to the largest height.
+_ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,56 @@ def is_periodic(h: xr.DataArray) -> bool:
     if period.shape != (2,) or not np.allclose(period, period_of(h), rtol=1e-6, atol=0):
         return False
     return max(border_mismatch(h).of_neighbours) <= 2 * JUMP
+
+
+def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
+    """Boundary that a surface was made for; None where it has to be said: of scans, plain arrays, and all others.
+
+    Attributes stay through selection and arithmetic. Therefore a recipe is believed only where it gives the heights
+    again, and :func:`mirror <roughvisc.mirror>` only where the heights still are their own mirror images. Anything
+    else that was done to a surface, a taper too, leaves open what lies beyond its border.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+
+    Returns
+    -------
+    {"free", "periodic"} or None
+        ``free`` of an indenter, ``periodic`` of waves, self-affine roughness, and surfaces with their mirror images.
+
+    Examples
+    --------
+    >>> from roughvisc.topography.indenters import sphere
+    >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
+    >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
+    ('free', 'periodic', None)
+    """
+    if grown(h, 1.0) is not None:
+        return "free"
+    mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
+    if is_made_by(h, wavy, self_affine) or (mirrored and is_periodic(h) and is_mirrored(h.values)):
+        return "periodic"
+    return None
+
+
+def is_mirrored(height: NDArray[np.float64]) -> bool:
+    """Whether a surface is its own mirror image in both axes, between the cells: an even number of them each way."""
+    nx, ny = (n // 2 for n in height.shape)
+    if height.shape != (2 * nx, 2 * ny):
+        return False
+    allowed = _ROUNDING * max(float(np.fmax.reduce(height, axis=None)), -float(np.fmin.reduce(height, axis=None)))
+    # the second half of the rows stands for the first, once they are known to be alike
+    return _alike(height[nx - 1 :: -1], height[nx:], allowed) and _alike(
+        height[nx:, ny - 1 :: -1], height[nx:, ny:], allowed
+    )
+
+
+def _alike(a: NDArray[np.float64], b: NDArray[np.float64], allowed: float) -> bool:
+    difference = a - b
+    near = np.abs(difference, out=difference) <= allowed
+    return bool(near.all() or (near | (np.isnan(a) & np.isnan(b))).all())
 
 
 def _differences(values: np.ndarray, axis: int) -> Iterator[np.ndarray]:

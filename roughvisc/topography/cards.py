@@ -11,7 +11,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import xarray as xr
 
@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography import conditioning
 from roughvisc.topography.readers import existing, read_file, sha256
-from roughvisc.topography.recipes import RECIPES, UNITS, make
+from roughvisc.topography.recipes import BOUNDARIES, RECIPES, UNITS, make
 from roughvisc.topography.surrogates import surrogate
 from roughvisc.units import quantity, shown
 
@@ -158,6 +158,45 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
     return h
 
 
+def boundary_after(
+    steps: Mapping[str, Any], made: Literal["free", "periodic"] | None
+) -> Literal["free", "periodic"] | None:
+    """Boundary of a surface after conditioning steps; None where it has to be said.
+
+    Parameters
+    ----------
+    steps : mapping
+        As :func:`condition` takes them. ``mirror`` and ``realisation`` make any surface periodic; turns, cuts of short
+        waves and other numbers of cells leave a periodic one so; all else leaves open what lies beyond the border.
+    made : {"free", "periodic"} or None
+        Boundary that the surface was made for.
+
+    Examples
+    --------
+    >>> boundary_after({"level": 1, "mirror": True}, None), boundary_after({"level": 1}, "free")
+    ('periodic', None)
+    """
+    for step in _STEPS:
+        if steps.get(step, False) is not False:
+            kept = made == "periodic" and step in _KEEP_PERIOD
+            made = "periodic" if kept or step in ("mirror", "realisation") else None
+    return made
+
+
+def boundary_of_card(path: Path) -> Literal["free", "periodic"] | None:
+    """Boundary that the surface of a card is made for, by its text alone; None where it has to be said.
+
+    Raises
+    ------
+    InputError
+        If the card cannot be read.
+    """
+    card = read_toml(path, "surface card in TOML")
+    steps, recipe = card.get("conditioning", {}), card.get("generate")
+    known = isinstance(steps, Mapping) and isinstance(recipe, str | None)  # else it is refused where it is opened
+    return boundary_after(steps, BOUNDARIES.get(recipe or "")) if known else None
+
+
 def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
     _known(card, _FILE, "a card of a file takes")
     path = folder / _text(card, "file")
@@ -248,3 +287,5 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),
     "mirror": _switch("mirror", conditioning.mirror),
 }
+#: Steps that leave a surface that repeats one that does.
+_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "band_limit", "resample")

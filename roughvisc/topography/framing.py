@@ -10,7 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.blocks import mean_of, row_blocks
-from roughvisc.topography.borders import is_periodic, period_of
+from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
     like,
@@ -307,7 +307,7 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     if weights is not None:
         weights = (np.r_[weights[0], weights[0][::-1]], np.r_[weights[1], weights[1][::-1]])
     doubled = with_taper_weights(doubled, weights)
-    return noted(doubled, "mirrored along x and y", period=period_of(doubled))
+    return noted(doubled, MIRRORED, period=period_of(doubled))
 
 
 def _with_images(values: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from inspect import Parameter, signature
-from typing import Any
+from typing import Any, Literal
 
 import xarray as xr
 
@@ -25,6 +25,14 @@ RECIPES: dict[str, dict[str, Any]] = {
 UNITS = {
     **dict.fromkeys(("size", "radius", "amplitude", "wavelength", "rms_height", "rolloff", "shortcut"), "m"),
     **dict.fromkeys(("slope", "hurst", "rms_slope", "anisotropy"), "1"),
+}
+#: recipe -> the boundary that its surfaces are made for
+BOUNDARIES: dict[str, Literal["free", "periodic"]] = {
+    "sphere": "free",
+    "cone": "free",
+    "flat_punch": "free",
+    "wavy": "periodic",
+    "self_affine": "periodic",
 }
 
 

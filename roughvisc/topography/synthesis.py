@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,7 +20,7 @@ from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, grown, recipe_of, sphere
 from roughvisc.units import Quantity, quantities
 
-__all__ = ["cone", "flat_punch", "grown", "is_analytic", "self_affine", "sphere", "wavy"]
+__all__ = ["cone", "flat_punch", "grown", "is_analytic", "is_made_by", "self_affine", "sphere", "wavy"]
 
 
 @quantities(amplitude="m", wavelength="m", size="m")
@@ -264,11 +265,23 @@ def is_analytic(h: xr.DataArray) -> bool:
     >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
     (True, False, True)
     """
-    if grown(h, 1.0) is not None:
-        return True
+    return grown(h, 1.0) is not None or is_made_by(h, wavy)
+
+
+def is_made_by(h: xr.DataArray, *makers: Callable[..., xr.DataArray]) -> bool:
+    """Whether heights are those that their recipe gives, and that is one of some. It is made again to know.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+    *makers : callable
+        Of :func:`wavy` and :func:`self_affine`; indenters are known beyond their grid (:func:`.indenters.grown`).
+    """
     try:
         recipe = json.loads(h.attrs["recipe"])
-        again = wavy(size=recipe["size"], shape=recipe["shape"], **recipe["parameters"]).values
+        make = {maker.__name__: maker for maker in makers}[recipe["name"]]
+        again = make(size=recipe["size"], shape=recipe["shape"], **recipe["parameters"]).values
     except (KeyError, TypeError, ValueError):
         return False
     return again.shape == h.shape and bool(np.abs(h.values - again).max() <= 1e-9 * np.abs(again).max())

@@ -19,7 +19,8 @@ GRIDS = {"whole": (5.3, 24), "window": (5.3, 120), "grown": (12.3, 12)}
 
 
 def pressed(height, program, **settings):
-    settings = {"tolerance": 1e-5, "progress": False, "fields": ("pressure", "gap", "displacement"), **settings}
+    fields = ("pressure", "gap", "displacement")
+    settings = {"boundary": "free", "tolerance": 1e-5, "progress": False, "fields": fields, **settings}
     return rv.simulate(height, UNIT, program, **settings)
 
 

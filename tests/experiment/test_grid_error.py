@@ -169,7 +169,7 @@ def test_grid_error__is_missing_unless_asked_for_and_leaves_the_rest_alone():
 def test_grid_error__is_missing_where_the_coarser_solve_fails():
     height = rv.sphere(RADIUS, SIZE, (24, 21)) * 1.0
     height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
-    at_border = {"times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
+    at_border = {"boundary": "free", "times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
     load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
     ds = simulate_whole(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
     assert np.isnan(ds.grid_error).all()
@@ -178,7 +178,7 @@ def test_grid_error__is_missing_where_the_coarser_solve_fails():
 
 def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
     file = tmp_path / "ball.toml"
-    file.write_text(BALL + "[solve]\ngrid_error = true\n")
+    file.write_text(BALL.replace("[keep]", "grid_error = true\n[keep]"))
     case = read_study(file)
     with run_whole(case, tmp_path / "out", progress=False) as ds:
         assert (ds.grid_error > 0).all()

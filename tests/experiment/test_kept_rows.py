@@ -139,7 +139,7 @@ class Kept:
 
     def __init__(self, height, *, tolerance=1e-5, fields=FIELDS, **settings):
         self.height, self.seed = height, 0
-        settings = Settings(tolerance=tolerance, fields=fields, **settings)
+        settings = Settings(**{"boundary": "free", "tolerance": tolerance, "fields": fields} | settings)
         self.problem = Problem(height, body_of(MATERIAL), settings)
         self.rows, self.store = LoadingRows(self.problem, PROGRAM), RowsInMemory()
         self.profile, self.scene = self.rows.profile, self.rows._scene

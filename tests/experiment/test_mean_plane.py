@@ -24,7 +24,7 @@ def bump(shape, shift=0.0):
 
 
 def pressed(h, **options):
-    return simulate_whole(h, RUBBER, PRESS, times=[0.4], progress=False, **options)
+    return simulate_whole(h, RUBBER, PRESS, **{"boundary": "free", "times": [0.4], "progress": False} | options)
 
 
 @pytest.mark.parametrize("shape", [(25, 28), (97, 101)])  # the second follows the contact with a window

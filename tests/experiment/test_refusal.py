@@ -111,7 +111,7 @@ def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
     off = ball.values + 1e-6 * np.arange(600)
     with pytest.raises(TooLargeError):
         refusal.require_memory(ball.shape, settings, RUBBER, PRESS, heights=off, **given)
-    refusal.require_memory(ball.shape, Settings(times=2), RUBBER, PRESS, heights=off, **given)
+    refusal.require_memory(ball.shape, Settings(boundary="free", times=2), RUBBER, PRESS, heights=off, **given)
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):

@@ -128,7 +128,7 @@ def test_recipe_that_no_longer_holds__does_not_grow():
         scaled = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29)) * 0.5
     assert "recipe" in scaled.attrs
     with pytest.raises(rv.EdgeContactError):
-        simulate(scaled, program=rv.Program().load(0.1, over=0))
+        simulate(scaled, program=rv.Program().load(0.1, over=0), boundary="free")
 
 
 def test_work__is_that_of_the_force_on_the_approach():
@@ -169,9 +169,12 @@ def with_value(value):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: simulate(height=with_value(np.nan)), r"missing at 1 of 1054 points, the first at cell \(3, 4\)"),
-        (lambda: simulate(height=with_value(np.inf)), "infinite values"),
-        (lambda: simulate(height=BALL * np.nan), "missing everywhere"),
+        (
+            lambda: simulate(height=with_value(np.nan), boundary="free"),
+            r"missing at 1 of 1054 points, the first at cell \(3, 4\)",
+        ),
+        (lambda: simulate(height=with_value(np.inf), boundary="free"), "infinite values"),
+        (lambda: simulate(height=BALL * np.nan, boundary="free"), "missing everywhere"),
         (lambda: simulate(height=BALL.values), "height: found ndarray: expected an xarray.DataArray"),
         (lambda: simulate(height=BALL.assign_attrs(units="K")), "height: the height has the unit 'K'"),
         (lambda: simulate(height=BALL[[0, 1, 5]]), "expected a uniform, ascending grid"),
@@ -185,7 +188,9 @@ def with_value(value):
         (lambda: simulate(times=0), "times is 0"),
         (lambda: simulate(missing="ignore"), "missing is 'ignore'"),
         (
-            lambda: simulate(height=rv.from_array(BALL.values, 1e-5), program=rv.Program().load(10.0, over=0)),
+            lambda: simulate(
+                rv.from_array(BALL.values, 1e-5), program=rv.Program().load(10.0, over=0), boundary="free"
+            ),
             "contact reaches the border of the free-space domain of 31 x 34 cells",
         ),
         (
@@ -246,7 +251,7 @@ FOLLOWED = {
 def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
     material, program = FOLLOWED[name]
     numerics = rv.Numerics(memory="direct" if "direct" in name else "auto")
-    settings = {"tolerance": 3e-3, "times": 6, "fields": FIELDS, "numerics": numerics}
+    settings = {"boundary": "free", "tolerance": 3e-3, "times": 6, "fields": FIELDS, "numerics": numerics}
     followed = simulate(two_hills(), material, program, **settings)
     assert len(set(solved_on)) >= 2, "the window grew"
     assert solved_on[0][0] < 60
@@ -267,21 +272,21 @@ def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
 
 
 def test_window__finds_the_contact_on_the_second_hill(solved_on):
-    ds = simulate(two_hills(), *FOLLOWED["loading and unloading"])
+    ds = simulate(two_hills(), *FOLLOWED["loading and unloading"], boundary="free")
     assert ds.pressure[1].where(ds.x > 1.7e-4).max() > 0
 
 
 def test_window__stops_at_the_border_of_a_scan():
     with pytest.raises(rv.EdgeContactError, match="151 x 133"):
-        simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5))
+        simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5), boundary="free")
 
 
 def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
     bored = two_hills()
     bored[40:50, 40:50] = np.nan
     press = rv.Program().load(1e-4, over=0)
-    simulate(bored, ZENER, press, missing="absent")
-    simulate(two_hills(), ZENER, press, edge="accept")
+    simulate(bored, ZENER, press, missing="absent", boundary="free")
+    simulate(two_hills(), ZENER, press, edge="accept", boundary="free")
     simulate(two_hills(), ZENER, press, boundary="periodic")
     assert set(solved_on) == {(151, 133)}
 
@@ -310,7 +315,7 @@ def test_window__after_a_jump_is_foreseen(solved_on):
 
 def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on):
     with pytest.raises(rv.InputError, match="expected at most 1e\\+100 N"):
-        simulate(two_hills(), program=rv.Program().load(1e200, over=0))
+        simulate(two_hills(), program=rv.Program().load(1e200, over=0), boundary="free")
     assert not solved_on
 
 

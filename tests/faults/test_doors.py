@@ -54,7 +54,7 @@ def test_sweep__is_refused_by_the_product_of_its_lengths(study):
     ("old", "new", "expected"),
     [
         ("[12, 9]", "[100000, 100000]", r"shape is \(100000, 100000\), 1e\+10 cells: expected at most"),
-        ("[keep]", "[solve]\ntolerance = 1e-17\n[keep]", r"solve\.tolerance: found 1e-17: expected .* at least 1e-12"),
+        ("[keep]", "tolerance = 1e-17\n[keep]", r"solve\.tolerance: found 1e-17: expected .* at least 1e-12"),
         ('[0, "0.1 s", "200 ms"]', "1000000000", r"keep\.times: found 1000000000: expected a whole number"),
         ("level = 0", f"level = 1{'0' * 400}", r"surface\.level.*found 1000000.*\.\.\."),
         ('"5 mN"', f"1{'0' * 400}", r"program\.0\.load: found 1000.*\.\.\.: expected a number in N.*finite"),
@@ -246,7 +246,7 @@ def test_scan__writes_over_nothing_unless_asked_to(tmp_path, invoke, coarse_pict
 @pytest.mark.long
 @pytest.mark.parametrize("after", [0.5, 1.0, 1.5, 2.0, 2.4, 2.8, 3.2, 4.0])
 def test_run__an_interrupt_while_processes_start_is_quiet(tmp_path, after):
-    text = SMALL.replace("[keep]", '[solve]\ntime_step = "100 us"\n[keep]')
+    text = SMALL.replace("[keep]", 'time_step = "100 us"\n[keep]')
     (tmp_path / "s.toml").write_text(f'{text}[sweep]\n"program.1.hold" = ["20 s", "21 s"]\n')
     command = [sys.executable, "-m", "roughvisc", "run", "s.toml", "--workers", "2", "-q"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True, start_new_session=True)

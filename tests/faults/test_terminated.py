@@ -15,7 +15,7 @@ from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import whole_result
 
-MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", '[solve]\ntime_step = "160 us"\n[keep]')
+MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", 'time_step = "160 us"\n[keep]')
 TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 
 

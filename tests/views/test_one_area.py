@@ -18,7 +18,7 @@ from roughvisc.views.console.result_tables import result_table
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import _numbers
 
-STUDY = BALL.replace("[24, 21]", "[17, 12]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
+STUDY = BALL.replace("[24, 21]", "[17, 12]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 
 
 @pytest.fixture(scope="module")

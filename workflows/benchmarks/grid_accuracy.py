@@ -29,7 +29,7 @@ CASES = {
 
 
 def pressed(height, load, approach=None, **settings):
-    settings = {"tolerance": 1e-4, "progress": False, "fields": ("pressure",), **settings}
+    settings = {"boundary": "free", "tolerance": 1e-4, "progress": False, "fields": ("pressure",), **settings}
     program = rv.Program().load(load, over=0) if approach is None else rv.Program().approach(approach, over=0)
     return rv.simulate(height, UNIT, program, **settings)
 

@@ -290,7 +290,7 @@ def _surface(case: Case) -> _Surface:
     )
 
 
-def _half_slope(height: xr.DataArray, boundary: Boundary = Settings.boundary) -> float:
+def _half_slope(height: xr.DataArray, boundary: Boundary) -> float:
     """Root mean square slope on cells twice as long; missing where there are too few cells."""
     if min(height.shape) < _HALVED:
         return math.nan

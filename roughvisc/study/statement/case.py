@@ -285,6 +285,8 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     data = json.loads(case.to_json())
     for name in ("origin", "varied", "written"):
         data.pop(name, None)
+    if "boundary" not in case.settings.solve.model_fields_set:  # another surface may have another one
+        data["solve"].pop("boundary")
     try:
         changed = _varied(data, changes, case.origin, None)
     except Problems as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 from roughvisc.errors import InputError
@@ -23,7 +24,8 @@ def in_sweep(problem: str, where: Sequence[int], changes: Sequence[Mapping[str, 
     if len(where) == len(changes):
         return problem
     values = ", ".join(f"{key} = {shown(value)}" for key, value in changes[where[0]].items())
-    return f"{problem} (case {where[0] + 1} of {len(changes)}: {values})"
+    head, *rows = problem.split("\n")
+    return "\n".join([f"{head} (case {where[0] + 1} of {len(changes)}: {values})", *rows])
 
 
 def line(path: Path | None, key: str, problem: str) -> str:
@@ -36,4 +38,4 @@ def report(path: Path | None, lines: Sequence[str]) -> str:
     name = str(path) if path else "case"
     if len(lines) == 1:
         return f"{name}: {lines[0]}"
-    return "\n".join([f"{name}: {len(lines)} problems", *(f"  {one}" for one in lines)])
+    return "\n".join([f"{name}: {len(lines)} problems", *(indent(one, "  ") for one in lines)])

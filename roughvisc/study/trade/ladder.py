@@ -145,6 +145,7 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool =
         If the surface is not known on a finer grid, or a value is refused.
     """
     changes: dict[str, Any] = {
+        "solve.boundary": case.settings.solve.boundary,  # on any grid
         "solve.tolerance": setting.tolerance,
         "solve.time_step": "auto" if setting.time_step is None else setting.time_step,
         "solve.method": setting.method,

@@ -60,6 +60,7 @@ def test_run__equals_simulate(study):
         rv.level(rv.sphere(10e-3, 1e-3, (24, 21)), 0),
         rv.zener(3e6, 1e6, 1e5),
         rv.Program().load(5e-3, over=0).hold(0.2),
+        boundary="free",
         fields=("pressure", "displacement"),
         times=[0, 0.1, 0.2],
         progress=False,

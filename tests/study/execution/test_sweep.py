@@ -109,8 +109,8 @@ def test_sweep__on_a_cluster_takes_the_scan_along(study, tmp_path, by_hand):
     card = f'file = "../data/rough.nc"\nsha256 = "{checksum}"\n[conditioning]\nlevel = 1\n'
     (tmp_path / "scans" / "cards" / "rough.toml").write_text(card)
     surface = BALL[BALL.index("generate") : BALL.index("[material]")]
-    text = BALL.replace(surface, 'file = "scans/cards/rough.toml"\n')
-    cases = study(text + '[solve]\nboundary = "periodic"\n[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
+    text = BALL.replace(surface, 'file = "scans/cards/rough.toml"\n').replace('"free"', '"periodic"')
+    cases = study(text + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
     wanted = sweep(cases, tmp_path / "here", workers=0, progress=False)
     packed = Case.from_json(serialize_with_inputs(cases[0], tmp_path / "inputs"))
     assert packed.key == cases[0].key

@@ -36,7 +36,7 @@ def test_run__touches_no_netcdf_file_outside_its_lock(tmp_path, monkeypatch):
     h = rv.self_affine((1e-3, 1e-3), (12, 9), hurst=0.8, rms_height=1e-6, seed=1)
     h.rename("height").to_netcdf(tmp_path / "rough.nc")
     surface = BALL[BALL.index("generate") : BALL.index("[material]")]
-    text = BALL.replace(surface, 'file = "rough.nc"\nlevel = 1\n') + '[solve]\nboundary = "periodic"\n'
+    text = BALL.replace(surface, 'file = "rough.nc"\nlevel = 1\n').replace('"free"', '"periodic"')
     (tmp_path / "rough.toml").write_text(text)
     touched, opened = [], netCDF4.Dataset
 

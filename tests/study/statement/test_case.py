@@ -470,7 +470,7 @@ hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
 
 title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | 2 problems
-| - solve.boundary: found 'periodc': expected 'free' or 'periodic'; did you mean 'periodic'?
+| - solve.boundary: found 'periodc': expected 'auto' or 'free' or 'periodic'; did you mean 'periodic'?
 | - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit
 
 [surface]  =>  [keep]\nfields = ['presure']\n[surface]
@@ -678,7 +678,7 @@ def test_key__counts_what_determines_the_numbers(study):
         ("[surface]", "[solve]\nmethod = 'seed'\n[surface]"),
         ("[surface]", "[keep]\ntimes = 3\n[surface]"),
         ("[surface]", "[keep]\nfields = ['gap']\n[surface]"),
-        ("[material]", "level = 1\n[material]"),
+        ("[material]", "level = 1\n[solve]\nboundary = 'free'\n[material]"),
         ('model = "zener"', 'model = "zener"\npoisson = 0.4'),
         ('model = "zener"', 'model = "zener"\nbulk_modulus = "1 GPa"'),
     ]
@@ -699,7 +699,7 @@ def test_key__knows_a_scan_by_its_content(study, tmp_path):
     (tmp_path / "same.toml").write_text('licence = "CC0"\nfile = "b.sur"\nlevel = 1')
     (tmp_path / "other.toml").write_text('file = "a.sur"\nlevel = 2')
     names = ("a.sur", "b.sur", "c.sur", "card.toml", "same.toml", "other.toml")
-    case = {n: read_study(study(BALL, (table, f'[surface]\nfile = "{n}"\n'))) for n in names}
+    case = {n: read_study(study(BALL, (table, f'solve.boundary = "free"\n[surface]\nfile = "{n}"\n'))) for n in names}
     key = {name: case[name].key for name in names}
     assert key["a.sur"] == key["b.sur"]
     assert key["card.toml"] == key["same.toml"]

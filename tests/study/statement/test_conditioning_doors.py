@@ -15,6 +15,7 @@ STATED = {
     "surface": {"generate": "sphere", "radius": 1e-3, "size": 1e-4, "shape": 16},
     "material": {"model": "elastic", "shear_modulus": 1e6},
     "program": [{"load": 1.0, "over": 0.1}],
+    "solve": {"boundary": "free"},
 }
 ORDERS, METHODS = "expected 0 (mean), 1 (plane), 2 or 3", "expected 'harmonic', 'nearest' or 'linear'"
 ODD = "expected an odd whole number of at least 3"

@@ -10,6 +10,7 @@ from roughvisc.study.statement.case import Case, read_cases, read_study
 from roughvisc.study.statement.schema.units import unit_of
 
 SURFACE = BALL[BALL.index("[surface]") : BALL.index("[[program]]")]
+FREE = '[solve]\nboundary = "free"\n'
 PERIODIC = '[solve]\nboundary = "periodic"\n'
 
 
@@ -67,7 +68,7 @@ def test_case__states_a_curve_and_survives_its_text(read):
         ("load = 1\nspeeds = { from = 1, to = 2 }", PERIODIC, r"friction\.speeds\.count: missing"),
         ('load = 1\nspeeds = 1\ndirection = "z"', PERIODIC, r"friction\.direction: found 'z': expected 'x' or '-x'"),
         ("load = 1\nspeeds = 1\ntime = 1", PERIODIC, r"friction\.time: unknown key"),
-        ("load = 1\nspeeds = 1", "", r"solve\.boundary: found 'free': steady sliding repeats: expected 'periodic'"),
+        ("load = 1\nspeeds = 1", FREE, r"solve\.boundary: found 'free': steady sliding repeats: expected 'periodic'"),
         ("load = 1\nspeeds = 1", PERIODIC + "time_step = 1", r"solve\.time_step: found 1\.0: steady sliding has none"),
         ("load = 1\nspeeds = 1", PERIODIC + 'edge = "accept"', r"solve\.edge: found 'accept'"),
         ("load = 1\nspeeds = 1", PERIODIC + "[keep]\ntimes = 3", r"keep\.times: found 3: steady sliding has none"),
@@ -129,3 +130,10 @@ def test_key__of_a_curve_is_that_of_what_is_asked(read, monkeypatch):
     ]
     assert keys[0] == keys[1]
     assert len(set(keys)) == 6
+
+
+@pytest.mark.parametrize("said", ["", '[solve]\nboundary = "auto"\n', "[solve]\ntolerance = 1e-3\n"])
+def test_boundary__is_periodic_unless_said_otherwise(read, said):
+    unsaid, stated = read("load = 2\nspeeds = 1", said), read("load = 2\nspeeds = 1")
+    assert unsaid.solving().boundary == "periodic"
+    assert unsaid.key == stated.key

@@ -84,7 +84,10 @@ def test_key__does_not_know_what_is_observed(study):
         ),
         ("[observe.leak]\n", "observe.leak: unknown key; did you mean 'leakage'?"),
         ("[observe]\nleakage = 1\n", "observe.leakage: found 1: expected a table"),
-        ('[observe.leakage]\nsides = "periodic"\n', "observe.leakage.sides: found 'periodic' where solve.boundary is"),
+        (
+            '[solve]\nboundary = "free"\n[observe.leakage]\nsides = "periodic"\n',
+            "observe.leakage.sides: found 'periodic' where solve.boundary is 'free'",
+        ),
         (
             '[keep]\nfields = ["pressure"]\n' + LEAKAGE,
             "observe.leakage: needs a field that is not kept",

@@ -14,7 +14,7 @@ from roughvisc.study.storage.parameters import identifier, labels_of_case
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.sliding import SLIDING
 
-SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
+SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 SWEEP = """
 [sweep]
 "program.0.load" = ["2 mN", "1 mN"]

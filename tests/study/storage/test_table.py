@@ -15,7 +15,7 @@ from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.table import CASES
 
-SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "[solve]\ntolerance = 1e-2\n[keep]")
+SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 #: The last two touch the border of the grid, which counts as measured and does not grow.
 SWEEP = """
 [[sweep]]

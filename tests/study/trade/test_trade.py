@@ -272,9 +272,12 @@ def test_closed_forms__are_found_and_met(tmp_path, surface, material, program, n
     "changes",
     [
         {"solve__boundary": "periodic"},
-        {"surface__level": 1},
+        {"surface__level": 1, "solve__boundary": "free"},
         {"surface__exact": True},
-        {"surface": {"generate": "wavy", "amplitude": 1e-6, "wavelength": 1e-3, "size": 1e-3, "shape": 16}},
+        {
+            "surface": {"generate": "wavy", "amplitude": 1e-6, "wavelength": 1e-3, "size": 1e-3, "shape": 16},
+            "solve__boundary": "free",
+        },
     ],
 )
 def test_closed_forms__are_not_taken_for_other_scenes(tmp_path, changes):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from pydantic.fields import FieldInfo
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.settings import ENTRIES, Settings
+from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.statement.schema.audit import AuditSection
 from roughvisc.study.statement.schema.entries import Text, a_list, nullable, shown
 from roughvisc.study.statement.schema.experiments import ExperimentSection
@@ -43,6 +43,20 @@ def _segments(value: Any, info: ValidationInfo) -> Any:
     return value
 
 
+def _with_boundary(solve: SolveSection, info: ValidationInfo) -> SolveSection:
+    """How it is computed, with the boundary that ``auto`` stands for, which the study then does not state itself."""
+    if not {"surface", *EXPERIMENTS} <= set(info.data):  # what is wrong there is said first
+        return solve
+    others = (info.data[name] for name in EXPERIMENTS)
+    only = next((section.experiment().boundary for section in others if section is not None), None)
+    found = known_boundary(solve, only, info.data["surface"].boundary)
+    if found is None:
+        raise refuse("boundary", OPEN_BOUNDARY.format(mirror="mirror = true in [surface]"))
+    if found == solve.boundary:
+        return solve
+    return SolveSection.model_construct(solve.model_fields_set - {"boundary"}, **dict(solve) | {"boundary": found})
+
+
 class Study(Section):
     """One case as a study file states it, checked, in SI."""
 
@@ -55,7 +69,7 @@ class Study(Section):
         BeforeValidator(_segments),
         Field(description=_SEGMENTS, validate_default=True),
     ] = None
-    solve: SolveSection = SolveSection()
+    solve: Annotated[SolveSection, AfterValidator(_with_boundary), Field(validate_default=True)] = SolveSection()
     keep: KeepSection = KeepSection()
     observe: nullable(ObserveSection) = Field(None, description="a table")
     audit: nullable(AuditSection) = None

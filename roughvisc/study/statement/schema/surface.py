@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import reduce
 from operator import or_
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, WrapValidator, create_model
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, Prepared, either
 from roughvisc.study.statement.schema.entries import (
     FilePath,
@@ -72,6 +74,10 @@ class Raw(Section):
         """The heights as read or made. [m]"""
         raise NotImplementedError
 
+    def made_for(self) -> Boundary | None:
+        """Boundary that the heights are made for; None where the study has to say it."""
+        raise NotImplementedError
+
 
 class FromFile(Raw):
     """An instrument file or a surface card."""
@@ -89,6 +95,12 @@ class FromFile(Raw):
         keys = ("format", "channel", "unit", "height_unit", "spacing")
         return open_scan(self.file, **{key: getattr(self, key) for key in keys})
 
+    def made_for(self) -> Boundary | None:
+        from roughvisc.topography.cards import boundary_of_card, is_card
+
+        path = Path(self.file)
+        return boundary_of_card(path) if is_card(path, self.format) else None
+
 
 class FromRecipe(Raw):
     """Heights made by a recipe; each recipe has a class of its own, made from :data:`RECIPES`."""
@@ -97,6 +109,9 @@ class FromRecipe(Raw):
 
     def raw(self) -> xr.DataArray:
         return recipes.make(self.generate, {key: getattr(self, key) for key in RECIPES[self.generate]})
+
+    def made_for(self) -> Boundary | None:
+        return recipes.BOUNDARIES[self.generate]
 
 
 class SecondFace(Prepared, Raw):
@@ -171,6 +186,16 @@ class SurfaceSection(Conditioned, Raw):
         """The heights as conditioned, peaks up; of two faces: their sum. [m]"""
         height = self.prepared(self.raw())
         return self.framed(height if self.second is None else self.second.laid(height))
+
+    def boundary(self) -> Boundary | None:
+        """Boundary that the surface is made for, without its heights; None where the study has to say it."""
+        from roughvisc.topography.cards import boundary_after
+
+        stated = self.model_dump(include=set(Conditioned.model_fields) - {"missing"}, exclude_none=True)
+        prepared = boundary_after(
+            {name: stated.pop(name) for name in stated.keys() & Prepared.model_fields}, self.made_for()
+        )
+        return boundary_after(stated, prepared if self.second is None else None)
 
 
 class FileSurface(FromFile, SurfaceSection):

@@ -1,0 +1,93 @@
+"""``boundary="auto"``: as the surface was made, and a question where it was not."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.settings import Settings, known_boundary
+
+PRESS = rv.Program().pressure(1e3, over=0)
+STEEL = rv.elastic(1e6)
+ROUGH = rv.self_affine(1e-3, (16, 18), hurst=0.8, rms_slope=0.05, seed=1)
+BALL = rv.sphere(1e-2, 1e-3, (16, 18))
+SCAN = rv.from_array(ROUGH.values, (1e-3 / 16, 1e-3 / 18))
+ANSWER = """\
+: boundary is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
+  a nominally flat scan that stands for a larger surface: boundary="periodic"; if opposite borders differ much, mirror \
+it first (rv.mirror)
+  an indenter or a single bump whose contact stays inside: boundary="free"
+  a scan that is itself the whole body: boundary="free" with edge="accept\""""
+
+
+def pressed(height, **settings):
+    return rv.simulate(height, STEEL, PRESS, progress=False, fields=("pressure",), **settings)
+
+
+@pytest.mark.parametrize(("height", "word"), [(BALL, "free"), (ROUGH, "periodic"), (rv.mirror(SCAN), "periodic")])
+def test_auto__is_what_the_surface_was_made_for(height, word):
+    found, said = pressed(height), pressed(height, boundary=word)
+    assert found.attrs["boundary"] == word
+    xr.testing.assert_equal(found.drop_vars("wall_time", errors="ignore").pressure, said.pressure)
+    assert pressed(height.to_dataset(name="height").chunk()).attrs["boundary"] == word, "also of what is read late"
+
+
+def test_auto__asks_of_anything_else_and_nothing_is_computed(monkeypatch):
+    monkeypatch.setattr("roughvisc.solve._solve_once", lambda *_: pytest.fail("something is computed"))
+    for height, name in (
+        (SCAN, "height"),
+        (SCAN.assign_attrs(source_file="ground.x3p"), "ground.x3p"),
+        (rv.taper(ROUGH, 2e-4), "height"),
+        (BALL + ROUGH, "height"),
+    ):
+        with pytest.raises(rv.InputError) as asked:
+            pressed(height)
+        assert str(asked.value) == name + ANSWER
+
+
+def test_auto__with_an_accepted_edge_is_free():
+    found = pressed(SCAN, edge="accept")
+    assert (found.attrs["boundary"], found.attrs["edge"]) == ("free", "accept")
+
+
+def test_friction__is_periodic_whatever_slides():
+    ds = rv.friction(SCAN, rv.zener(1e6, 1e6, 1e5), pressure=1e3, speeds=[1e-3], progress=False)
+    assert ds.attrs["boundary"] == "periodic"
+
+
+@pytest.mark.parametrize(
+    ("stated", "edge", "only", "made", "expected"),
+    [
+        ("auto", "error", None, "free", "free"),
+        ("auto", "error", None, None, None),
+        ("auto", "accept", None, "periodic", "free"),
+        ("auto", "accept", "periodic", "free", "periodic"),
+        ("auto", "error", "periodic", None, "periodic"),
+        ("free", "error", "periodic", "periodic", "free"),
+        ("periodic", "accept", None, "free", "periodic"),
+    ],
+)
+def test_known_boundary__takes_what_is_said_then_the_experiment_then_the_edge_then_the_surface(
+    stated, edge, only, made, expected
+):
+    assert known_boundary(Settings(boundary=stated, edge=edge), only, lambda: made) == expected
+
+
+def test_known_boundary__looks_at_the_surface_only_where_it_must():
+    def looked():
+        raise AssertionError("the heights are made again")
+
+    for settings, only in ((Settings(boundary="free"), None), (Settings(edge="accept"), None), (Settings(), "free")):
+        assert known_boundary(settings, only, looked) == "free"
+
+
+def test_auto__is_no_boundary_of_a_grid():
+    with pytest.raises(rv.InputError, match="boundary is 'auto': expected 'free' or 'periodic'"):
+        HalfSpace((4, 4), (1.0, 1.0), "auto")
+
+
+def test_auto__of_a_moved_grid_of_waves_is_periodic_still():
+    moved = ROUGH.assign_coords(x=ROUGH.x + 1.0)
+    assert pressed(moved).attrs["boundary"] == "periodic"
+    assert np.isfinite(pressed(moved).pressure).all()

@@ -1,0 +1,138 @@
+"""``boundary`` of a study that does not say it: as the surface was made, in the key too, or one question."""
+
+import json
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.study.statement.case import Case, read_cases, read_study, vary
+
+BODY = '[material]\nmodel = "elastic"\nshear_modulus = 1e6\n[[program]]\npressure = 1e3\nover = 0\n'
+BALL = '[surface]\ngenerate = "sphere"\nradius = 1e-2\nsize = 1e-3\nshape = [12, 10]\n'
+ROUGH = '[surface]\ngenerate = "self_affine"\nsize = 1e-3\nshape = 16\nhurst = 0.8\nrms_slope = 0.1\nseed = 1\n'
+WAVES = '[surface]\ngenerate = "wavy"\namplitude = 1e-6\nwavelength = 1e-3\nsize = 1e-3\nshape = 16\n'
+SECOND = BALL.replace("[surface]", "[surface.second]")
+SCAN = '[surface]\nfile = "rough.nc"\n'
+ANSWER = """\
+solve.boundary: is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
+  a nominally flat scan that stands for a larger surface: boundary = "periodic"; if opposite borders differ much, \
+mirror it first (mirror = true in [surface])
+  an indenter or a single bump whose contact stays inside: boundary = "free"
+  a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
+
+
+@pytest.fixture
+def study(tmp_path):
+    h = rv.self_affine(1e-3, (12, 10), hurst=0.8, rms_height=1e-6, seed=1)
+    h.to_netcdf(tmp_path / "rough.nc")
+    h.to_netcdf(tmp_path / "other.nc")
+    (tmp_path / "ball.toml").write_text('generate = "cone"\nslope = 0.1\nsize = 1e-3\nshape = [12, 10]\n')
+    (tmp_path / "scan.toml").write_text('file = "rough.nc"\n')
+
+    def written(text):
+        (tmp_path / "study.toml").write_text(text)
+        return tmp_path / "study.toml"
+
+    return written
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        (BALL, "free"),
+        (ROUGH, "periodic"),
+        (WAVES, "periodic"),
+        (BALL + "mirror = true\n", "periodic"),
+        (BALL + "level = false\n", "free"),
+        (ROUGH + "resample = 8\n", "periodic"),
+        (ROUGH + "mirror = true\n" + SECOND, "periodic"),
+        (SCAN + "realisation = 3\n", "periodic"),
+        (SCAN + "level = 1\nmirror = true\n", "periodic"),
+        (SCAN + '[solve]\nedge = "accept"\n', "free"),
+        ('[surface]\nfile = "ball.toml"\n', "free"),
+        ('[surface]\nfile = "scan.toml"\nmirror = true\n', "periodic"),
+    ],
+)
+def test_key__holds_the_word_that_auto_stands_for(study, text, word):
+    found = read_study(study(text + BODY))
+    said = "[solve]\n" + f'boundary = "{word}"\n'
+    stated = read_study(study((text.replace("[solve]\n", said) if "[solve]" in text else text + said) + BODY))
+    assert (found.settings.solve.boundary, found.solving().boundary) == (word, word)
+    assert found.key == stated.key
+    assert json.loads(found.to_json())["solve"]["boundary"] == word
+    assert Case.from_json(found.to_json()).key == found.key
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SCAN,
+        SCAN + "level = 1\n",
+        SCAN + 'taper = "0.1 mm"\n',
+        SCAN + '[solve]\nboundary = "auto"\n',
+        ROUGH + "level = 1\n",
+        ROUGH + 'taper = "0.1 mm"\n',
+        ROUGH + 'crop = { x = [0, "0.5 mm"] }\n',
+        BALL + "level = 0\n",
+        BALL + SECOND,
+        ROUGH + "resample = 8\n" + SECOND,
+        '[surface]\nfile = "scan.toml"\n',
+        '[surface]\nfile = "ball.toml"\nlevel = 0\n',
+    ],
+)
+def test_study__of_any_other_surface_is_asked(study, text):
+    path = study(text + BODY)
+    with pytest.raises(rv.InputError) as asked:
+        read_study(path)
+    assert str(asked.value) == f"{path}: {ANSWER}"
+
+
+def test_sweep__over_surfaces_decides_for_each_case(study):
+    sweep = '[sweep]\n"surface.mirror" = [false, true]\n'
+    assert [case.solving().boundary for case in read_cases(study(BALL + BODY + sweep))] == ["free", "periodic"]
+
+
+def test_sweep__over_scans_is_asked_once(study):
+    path = study(SCAN + BODY + '[sweep]\n"surface.file" = ["rough.nc", "other.nc"]\n')
+    with pytest.raises(rv.InputError) as asked:
+        read_cases(path)
+    assert str(asked.value) == f"{path}: {ANSWER}"
+    path = study(SCAN + BODY + '[sweep]\n"surface.mirror" = [true, false]\n')
+    with pytest.raises(rv.InputError) as asked:
+        read_cases(path)
+    head, *rows = ANSWER.split("\n")
+    assert str(asked.value) == "\n".join([f"{path}: {head} (case 2 of 2: surface.mirror = False)", *rows])
+
+
+def test_rows_of_a_message__stay_below_it_beside_another_problem(study):
+    with pytest.raises(rv.InputError) as asked:
+        read_study(study(SCAN + BODY + '[keep]\nfields = ["gep"]\n'))
+    lines = str(asked.value).split("\n")
+    assert lines[0].endswith("study.toml: 2 problems")
+    assert [line[:4].count(" ") for line in lines[1:5]] == [2, 4, 4, 4]
+
+
+def test_vary__to_another_surface_decides_anew(study):
+    ball = read_study(study(BALL + BODY))
+    rough = {"generate": "self_affine", "size": 1e-3, "shape": 16, "hurst": 0.8, "rms_slope": 0.1, "seed": 1}
+    assert vary(ball, {"surface": rough}).solving().boundary == "periodic"
+    assert vary(ball, {"surface.radius": 2e-2}).solving().boundary == "free"
+    assert vary(ball, {"surface": rough, "solve.boundary": "free"}).solving().boundary == "free"
+    with pytest.raises(rv.InputError, match=r"solve\.boundary: is 'auto'"):
+        vary(ball, {"surface.level": 1})
+    stated = read_study(study(BALL + BODY + '[solve]\nboundary = "free"\n'))
+    assert vary(stated, {"surface": rough}).solving().boundary == "free"
+    assert vary(Case.from_json(ball.to_json()), {"surface": rough}).solving().boundary == "free", "a result says it"
+
+
+def test_result__says_the_word(study):
+    ds = rv.run(read_study(study(ROUGH + BODY)), progress=False)
+    assert ds.attrs["boundary"] == "periodic"
+    assert np.isfinite(ds.pressure).all()
+
+
+def test_card__that_cannot_be_read_is_named(study, tmp_path):
+    (tmp_path / "scan.toml").write_text("file = ")
+    with pytest.raises(rv.InputError, match=r"study\.toml: solve: .*scan\.toml: is no surface card in TOML"):
+        read_study(study('[surface]\nfile = "scan.toml"\n' + BODY))

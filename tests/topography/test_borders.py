@@ -1,0 +1,122 @@
+"""The boundary that a surface was made for: by its recipe as long as that gives the heights, by mirror images."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.topography.borders import boundary_of, is_periodic
+from roughvisc.topography.cards import boundary_after, boundary_of_card, condition, open_card
+from roughvisc.topography.recipes import BOUNDARIES, RECIPES
+
+SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
+BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)
+WAVES = rv.wavy(1e-6, 1e-4, SIDE, SHAPE)
+ROUGH = rv.self_affine(SIDE, SHAPE, hurst=0.8, rms_height=1e-6, seed=1)
+SCAN = rv.from_array(np.random.default_rng(0).normal(size=SHAPE) * 1e-6, (1e-3 / 24, 1.2e-3 / 20))
+CAP = rv.sphere(2e-3, SIDE, SHAPE, exact=True)
+
+
+@pytest.mark.parametrize(
+    ("height", "expected"),
+    [
+        (BALL, "free"),
+        (CAP, "free"),
+        (TIP, "free"),
+        (PUNCH, "free"),
+        (BALL.T, "free"),
+        (BALL[3:-1, 2:], "free"),
+        (rv.sphere(1e-2, 1e-3, (8, 1)), "free"),
+        (WAVES, "periodic"),
+        (rv.wavy(1e-6, 1e-3, 1e-3, (16, 1), waves=1), "periodic"),
+        (ROUGH, "periodic"),
+        (rv.self_affine(SIDE, SHAPE, hurst=0.8, rms_slope=0.1, amplitudes="gaussian", seed=7), "periodic"),
+        (rv.mirror(SCAN), "periodic"),
+        (rv.mirror(BALL), "periodic"),
+        (rv.band_limit(rv.mirror(SCAN), (32, 32)), "periodic"),
+        (SCAN, None),
+        (xr.zeros_like(SCAN), None),
+        (rv.taper(SCAN, 1e-4), None),
+        (rv.taper(ROUGH, 1e-4), None),
+        (rv.taper(BALL, 1e-4), None),
+    ],
+)
+def test_boundary__is_the_one_that_a_surface_was_made_for(height, expected):
+    assert boundary_of(height) == expected
+
+
+@pytest.mark.parametrize(
+    "height",
+    [
+        BALL + 1e-6,
+        2 * BALL,
+        BALL + ROUGH,  # a rough ball has the period among its attributes still, and its borders meet
+        ROUGH + BALL,
+        WAVES + BALL,
+        ROUGH + BALL.values,
+        ROUGH * 2,
+        ROUGH[:, 1:],
+        WAVES[:-1],
+        rv.level(ROUGH),
+        rv.resample(ROUGH, (12, 10)),
+        rv.combine(ROUGH, ROUGH),
+        rv.combine(BALL, BALL),
+        rv.mirror(SCAN)[1:],
+        rv.mirror(SCAN) + rv.mirror(BALL),
+        rv.mirror(SCAN) * (1 + rv.mirror(SCAN).x),
+        rv.level(rv.mirror(SCAN) + rv.mirror(SCAN).x.values[:, None], 1),
+        rv.self_affine(SIDE, SHAPE, hurst=0.8, rms_height=1e-6, seed=np.random.default_rng(1)),
+        BALL.assign_attrs(recipe="{}"),
+        BALL.assign_attrs(recipe=3),
+    ],
+)
+def test_boundary__of_what_was_changed_has_to_be_said(height):
+    assert boundary_of(height) is None
+
+
+def test_boundaries__are_those_of_all_recipes():
+    assert BOUNDARIES.keys() == RECIPES.keys()
+    made = {"sphere": BALL, "cone": TIP, "flat_punch": PUNCH, "wavy": WAVES, "self_affine": ROUGH}
+    assert {name: boundary_of(height) for name, height in made.items()} == BOUNDARIES
+
+
+@pytest.mark.parametrize(
+    ("steps", "made", "expected"),
+    [
+        ({}, "free", "free"),
+        ({}, None, None),
+        ({"level": False, "mirror": False}, "periodic", "periodic"),
+        ({"level": 0}, "free", None),
+        ({"level": 1}, "periodic", None),
+        ({"taper": 1e-4}, "periodic", None),
+        ({"mirror": True}, None, "periodic"),
+        ({"realisation": 2}, None, "periodic"),
+        ({"realisation": 2, "taper": 1e-4}, "free", None),
+        ({"crop": {}, "realisation": 2, "resample": 8}, None, "periodic"),
+        ({"resample": 8}, "free", None),
+        ({"resample": 8}, "periodic", "periodic"),
+        ({"resample": 8}, None, None),
+        ({"level": 1, "taper": 1e-4, "mirror": True}, "free", "periodic"),
+    ],
+)
+def test_boundary_after__trusts_nothing_but_an_untouched_recipe_and_mirror_images(steps, made, expected):
+    assert boundary_after(steps, made) == expected
+
+
+@pytest.mark.parametrize("height", [ROUGH, WAVES])
+def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
+    values = {"rotate90": 1, "invert": True, "shortest_wave": 4e-4, "band_limit": [8, 8], "resample": [12, 10]}
+    values |= {"realisation": 2, "mirror": True, "level": 1, "filter": 3e-4, "crop": {"x": [0, 5e-4]}}
+    for step, value in values.items():
+        found = is_periodic(condition(height, {step: value}))
+        assert (boundary_after({step: value}, "periodic") == "periodic") == found, step
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [("", "free"), ("[conditioning]\nmirror = true", "periodic"), ("[conditioning]\nlevel=1", None)],
+)
+def test_card__says_by_its_text_what_its_heights_say(tmp_path, steps, expected):
+    path = tmp_path / "ball.toml"
+    path.write_text(f'generate = "sphere"\nradius = "1 cm"\nsize = "1 mm"\nshape = [12, 10]\n{steps}\n')
+    assert boundary_of_card(path) == boundary_of(open_card(path)) == expected
