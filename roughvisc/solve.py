@@ -107,7 +107,7 @@ def _solve_once(
     with fft.set_workers(threads), retain_arena(8 * problem.height.size):
         rows = experiment.rows(problem, reached.state, in_memory=recorder.in_memory)
         if reached.state is not None:
-            log.info("goes on after %s", experiment.progress(reached.done, rows.end))
+            log.info("resumes after %s", experiment.progress(reached.done, rows.end))
             reached = replace(reached, state=None)
         with reused(), reporting(progress, experiment.doing, at=experiment.progress) as report:
             for row in rows:

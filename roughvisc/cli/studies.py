@@ -94,7 +94,7 @@ def _run_one(
     if is_result_of(case, result_path(folder, case.key), same_bits):
         console.print("Finished before: nothing has to be computed")
         if not is_writable(folder):
-            complain(f"{folder}: may not be written to: the finished result is shown, and nothing is written")
+            complain(f"{folder}: is not writable: the finished result is shown, and nothing is written")
             plots = False
     else:
         require_writable(folder, "since the case is not finished")

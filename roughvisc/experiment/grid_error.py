@@ -116,7 +116,7 @@ def with_grid_error(
     try:
         few = coarser(height, 2.0, dataset.attrs["boundary"])
         if few.size == height.size:
-            raise RoughviscError(f"{height.shape[0]} x {height.shape[1]} cells are the fewest that there can be")
+            raise RoughviscError(f"{height.shape[0]} x {height.shape[1]} cells cannot be coarsened")
         second = press_again(few, places)
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)

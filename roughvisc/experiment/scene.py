@@ -149,12 +149,12 @@ def check_times(program: Program, time_step: float | Literal["auto"]) -> None:
             )
         if shortest < least:
             raise InputError(
-                f"program.{i}: {what} lasts {shortest:g} s where time has reached {end:g} s, which is known to "
+                f"program.{i}: {what} lasts {shortest:g} s where time has reached {end:g} s, which has a resolution of "
                 f"{math.ulp(end):.2g} s: expected at least {least:.2g} s"
             )
     if time_step != "auto" and time_step < 4 * math.ulp(program.duration):
         raise InputError(
-            f"time_step is {time_step!r} s and the program ends at {program.duration:g} s, which is known to "
+            f"time_step is {time_step!r} s and the program ends at {program.duration:g} s, which has a resolution of "
             f"{math.ulp(program.duration):.2g} s: expected a longer step"
         )
 
@@ -168,7 +168,7 @@ def check_loads(
     ------
     InputError
         If the load is beyond what can be computed with, or presses a periodic surface so far past full contact that
-        the pressure's variation is lost in its mean.
+        rounding would hide the variation of the pressure.
     """
     load = program.largest_load
     if load > LARGEST:
@@ -180,7 +180,7 @@ def check_loads(
     if displaced > MOST_HEIGHTS * heights:
         raise InputError(
             f"the load reaches {load:g} N, which would close gaps {displaced / heights:.1g} times as high as this "
-            f"surface has: the pressure's variation is lost in its mean; expected at most "
+            f"surface has: rounding would hide the variation of the pressure; expected at most "
             f"{load * MOST_HEIGHTS * heights / displaced:.1g} N"
         )
 
@@ -207,11 +207,11 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
         )
     if settings.method != "fast":
         raise InputError(
-            f"method is {settings.method!r}, which knows no motion along the surface, and the program slides: expected "
+            f"method is {settings.method!r}, which does not model sliding, and the program slides: expected "
             "method = 'fast'"
         )
     if program.segments[0].slide is not None:
-        raise InputError("program.0 slides and nothing is pressed yet: expected load, pressure or approach before it")
+        raise InputError("program.0 slides before there is a load: expected load, pressure or approach before it")
     for number, segment in enumerate(program.segments):
         if segment.slide is not None:
             try:

@@ -95,7 +95,7 @@ class SlidingGrid:
         """
         gap, shortest = without_last_octave(self.gap, self.spacing)
         if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
-            raise InputError("height has no waves beyond its shortest octave: expected last_octave = False")
+            raise InputError("height has no wavelengths above its shortest octave: expected last_octave = False")
         return SlidingGrid(gap, self.spacing, self.kernel), shortest
 
     def coarser(self, factor: float) -> SlidingGrid | None:
@@ -171,7 +171,7 @@ class CoarserFaces:
         self._spacing = face.spacing
         self.faces = [coarse for coarse in (face.coarser(2.0), face.coarser(4.0)) if coarse is not None]
         if not self.faces:
-            log.warning("no grid error: %d x %d cells are the fewest that there can be", *face.gap.shape)
+            log.warning("no grid error: %d x %d cells cannot be coarsened", *face.gap.shape)
             return
         self._ratio = max(many / few for many, few in zip(face.gap.shape, self.faces[0].gap.shape, strict=True))
         if self.faces[-1].gap.size == self.faces[0].gap.size:

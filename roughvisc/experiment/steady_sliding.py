@@ -191,7 +191,7 @@ class SlidingRows(Rows):
         self._profile = Profile(problem.height, "refuse", kernel=term.kernel)
         require_memory_of_curve((self._profile.gap.shape[0], self._profile.gap.shape[1]), problem.settings)
         if not self._profile.present.all():  # of a punch, which says so itself
-            raise InputError("height is missing at some points: expected a whole surface, which repeats without end")
+            raise InputError("height is missing at some points: expected none, because the surface repeats")
         super().__init__(self._profile.height, (), float(len(curve.asked)), self._profile.highest)
         self._turn = AxisTransform.of(curve.direction)
         self._force = curve.force(self._profile.nominal_area)

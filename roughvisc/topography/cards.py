@@ -57,8 +57,8 @@ def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.Dat
     """
     path = Path(path)
     if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
-        raise InputError(f"{path}: found {named} beside a surface card: expected it in the card")
-    card = read_toml(path, "surface card in TOML")
+        raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
+    card = read_toml(path, "a surface card in TOML")
     try:
         if ("file" in card) == ("generate" in card):
             raise InputError(
@@ -90,13 +90,13 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         line = 1 + error.object[: error.start].count(b"\n")
-        where = f"line {line} holds a byte that is no UTF-8"
+        where = f"line {line} contains a byte that is not UTF-8"
         found = "it is in UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else where
-        raise InputError(f"{path}: is no {wanted}: {found}: expected a text in UTF-8") from error
+        raise InputError(f"{path}: is not {wanted}: {found}: expected a text in UTF-8") from error
     except ValueError as error:  # of TOML, of an integer of thousands of digits
-        raise InputError(f"{path}: is no {wanted}: {error}") from error
+        raise InputError(f"{path}: is not {wanted}: {error}") from error
     except RecursionError as error:
-        raise InputError(f"{path}: is no {wanted}: it is nested too deeply") from error
+        raise InputError(f"{path}: is not {wanted}: it is nested too deeply") from error
 
 
 def generate(table: Mapping[str, Any]) -> xr.DataArray:

@@ -216,13 +216,13 @@ def _chosen(opened: Opened, channel: int | str | None) -> Channel:
         preferred = [c for c in heights if c.index == opened.default] + heights
         if not preferred:
             profiles = [c for c in opened.channels if len(c.shape) == 1 or 1 in c.shape]
-            kind = "a profile, which is no areal scan" if profiles else "no areal height"
+            kind = "a profile, not an areal scan" if profiles else "no areal height"
             raise InputError(f"it holds {kind} (channels {listed or 'none'}): expected heights over x and y")
         return preferred[0]
     for c in opened.channels:
         if channel == c.name or (isinstance(channel, int) and channel == c.index):
             if not c.is_height:
-                raise InputError(f"channel {channel!r} is no areal height: expected another of {listed}")
+                raise InputError(f"channel {channel!r} is not an areal height: expected another of {listed}")
             return c
     raise InputError(f"channel is {channel!r}: expected one of {listed}")
 

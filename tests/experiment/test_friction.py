@@ -183,7 +183,7 @@ def test_last_octave__is_the_change_from_a_surface_without_it():
     found, less = friction_whole(two, RUBBER, **press, last_octave=True), friction_whole(long, RUBBER, **press)
     np.testing.assert_allclose(found.last_octave_area, 1 - less.contact_area / found.contact_area, rtol=1e-9)
     assert (found.last_octave_area < -0.1).all(), "finer roughness takes area away"
-    with pytest.raises(rv.InputError, match="no waves beyond its shortest octave"):
+    with pytest.raises(rv.InputError, match="no wavelengths above its shortest octave"):
         friction_whole(long, RUBBER, **press, last_octave=True)
 
 
@@ -240,7 +240,7 @@ def test_friction__refuses(settings, message):
 def test_missing_points_and_fluids__are_refused():
     with pytest.raises(rv.InputError, match="height is missing"):
         friction_whole(ROUGH.where(ROUGH.x > 1e-4), RUBBER, **PRESS)
-    with pytest.raises(rv.InputError, match="expected a whole surface"):
+    with pytest.raises(rv.InputError, match="expected none, because the surface repeats"):
         friction_whole(rv.flat_punch(1e-4, 4e-4, 15), RUBBER, **PRESS)
     with pytest.raises(rv.InputError, match="creeps without end"):
         friction_whole(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)

@@ -114,7 +114,7 @@ def test_plan__warns_of_full_contact_in_megapascals(tmp_path):
     study.write_text(STUDY.replace('pressure = "20 kPa"', 'load = "2 N"'))
     costs = rv.plan(study)
     assert float(costs.nominal_pressure[0]) == pytest.approx(2 / 2e-8)
-    assert "Full contact is foreseen: the nominal pressure comes to 100 MPa." in printed(plan_tables(costs))
+    assert "Full contact is expected: the nominal pressure comes to 100 MPa." in printed(plan_tables(costs))
     study.write_text(STUDY)
     costs = rv.plan(study)
     assert float(costs.nominal_pressure[0]) == pytest.approx(2e4)

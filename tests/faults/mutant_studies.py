@@ -471,7 +471,7 @@ def close(said, taken, tolerance=1e-13):
 def names_key(message, path, raw):
     """Whether a refusal names a line of the file, or begins with a key; each of its lines where it has several."""
     lines = message.split("\n")
-    if "is no valid TOML" in lines[0]:
+    if "is not valid TOML" in lines[0]:
         return bool(re.search(r"line \d+|end of document|UTF-16", lines[0]))
     said = [line.strip().removeprefix(f"{path}: ") for line in lines]
     if len(said) > 1:

@@ -220,10 +220,10 @@ def test_quantity_said__is_that_of_the_units_by_hand():
         ("-eep: unknown key; did you mean 'keep'?", True),
         ("surface: the scan is flat", True),
         ("2 problems\n  keep.times: found -1: expected more\n  -eep: unknown key", True),
-        ("is no valid TOML: Invalid value (at line 3, column 1)", True),
+        ("is not valid TOML: Invalid value (at line 3, column 1)", True),
         ("the load is below zero", False),
         ("2 problems\n  keep.times: found -1\n  nothing: found -1", False),
-        ("is no valid TOML: it cannot be decoded", False),
+        ("is not valid TOML: it cannot be decoded", False),
     ],
 )
 def test_names_key__wants_a_line_or_a_key_of_the_study(message, named):

@@ -51,7 +51,7 @@ def test_sweep__on_a_disk_that_may_only_be_read(study, tmp_path, small_disk, inv
     status, out, err = invoke("run", study, "--out", folder, "-q")
     assert (status, out) == (2, "")
     why = "since there are cases to compute (1 of 2)"
-    assert err.endswith(f"disk: may not be written to: expected a folder with write permission, {why}\n")
+    assert err.endswith(f"disk: is not writable: expected a folder with write permission, {why}\n")
     assert err.count("\n") == 1
     with pytest.raises(OSError, match="Read-only file system"):
         run_case(second, folder)
@@ -81,11 +81,11 @@ def test_run__serves_what_is_finished_on_a_disk_that_may_only_be_read(study, tmp
     remount("ro")
     status, out, err = invoke("run", study, "--out", folder)
     assert (status, err) == (0, "")
-    assert out.count(f"{folder}: may not be written to: all cases are finished, and nothing is written\n") == 1
+    assert out.count(f"{folder}: is not writable: all cases are finished, and nothing is written\n") == 1
     assert "2, all before: nothing had to be computed" in out
     status, out, err = invoke("run", one, "--out", folder)
     assert (status, err.count("\n")) == (0, 1)
-    assert "may not be written to: the finished result is shown, and nothing is written" in err
+    assert "is not writable: the finished result is shown, and nothing is written" in err
     assert "Figure" not in out
     xr.testing.assert_equal(whole_of(rv.sweep(study, folder, progress=False)).drop_vars("wall_time").load(), wanted)
     assert float(rv.run(one, folder, progress=False).force[-1]) == pytest.approx(5e-3)
@@ -93,7 +93,7 @@ def test_run__serves_what_is_finished_on_a_disk_that_may_only_be_read(study, tmp
 
 @pytest.fixture
 def protected(monkeypatch):
-    """Has a folder be one that may not be written to by its permissions, which do not stop everybody."""
+    """Has a folder be one that is not writable by its permissions, which do not stop everybody."""
     access = os.access
 
     def protect(folder):
@@ -123,7 +123,7 @@ def test_run__writes_nothing_where_it_may_not(study, tmp_path, invoke, protected
     study.write_text(TWO_LOADS.replace("4 mN", "6 mN"))
     status, out, err = invoke("run", study, "--out", folder, "-q")
     assert (status, out) == (2, "")
-    refusal = f"roughvisc: {folder}: may not be written to: expected a folder with write permission"
+    refusal = f"roughvisc: {folder}: is not writable: expected a folder with write permission"
     assert err == f"{refusal}, since there are cases to compute (1 of 2)\n"
     one.write_text(one.read_text().replace("5 mN", "7 mN"))
     status, out, err = invoke("run", one, "--out", folder, "-q")

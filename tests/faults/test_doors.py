@@ -58,9 +58,9 @@ def test_sweep__is_refused_by_the_product_of_its_lengths(study):
         ('[0, "0.1 s", "200 ms"]', "1000000000", r"keep\.times: found 1000000000: expected a whole number"),
         ("level = 0", f"level = 1{'0' * 400}", r"surface\.level.*found 1000000.*\.\.\."),
         ('"5 mN"', f"1{'0' * 400}", r"program\.0\.load: found 1000.*\.\.\.: expected a number in N.*finite"),
-        ('"5 mN"', f"1{'0' * 5000}", r"is no valid TOML: Exceeds the limit"),
+        ('"5 mN"', f"1{'0' * 5000}", r"is not valid TOML: Exceeds the limit"),
         ('"5 mN"', f'"{"9" * 5000} mN"', r"program\.0\.load: found '999[9]{1,60}\.\.\., which is no quantity"),
-        ("level = 0", f"level = {'[' * 3000}{']' * 3000}", r"is no valid TOML: it is nested too deeply"),
+        ("level = 0", f"level = {'[' * 3000}{']' * 3000}", r"is not valid TOML: it is nested too deeply"),
     ],
 )
 def test_study__sizes_are_bounded_before_anything_is_allocated(study, old, new, expected):

@@ -205,5 +205,5 @@ def test_slightly_different_spacing__is_never_aligned_silently(tmp_path):
 
 def test_card__refuses_options_that_belong_in_it(tmp_path):
     path = card(tmp_path, 'generate = "sphere"\nradius = 1\nsize = 1e-6\nshape = 4\n')
-    with pytest.raises(InputError, match=r"card\.toml: found unit=, spacing= beside a surface card"):
+    with pytest.raises(InputError, match=r"card\.toml: found unit=, spacing= together with a surface card"):
         open_scan(path, unit="um", spacing=1e-6)

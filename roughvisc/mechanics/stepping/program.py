@@ -491,7 +491,7 @@ class Program:
                 stated_quantity(value, unit, f"table.values.{row}"),
             )
             if not now >= before:
-                raise InputError(f"table row {row}: time {time!r} s after {before!r} s: expected ascending times")
+                raise InputError(f"table row {row}: time {time!r} s after {before!r} s: expected increasing times")
             if row or end:
                 segments.append(Segment(control, now - before, end))
             before = now

@@ -18,7 +18,7 @@ NEARLY_FULL = 0.9
 def border_warning(shape: tuple[int, ...]) -> str:
     """What to say of contact that reaches the border of a free surface of so many cells, where that ends a run."""
     return (
-        f"Contact is foreseen to reach the border of the free-space domain of {shape[0]} x {shape[1]} cells, which "
+        f"Contact is expected to reach the border of the free-space domain of {shape[0]} x {shape[1]} cells, which "
         "ends a run: use boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = "
         "'accept' to press it as a punch of that outline."
     )
@@ -79,6 +79,6 @@ def full_contact_warning(pressure: float, full: float) -> str:
     if not pressure >= full > 0:
         return ""
     return (
-        f"Full contact is foreseen: the nominal pressure comes to {pressure / 1e6:.3g} MPa. At {full / 1e6:.3g} MPa "
+        f"Full contact is expected: the nominal pressure comes to {pressure / 1e6:.3g} MPa. At {full / 1e6:.3g} MPa "
         "more than 95 % of the area is in contact (Persson: modulus at the end of the program times rms slope)."
     )

@@ -74,7 +74,7 @@ def _named_by(path: Path) -> str | None:
     if path.suffix.lower() != ".toml":
         return None
     try:
-        named = read_toml(path, "surface card in TOML").get("file")
+        named = read_toml(path, "a surface card in TOML").get("file")
     except InputError:
         return None  # it is refused where it is opened
     return named if isinstance(named, str) and not Path(named).is_absolute() else None

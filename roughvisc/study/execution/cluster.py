@@ -213,7 +213,7 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
     if (address is None) == (file is None):
         raise InputError("found both an address and a file of the scheduler: expected one of them")
     if file is not None and not file.is_file():
-        raise InputError(f"{file}: does not exist: expected what dask scheduler --scheduler-file wrote")
+        raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
     try:
         where = {"address": address} if file is None else {"scheduler_file": str(file)}
         client = Client(**where, set_as_default=False, timeout="20s")

@@ -190,7 +190,7 @@ class _Dispatch:
             if outcome.kind != "interrupted":
                 self.book.ended(outcome)
             elif going_on:
-                log.info("%s: goes on on another worker", key)
+                log.info("%s: resumes on another worker", key)
                 self.waiting.append(key)
 
 
@@ -309,8 +309,8 @@ def _go_on(cases: _Dispatch) -> None:
             cases.book.tell(
                 f"the cluster has had no worker for {looked - seen:.0f} s "
                 f"({len(cases.futures) + len(cases.waiting)} cases to go): start "
-                "workers (dask worker), or see whether their jobs still queue (squeue); the cases go on as soon as "
-                "one is there. Ctrl-C ends the sweep: what was computed is kept, and the same command goes on"
+                "workers (dask worker), or check whether their jobs are queued (squeue); the cases start as soon as "
+                "one joins. Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
             )
 
 
@@ -365,10 +365,10 @@ def _outcome(key: str, result: Any, course: _CaseStatus) -> Outcome:
             key,
             "hindered",
             f"the worker that computed it was lost {course.tries} times, the last at {result.last_worker.address}: "
-            "killed, out of memory (roughvisc plan says how much a case needs), or out of its time; the same command "
-            "goes on from the last checkpoint",
+            "killed, out of memory (roughvisc plan says how much a case needs), or out of time; repeat the command to "
+            "resume from the last checkpoint",
             "KilledWorker",
         )
     if isinstance(result, CancelledError | concurrent.futures.CancelledError):
-        raise RoughviscError("the scheduler was lost: what was finished is kept, and the same command goes on")
+        raise RoughviscError("the scheduler was lost: finished results are kept; repeat the command to resume")
     return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)

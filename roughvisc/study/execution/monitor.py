@@ -243,7 +243,7 @@ class SweepLog:
         self.watch.message(message)
 
     def save(self) -> None:
-        """Write the index and the table of the folder, unless it may not be written to."""
+        """Write the index and the table of the folder, unless it is not writable."""
         self.saved = time.monotonic()
         if not is_writable(self.folder):
             return

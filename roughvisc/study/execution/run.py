@@ -258,7 +258,7 @@ def set_aside_damaged(case: Case, folder: Path) -> str:
     with suppress(InUseError, OSError), lock_case(lock_path(folder, case.key), patience=0.0):
         if path.exists() and (problem := _problem(case, path)):
             quarantine(path, problem)
-            return f"{problem}; it is set aside as {path.name}.damaged"
+            return f"{problem}; it is renamed to {path.name}.damaged"
     return ""
 
 

@@ -208,13 +208,13 @@ def run_cases(
 def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], writable: bool) -> None:
     """Say what there is to say of the folder before anything is computed, each thing once."""
     if not writable:
-        book.tell(f"{book.folder}: may not be written to: all cases are finished, and nothing is written")
+        book.tell(f"{book.folder}: is not writable: all cases are finished, and nothing is written")
     if told := upgrade_note(book.folder, list(todo.values()), index):
         book.tell(told)
     problems = dict(index.problems)
     for key in index.problems.keys() & todo.keys():
         if told := set_aside_damaged(todo[key], book.folder):
-            book.watch.message(f"{told}, and computed anew")
+            book.watch.message(f"{told} and computed again")
             del problems[key]
     warn_of(book.folder, problems)
 

@@ -189,7 +189,7 @@ def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
     if falls.size:
         at = int(falls[0]) + 1
         raise InputError(
-            f"{path}, line {lines[at]}: time {times[at]:g} s after {times[at - 1]:g} s: expected ascending times"
+            f"{path}, line {lines[at]}: time {times[at]:g} s after {times[at - 1]:g} s: expected increasing times"
         )
     crowded = np.flatnonzero(times[2:] == times[:-2])
     if crowded.size:

@@ -94,7 +94,7 @@ def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
     path = Path(stated.pop("file"))
     if path.suffix.lower() != ".toml":
         return _checksum(path), stated
-    card = read_toml(path, "surface card in TOML")
+    card = read_toml(path, "a surface card in TOML")
     stated["card"] = {key: value for key, value in card.items() if key not in _PROSE and key != "file"}
     if isinstance(card.get("file"), str):
         return _checksum(path.parent / card["file"]), stated

@@ -130,9 +130,7 @@ def verify_checksum(path: Path) -> bool:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}: expected a result") from error
     if found:
-        raise InputError(
-            f"{path}: is damaged: {found}: the run that it is the result of sets it aside and computes it anew"
-        )
+        raise InputError(f"{path}: is damaged: {found}: repeat the run to compute it again")
     if not sealed:
         warn_once(path, f"{path}: {UNSEALED}")
     return sealed

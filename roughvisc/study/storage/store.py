@@ -123,11 +123,11 @@ def require_writable(folder: Path, why: str = "") -> None:
     Raises
     ------
     FolderError
-        If there is none and none can be made, or it may not be written to; with the reason that is given.
+        If there is none and none can be made, or it is not writable; with the reason that is given.
     """
     if not is_writable(folder):
         needed = f", {why}" if why else ""
-        raise FolderError(f"{_nearest(folder)}: may not be written to: expected a folder with write permission{needed}")
+        raise FolderError(f"{_nearest(folder)}: is not writable: expected a folder with write permission{needed}")
 
 
 def _nearest(folder: Path) -> Path:
@@ -170,7 +170,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
     if not os.access(path.parent, os.W_OK):
-        raise FolderError(f"{path.parent}: may not be written to: expected a folder with write permission")
+        raise FolderError(f"{path.parent}: is not writable: expected a folder with write permission")
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     try:
         yield temporary
@@ -352,9 +352,9 @@ def quarantine(path: Path, problem: str) -> None:
     news = is_news(path, problem)
     os.replace(path, aside)
     if news:
-        log.warning("%s; it is set aside as %s, and computed anew", problem, aside.name)
+        log.warning("%s; it is renamed to %s and computed again", problem, aside.name)
     else:
-        log.info("%s: is set aside as %s, and computed anew", path, aside.name)
+        log.info("%s: is renamed to %s and computed again", path, aside.name)
 
 
 def open_result(path: str | Path, *, group: str = "") -> xr.Dataset:
@@ -405,7 +405,7 @@ def _stored(path: str | Path) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(
-            f"{path}: is no NetCDF file, or is damaged: expected a result of roughvisc ({error})"
+            f"{path}: is not a NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
     try:
         if format_of(dataset.variables, dataset.attrs) < RESULT_FORMAT:

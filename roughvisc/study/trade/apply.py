@@ -48,7 +48,7 @@ def apply(path: str | Path, tables: Mapping[str, Mapping[str, Any]]) -> str:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (TOMLKitError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no valid TOML: {error}") from error
+        raise InputError(f"{path}: is not valid TOML: {error}") from error
     done = [
         f"{name}.{key} = {value}"
         for name, keys in tables.items()

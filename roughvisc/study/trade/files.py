@@ -54,7 +54,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be opened: {error}: expected a trade of roughvisc (.nc)") from error
     if "run_time" not in dataset or "quantity" not in dataset.dims:
-        raise InputError(f"{path}: is no trade: expected a file that roughvisc trade wrote")
+        raise InputError(f"{path}: is not a trade: expected a file that roughvisc trade wrote")
     return dataset
 
 
@@ -104,4 +104,4 @@ def seconds(text: str, name: str) -> float:
 def check_writable(path: Path) -> None:
     """Refuse, before anything is measured, a study that could not be written back."""
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
-        raise InputError(f"{path}: may not be written to: --apply needs write permission for it and its folder")
+        raise InputError(f"{path}: is not writable: --apply needs write permission for it and its folder")

@@ -74,14 +74,14 @@ class ReferenceRun:
         if expected > allowed:
             where = f"{bench.case.origin}: " if bench.case.origin else ""
             raise InputError(
-                f"{where}surface: the run that all others are measured against would take about {expected:.3g} s, "
+                f"{where}surface: the reference run would take about {expected:.3g} s, "
                 f"more than half of the {bench.left:.0f} s allowed: give a larger budget, or resample the surface"
             )
         try:
             self.run: Run = bench.run(self._setting)
         except NotRun as error:
             where = f"{bench.case.origin}: " if bench.case.origin else ""
-            raise InputError(f"{where}the run that all others are measured against: {error}") from error
+            raise InputError(f"{where}the reference run: {error}") from error
         self.name = f"finest run: {bench.label(self._setting)}"
         self.time, self.grid = self._uncertainties()
 

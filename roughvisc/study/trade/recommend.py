@@ -147,7 +147,7 @@ def shortfall(dataset: xr.Dataset, quantity: str, target: float) -> str:
     if not np.isfinite(unsure):
         return "cannot be told, the finest run's own accuracy is not known"
     if unsure >= target:
-        return f"cannot be told, the finest run itself is known to {percent(unsure)}"
+        return f"not possible, the uncertainty of the finest run is {percent(unsure)}"
     errors = dataset["error"].sel(quantity=quantity).values
     if dataset.attrs.get("grid_is_data"):
         errors = np.where(dataset["coarsening"].values == 1, errors, np.nan)

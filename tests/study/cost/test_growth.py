@@ -181,7 +181,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
     accepted = vary(rough, {"solve.edge": "accept"})
     costs = rv.plan([rough, accepted])
     assert list(costs.border_warning.values != "") == [True, False]
-    assert "Warning: Contact is foreseen to reach the border of the free-space domain of 40 x 36 cells" in said_of(
+    assert "Warning: Contact is expected to reach the border of the free-space domain of 40 x 36 cells" in said_of(
         costs
     )
     with pytest.raises(EdgeContactError):
@@ -195,6 +195,6 @@ def test_grid_that_would_grow_too_large__is_foreseen(study, monkeypatch):
     case = study(HEAD + GROWING["mirrored"])
     costs = rv.plan([case])
     assert (int(costs.final_cells_x[0]), int(costs.final_cells_y[0])) == (36, 36)
-    assert "Contact is foreseen to reach the border" in costs.border_warning.item()
+    assert "Contact is expected to reach the border" in costs.border_warning.item()
     with pytest.raises(EdgeContactError):
         run_whole(case, progress=False)

@@ -254,7 +254,7 @@ def test_sweep__gives_up_for_now_a_case_whose_workers_die(study, tmp_path, by_ha
     cases = study(LONG + LOADS)[:2]
     with connect(file=by_hand) as client:
         killed = kill_working(client, times=2)
-        with pytest.raises(RoughviscError, match=r"none of 1 cases .* was lost 2 times.* the same command goes on"):
+        with pytest.raises(RoughviscError, match=r"none of 1 cases .* was lost 2 times.* repeat the command to resume"):
             sweep(cases[:1], tmp_path / "out", client, progress=False)
         killed.join()
         client.wait_for_workers(2, timeout=60)

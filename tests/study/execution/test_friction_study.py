@@ -101,7 +101,7 @@ def test_run__interrupted_goes_on_with_the_same_bits(case, tmp_path, caplog):
     told = []
     with caplog.at_level(logging.INFO, "roughvisc"):
         run_case(one, tmp_path / "out", progress=lambda now, end: told.append((now, end)))
-    assert "goes on after speed 2 of 4" in caplog.text
+    assert "resumes after speed 2 of 4" in caplog.text
     assert told == [(3.0, 4.0), (4.0, 4.0)], "two speeds are not computed again"
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "whole"))
     assert [p.name for p in (tmp_path / "out").iterdir()] == [f"{one.key}.nc"], "nothing else is left"

@@ -372,7 +372,7 @@ def test_program__table_from_csv(study, tmp_path, rows):
         ("0, 0\n1", "line 2: found 1 columns: expected a number for load"),
         ("", "holds no rows: expected columns time, load"),
         ("0, 0\n1, -2\n2, 3", "load, table row 1: found -2.0: expected a number in N"),
-        ("0, 0\n2, 1\n1, 3", "table row 2: time 1.0 s after 2.0 s: expected ascending times"),
+        ("0, 0\n2, 1\n1, 3", "table row 2: time 1.0 s after 2.0 s: expected increasing times"),
     ],
 )
 def test_program__table_from_bad_csv(study, tmp_path, rows, found):
@@ -474,7 +474,7 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit
 
 [surface]  =>  [keep]\nfields = ['presure']\n[surface]
-| keep.fields: found 'presure', which is no field; did you mean 'pressure'?
+| keep.fields: found 'presure', which is not a field; did you mean 'pressure'?
 
 [surface]  =>  [keep]\ntimes = [1, '6 s']\n[surface]
 | keep.times: found 6 s: expected times up to the end of the program, 5.05 s
@@ -556,22 +556,22 @@ def test_read_study__refuses_a_file_that_is_not_there(study, tmp_path):
     assert message == f"surface.file: found 'gone.sur', which does not exist: expected a file ({tmp_path / 'gone.sur'})"
     assert refusal(tmp_path / "none.toml") == "does not exist: expected a study file (TOML)"
     (tmp_path / "bad.toml").write_text("title = ")
-    assert refusal(tmp_path / "bad.toml").startswith("is no valid TOML: Invalid value (at end of document)")
+    assert refusal(tmp_path / "bad.toml").startswith("is not valid TOML: Invalid value (at end of document)")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    assert refusal(tmp_path / "binary.toml").startswith("is no valid TOML")
+    assert refusal(tmp_path / "binary.toml").startswith("is not valid TOML")
 
 
 @pytest.mark.parametrize(
     ("content", "found"),
     [
-        ('title = "a"\r\nsize = "5 µm"\n'.encode("cp1252"), "line 2 holds a byte that is no UTF-8: expected a text"),
+        ('title = "a"\r\nsize = "5 µm"\n'.encode("cp1252"), "line 2 contains a byte that is not UTF-8: expected a"),
         ('title = "a"'.encode("utf-16"), "it is in UTF-16: expected a text in UTF-8"),
     ],
 )
 def test_read_study__names_what_is_no_utf_8(tmp_path, content, found):
     path = tmp_path / "study.toml"
     path.write_bytes(content)
-    assert refusal(path).startswith(f"is no valid TOML: {found}")
+    assert refusal(path).startswith(f"is not valid TOML: {found}")
 
 
 def test_read_study__refuses_a_program_of_another_kind(study):
@@ -589,7 +589,7 @@ def test_read_study__refuses_a_program_of_another_kind(study):
         )
     )
     assert "program.0: load reaches -1.0 N: expected no negative load" in message
-    assert "program.1: table row 2: time 1.0 s after 2.0 s: expected ascending times" in message
+    assert "program.1: table row 2: time 1.0 s after 2.0 s: expected increasing times" in message
 
 
 def test_read_cases__product(study):

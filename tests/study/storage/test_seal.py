@@ -100,10 +100,10 @@ def test_damaged_result__is_warned_of_once(tmp_path, caplog):
         return [one.getMessage() for one in caplog.records if f"{result}: is damaged" in one.getMessage()]
 
     (message,) = warned_by(lambda: run_whole(cases[0], out, progress=False))
-    assert message.endswith(f"; it is set aside as {cases[0].key}.nc.damaged, and computed anew")
+    assert message.endswith(f"; it is renamed to {cases[0].key}.nc.damaged and computed again")
     assert len(warned_by(lambda: [rv.open_results(out), rv.open_results(out), rv.to_table(out)])) == 1
     (message,) = warned_by(lambda: sweep(cases, out, workers=0, progress=False))
-    assert message.endswith(f"; it is set aside as {cases[0].key}.nc.damaged, and computed anew")
+    assert message.endswith(f"; it is renamed to {cases[0].key}.nc.damaged and computed again")
 
 
 def test_seal__tells_every_changed_bit_and_every_cut(result):
@@ -113,11 +113,11 @@ def test_seal__tells_every_changed_bit_and_every_cut(result):
         damaged = whole.copy()
         damaged[at] ^= 1 << rng.integers(8)
         damaged.tofile(result)
-        with pytest.raises(InputError, match=r"result\.nc: is (damaged|no NetCDF file, or is damaged)"):
+        with pytest.raises(InputError, match=r"result\.nc: is (damaged|not a NetCDF file, or is damaged)"):
             whole_result(result)
     for length in rng.integers(len(whole), size=20):
         whole[:length].tofile(result)
-        with pytest.raises(InputError, match=r"result\.nc: is (damaged|no NetCDF file, or is damaged)"):
+        with pytest.raises(InputError, match=r"result\.nc: is (damaged|not a NetCDF file, or is damaged)"):
             whole_result(result)
     whole[:-24].tofile(result)  # all but the seal: every value is there
     with whole_result(result) as ds:
@@ -136,7 +136,7 @@ def test_run__sets_a_damaged_result_aside_and_computes_it_anew(tmp_path, caplog)
     xr.testing.assert_equal(again.drop_vars("wall_time"), first.drop_vars("wall_time"))
     assert (result.parent / f"{result.name}.damaged").read_bytes() == damaged
     assert f"{result}: is damaged: its bytes are not those that were written" in caplog.text
-    assert "is set aside" in caplog.text
+    assert "is renamed to" in caplog.text
 
 
 def test_sweep__computes_a_damaged_result_anew(tmp_path):

@@ -122,11 +122,11 @@ def test_open_result__refuses_what_is_none(tmp_path):
     with pytest.raises(InputError, match="is a folder"):
         whole_result(tmp_path)
     (tmp_path / "text.nc").write_text("hello")
-    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+    with pytest.raises(InputError, match="is not a NetCDF file, or is damaged"):
         whole_result(tmp_path / "text.nc")
     whole = write_result(hertz_creep((30, 40), 4), tmp_path / "whole.nc").read_bytes()
     (tmp_path / "torn.nc").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="is no NetCDF file, or is damaged"):
+    with pytest.raises(InputError, match="is not a NetCDF file, or is damaged"):
         whole_result(tmp_path / "torn.nc")
     xr.Dataset({"rain": ("time", np.arange(3.0))}).to_netcdf(tmp_path / "weather.nc")
     with pytest.raises(InputError, match="holds no time, force, approach: expected a result of roughvisc"):

@@ -133,7 +133,7 @@ def test_expected_time__counts_the_window_and_not_the_whole_domain(tmp_path):
 
 
 def test_reference__that_would_take_too_long_is_refused(tmp_path):
-    with pytest.raises(rv.InputError, match=r"study\.toml: surface: the run that all others are measured against"):
+    with pytest.raises(rv.InputError, match=r"study\.toml: surface: the reference run"):
         measured(case_of(tmp_path, ROUGH), Setting(1e-2), budget=1e-6)
 
 
@@ -382,7 +382,7 @@ def test_trade__is_labelled_and_survives_its_file(tmp_path):
     assert again.attrs["recommendation"] == ds.attrs["recommendation"]
     with xr.open_dataset(tmp_path / "trade.nc") as plain:
         assert len(rv.plot.trade(plain).axes) == 2
-    with pytest.raises(rv.InputError, match="is no trade"):
+    with pytest.raises(rv.InputError, match="is not a trade"):
         open_trade(write_trade(ds[["error"]], tmp_path / "other.nc"))
     with pytest.raises(rv.InputError, match="cannot be opened"):
         open_trade(tmp_path / "nowhere.nc")

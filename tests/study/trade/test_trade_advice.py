@@ -130,7 +130,7 @@ def test_words__say_what_is_short():
     text = made_up(MADE_UP[:1]).attrs["recommendation"].splitlines()[0]
     assert text.startswith("for 1 % or 0.1 % on contact area: no setting measured keeps it")
     text = made_up(unsure=0.02).attrs["recommendation"].splitlines()[0]
-    assert text == "for 1 % or 0.1 % on contact area: cannot be told, the finest run itself is known to 2 %"
+    assert text == "for 1 % or 0.1 % on contact area: not possible, the uncertainty of the finest run is 2 %"
     text = made_up(grid_unsure=0.4, grid_is_data=1).attrs["recommendation"].splitlines()[-1]
     assert "changes by 0.3 % on cells 2 times as long" in text
     assert text.endswith("leaves about 40 % of it unknown")
@@ -241,7 +241,7 @@ def test_apply__follows_a_link_and_keeps_the_mode(tmp_path):
 def test_apply__refuses_what_is_no_toml(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text("tolerance = = 3")
-    with pytest.raises(rv.InputError, match=r"study\.toml: is no valid TOML"):
+    with pytest.raises(rv.InputError, match=r"study\.toml: is not valid TOML"):
         apply(path, {"solve": {"tolerance": 0.1}})
     with pytest.raises(rv.InputError, match="cannot be read"):
         apply(tmp_path / "nowhere.toml", {"solve": {"tolerance": 0.1}})

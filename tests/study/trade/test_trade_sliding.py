@@ -152,7 +152,7 @@ def test_slides__are_compared_where_whole_cells_of_all_grids_are_behind(tmp_path
 
 def test_slides__with_an_algorithm_that_knows_no_motion_say_so(tmp_path):
     ds = measured(case_of(tmp_path, SLIDES), Setting(0.1), Setting(0.1, time_step=1e-3, method="seed"))
-    assert "knows no motion along the surface" in ds.note[1].item()
+    assert "does not model sliding" in ds.note[1].item()
 
 
 def test_rows_at_other_places__are_not_compared():

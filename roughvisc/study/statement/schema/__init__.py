@@ -34,7 +34,7 @@ def _segments(value: Any, info: ValidationInfo) -> Any:
     others = [name for name in EXPERIMENTS if info.data.get(name) is not None]
     if value is not None:
         if others:
-            raise InputError(f"found beside [{others[0]}]: expected one of them: a study does one thing with a surface")
+            raise InputError(f"found together with [{others[0]}]: expected one of them: a study states one experiment")
         return tuple(a_list(value, _SEGMENTS) or a_list(None, _SEGMENTS))
     if not others and all(name in info.data for name in EXPERIMENTS):
         raise InputError(

@@ -107,7 +107,7 @@ class SlideSegment(SegmentSection):
     def extend(self, program: Program) -> Program:
         if (self.speed is None) == (self.over is None):
             found = "neither" if self.speed is None else "both"
-            raise InputError(f"a slide has a speed, or a time over which it goes: found {found}, expected one of them")
+            raise InputError(f"a slide has either a speed or a duration: found {found}, expected one of them")
         return program.slide(self.slide, speed=self.speed, over=self.over, direction=self.direction)
 
 

@@ -33,7 +33,7 @@ def _fields(value: Any) -> Any:
     names = a_list(value, wanted)
     for name in names:
         if name not in FIELDS:
-            raise InputError(f"found {shown(name)}, which is no field{nearest(name, FIELDS)}")
+            raise InputError(f"found {shown(name)}, which is not a field{nearest(name, FIELDS)}")
     return tuple(name for name in FIELDS if name in names)
 
 
