@@ -54,43 +54,41 @@ def simulate(
         that heights or coordinates state is converted; without one they are metres. The undeformed gap is
         ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Of a half-space: one of roughvisc's, or any object with the two functions that
-        :class:`roughvisc.mechanics.materials.models.Material` asks for; or a body, as :func:`roughvisc.sheet` gives
-        one. With periodic boundaries and a Poisson ratio below a half, the approach on a sheet holds its compression.
+        Material of a half-space: one of roughvisc, or any object with the two methods of
+        :class:`roughvisc.mechanics.materials.models.Material`; or a body, such as from :func:`roughvisc.sheet`. With
+        periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet includes its compression.
     program : Program
-        Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the
-        grid of heights as it is given, absent cells included; of a tapered surface, over the integral of the taper's
-        weight.
+        Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the given
+        grid, absent cells included, or for a tapered surface over the integral of the taper's weight.
     boundary : {"auto", "free", "periodic"}
         ``free`` for an indenter, ``periodic`` for a nominally flat scan. ``auto`` is ``free`` for the indenters of
         this package, and ``periodic`` for its waves, its self-affine roughness and any surface with its mirror images
-        (:func:`roughvisc.mirror`), as long as their heights are those that were made; any other surface must say.
+        (:func:`roughvisc.mirror`), as long as their heights are unchanged; any other surface needs an explicit choice.
     tolerance : float
-        Asked of ``stated_error`` at every kept time: the error that time steps, contact solver and series leave of
-        pressure (L1), force and approach, over the largest force and approach so far. Rows that miss it state by how
-        much, and ``accuracy_note`` counts them; the error of the grid comes on top.
+        Relative tolerance on ``stated_error`` at each output time: the error of pressure (L1), force and approach from
+        time steps, contact solver and exponential series, over the largest force and approach so far. Rows that exceed
+        it state their error, and ``accuracy_note`` counts them. The grid error is not included.
     times : int or sequence of float or str, optional
-        Times whose fields are kept, stepped onto exactly: a count, the corners of the program and the rest where the
-        result changes; a list; or None, all corners and every accepted step that keeps the tolerance. [s]
+        Output times, reached exactly: a number of times (the corners of the program, and the others where the result
+        changes most); a list; or None for all corners and every accepted step that meets the tolerance. [s]
     fields : sequence of str
-        Fields to keep, of ``pressure``, ``gap``, ``displacement``.
+        Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}
-        Missing heights are an error, or cells without material that never touch.
+        Whether missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
-        In free space, whether contact may reach the border of the grid. Where it is accepted, the attribute ``edge``
-        of the result says so, and ``edge_note`` when contact came to the border, where the surface acts as a punch.
+        Whether contact may reach the border of the grid in free space. With "accept" the scan outline is treated as a
+        punch: the attribute ``edge`` of the result says so, and ``edge_note`` if contact reached the border.
     grid_error : bool
-        Whether to compute the history again on cells twice and four times as long, and to bound by it the error that
-        the grid makes: ``grid_error``, ``grid_error_area`` and the bounds ``contact_area_lower`` and
-        ``contact_area_upper`` at the kept times.
+        Whether to estimate the grid error from two more runs, on cells twice and four times as long: ``grid_error``,
+        ``grid_error_area`` and the bounds ``contact_area_lower`` and ``contact_area_upper`` at the output times.
     numerics : Numerics
         Settings that are rarely changed: length of the time steps, algorithm, and memory of past pressures.
     threads : int, optional
-        Of a large grid; the bits are the same with any number. Default: as ``scipy.fft.set_workers`` has it; where
-        nobody has set that, all cores the process may use, but one beside other threads or in a process that was
-        started by another one.
+        Number of threads for a large grid; the result does not depend on it. Default: the value of
+        ``scipy.fft.set_workers``, or else all cores that the process may use, but one thread if other threads run or in
+        a child process.
     progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length. [s]
+        A progress bar, or a function called with the current time and the length of the program. [s]
 
     Returns
     -------
@@ -100,13 +98,13 @@ def simulate(
     Raises
     ------
     InputError
-        If the input is wrong; the message says what was found and what was expected.
+        If the input is invalid; the message says what was found and what was expected.
     TooLargeError
-        If it needs more memory than there is, before any is taken.
+        If it needs more memory than is available; raised before any is allocated.
     EdgeContactError
         If contact reached the border of a free-space domain.
     ConvergenceError
-        If any step did not converge and nothing was kept; otherwise ``status`` says which did not.
+        If a step did not converge and no row was kept; otherwise ``status`` marks the rows that did not converge.
 
     Examples
     --------
@@ -160,9 +158,9 @@ def friction(
     height : xarray.DataArray, dims (x, y)
         Profile, peaks up, with cell-centre coordinates and no missing points. [m]
     material : Material
-        Of a half-space, or a body as :func:`roughvisc.simulate` has it: one with a finite compliance after endless
-        creep, unless the profile is the same all across the motion. Shift factors of a temperature act as factors of
-        the speed.
+        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. Its compliance must be finite at long
+        times, unless the profile is uniform across the motion. Shift factors of a temperature act as factors of the
+        speed.
     speeds : float or str, or sequence of them
         [m/s]
     load, pressure : float or str
@@ -170,35 +168,35 @@ def friction(
     direction : {"x", "-x", "y", "-y"}
         In which the profile moves.
     tolerance : float
-        On what the iteration leaves of pressure (L1, over the load) and friction (relative).
+        Tolerance on the iteration errors of pressure (L1, over the load) and friction (relative).
     fields : sequence of str
-        Fields to keep, of ``pressure`` and ``gap``, in the frame of the profile.
+        Fields to keep: any of ``pressure`` and ``gap``, in the frame of the profile.
     last_octave : bool
-        Whether to tell what the shortest octave of the surface's waves adds to friction and area, at twice the cost. If
-        that is much, the waves that the scan does not resolve would add as much again.
+        Whether to compute the contribution of the shortest octave of wavelengths to friction and area, at twice the
+        cost. If it is large, wavelengths that the scan does not resolve may add as much again.
     grid_error : bool
-        Whether to compute the curve again on cells twice and four times as long, and to bound by it the errors that the
-        grid makes: ``grid_error_friction`` and ``grid_error_area``. It takes about a third of the time more.
+        Whether to estimate the grid errors ``grid_error_friction`` and ``grid_error_area`` from the same curve on cells
+        twice and four times as long. It takes about a third more time.
     threads : int, optional
-        As :func:`roughvisc.simulate` has them.
+        As in :func:`roughvisc.simulate`.
     progress : bool or callable
-        A progress bar, or a function called with the speeds done and their number.
+        A progress bar, or a function called with the number of finished speeds and the total number.
 
     Returns
     -------
     xarray.Dataset
-        Over ``speed``, in the order given: as :data:`roughvisc.variables.sliding.SLIDING` declares it.
+        Variables over ``speed``, in the given order, as declared in :data:`roughvisc.variables.sliding.SLIDING`.
 
     Raises
     ------
     InputError
-        If the input is wrong, or the material creeps without end under waves across the motion.
+        If the input is invalid, or the material creeps without limit and the profile varies across the motion.
 
     Notes
     -----
-    In the steady state the friction force times the speed is the power that the material dissipates. The force is
-    taken from that power: on the grid it converges much faster than the sum of pressure times slope. The force across
-    the motion, ``friction_force_across``, is the same sum with the slope across the motion.
+    In the steady state the friction force times the speed equals the power dissipated in the material. The force is
+    computed from this power, which on a grid converges much faster than the sum of pressure times slope. The force
+    across the motion, ``friction_force_across``, is the same sum with the slope across the motion.
 
     References
     ----------
