@@ -91,16 +91,16 @@ def wake_note(left: Mapping[float, float], period: float) -> str:
     where = f"at {said(speeds[0], 'm/s')}" if len(speeds) == 1 else f"from {said(speeds[0], 'm/s')} on"
     most = max(left[speed] for speed in speeds)
     return (
-        f"The surface repeats every {said(period, 'm')}, and {where} the contact runs into the wake of the one before: "
-        f"after a period up to {percent(most)} of the creep has not recovered. Friction and area are those of a row "
-        "of such contacts; of a single one they are not known. Take a longer period."
+        f"The surface repeats every {said(period, 'm')}, and {where} the contact slides into the wake of the one "
+        f"before: after a period up to {percent(most)} of the creep has not recovered. Friction and area are those of "
+        "a row of such contacts; those of a single one are not known. Use a longer period."
     )
 
 
 #: What a result says of a material without instantaneous compliance.
 NO_JUMP = (
     "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
-    "comes into contact. The approach keeps the tolerance; of pressure, force and work each row states its own error."
+    "makes contact. The approach meets the tolerance; each row states its own error of pressure, force and work."
 )
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
 #: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
@@ -139,9 +139,9 @@ def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
         notes.append(NO_JUMP)
     elif at_once < _AT_ONCE * final:
         notes.append(
-            f"Only {100 * at_once / final:.2g} % of the compliance is there at once: pressure, and force under a given "
-            "approach, nearly jump in each cell that comes into contact. The approach keeps the tolerance; of "
-            "pressure, force and work each row states its own error."
+            f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
+            "approach, nearly jump in each cell that makes contact. The approach meets the tolerance; each row "
+            "states its own error of pressure, force and work."
         )
     errors = dataset["stated_error"].values
     missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
@@ -180,7 +180,7 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
         sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
-    return note + " Use mirror = true under [surface]; a taper would do without the step, but changes the contact."
+    return note + " Use mirror = true under [surface]; a taper also removes the step, but changes the contact."
 
 
 def edge_note(time: float) -> str:
@@ -226,20 +226,20 @@ def body_note(
         more = kernel.relief * compliance * force / approach
         if more < settings.tolerance:
             return (
-                f"A half-space would have done: its approach is at most {percent(more)} larger, which is less than "
-                "the tolerance."
+                f"A half-space would be accurate enough: its approach is at most {percent(more)} larger, less than the "
+                "tolerance."
             )
         larger = "much" if more > 1 else f"up to {percent(more)}"  # the bound says little where it is wide
         return f"The base matters: on a half-space the approach would be {larger} larger."
     longest = max(size)
     lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
     note = f"The base holds back {percent(lost)} of the longest wave, of {longest:.3g} m" + (
-        ": a half-space would have done." if lost < settings.tolerance else "."
+        ": a half-space would be accurate enough." if lost < settings.tolerance else "."
     )
     if kernel.uniform_displacement > 0:
         share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
         note += (
-            " The approach holds the compression of the sheet itself, mean pressure times compliance times "
+            " The approach includes the compression of the sheet itself, mean pressure times compliance times "
             f"{kernel.uniform_displacement:.3g} m: up to {percent(min(share, 1.0))} of it."
         )
     return note
@@ -267,8 +267,8 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
     if not slope > LARGEST_SLOPE:
         return ""
     return (
-        f"The rms slope of the loaded surface is {slope:.2g}: the method takes slopes as small, and leaves out what is "
-        f"of the order of its square. Beyond {LARGEST_SLOPE:g} the results are a rough guess."
+        f"The rms slope of the loaded surface is {slope:.2g}: the method assumes small slopes, with an error of the "
+        f"order of the squared slope. Beyond {LARGEST_SLOPE:g} the results are a rough estimate."
     )
 
 
@@ -284,6 +284,6 @@ def octave_note(dataset: xr.Dataset) -> str:
     if not most > _MUCH_OF_FRICTION:
         return ""
     return (
-        f"The shortest octave of waves adds up to {100 * most:.0f} % of the friction: waves that the scan does not "
-        "resolve may add as much again."
+        f"The shortest octave of wavelengths adds up to {100 * most:.0f} % of the friction: wavelengths that the scan "
+        "does not resolve may add as much again."
     )

@@ -27,13 +27,13 @@ def test_note__is_left_out_where_every_row_keeps_the_tolerance():
     ("material", "says"),
     [
         (rv.kelvin_voigt(1e6, 1e5), "no instantaneous compliance"),
-        (rv.zener(1e8, 1e6, 1e5), "% of the compliance is there at once"),
+        (rv.zener(1e8, 1e6, 1e5), "% of the compliance is instantaneous"),
     ],
 )
 def test_note__names_what_jumps(material, says):
     note = press(material).attrs["accuracy_note"]
     assert says in note
-    assert "The approach keeps the tolerance" in note
+    assert "The approach meets the tolerance" in note
 
 
 def test_note__counts_the_rows_that_state_more_than_the_tolerance():

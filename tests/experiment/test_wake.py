@@ -30,7 +30,7 @@ def test_wake_note__is_of_speeds_at_which_a_longer_period_changes_friction(caplo
     assert ratio[1] < 0.6
     note = short.attrs["wake_note"]
     assert note in caplog.text
-    assert f"every {49 * CELL * 1e3:.6g} mm, and at 1 m/s the contact runs into the wake" in note
+    assert f"every {49 * CELL * 1e3:.6g} mm, and at 1 m/s the contact slides into the wake" in note
     assert f"up to {left(49 * CELL, FAST):.2g} % of the creep" in note
     assert "wake_note" not in rv.friction(ball(49), RUBBER, load=2e-2, speeds=SLOW).attrs
 

@@ -108,7 +108,7 @@ def choose_memory(
             check_creep(material, lattice(SHORTEST_AGE * duration, duration, _SAMPLES))
         if duration > 0 and not _direct_is_accurate(material, duration):
             raise InputError(
-                "memory='direct' takes the pressure as linear in each step, which rings on this material: "
+                "memory='direct' assumes linear pressure in each step, which oscillates for this material: "
                 "expected memory='auto', or an instantaneous compliance that is not small"
             )
         return Choice(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")

@@ -331,7 +331,7 @@ def edge_error(scene: Scene, time: float) -> EdgeContactError:
     return EdgeContactError(
         f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
         "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
-        "edge='accept' to press it as a punch of that outline"
+        "edge='accept' to treat the scan outline as a punch"
     )
 
 

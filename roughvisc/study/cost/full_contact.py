@@ -20,7 +20,7 @@ def border_warning(shape: tuple[int, ...]) -> str:
     return (
         f"Contact is expected to reach the border of the free-space domain of {shape[0]} x {shape[1]} cells, which "
         "ends a run: use boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = "
-        "'accept' to press it as a punch of that outline."
+        "'accept' to treat the scan outline as a punch."
     )
 
 

@@ -113,7 +113,7 @@ def _of_the_scan(dataset: xr.Dataset) -> str:
     found = dict(zip(dataset["coarsening"].values, dataset["coarsening_error"].sel(quantity=name).values, strict=True))
     parts = [f"{percent(found[k])} on cells {k:g} times as long" for k in sorted(found) if k > 1 and found[k] > 0]
     unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=name))
-    text = "the grid is data, and no setting"
+    text = "the grid is part of the data"
     if parts:
         text += f": the {WORDS[name]} changes by {' and '.join(parts)}"
     if np.isfinite(unsure):

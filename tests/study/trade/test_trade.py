@@ -323,7 +323,7 @@ def test_scan__shows_what_coarsening_makes_of_the_surface(tmp_path):
     assert not ds.coarsening_error[0].any()
     share = ds.coarsening_error[1] / ds.error[1]
     assert share.values == pytest.approx(1, abs=0.1), "at this tolerance the grid makes the whole error"
-    assert "the grid is data" in ds.attrs["recommendation"]
+    assert "the grid is part of the data" in ds.attrs["recommendation"]
     few = changed(case, (30, 26), Setting(coarsening=2.0)).height()
     x, y = (_waves_at(old, new) for old, new in ((30, 15), (26, 13)))
     expected = x @ case.height().values @ y.T
