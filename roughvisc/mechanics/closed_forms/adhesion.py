@@ -23,7 +23,7 @@ _REPULSION = 2.0
 def tabor_parameter(
     radius: Quantity, contact_modulus: Quantity, work_of_adhesion: Quantity, attraction_range: Quantity
 ) -> float:
-    r"""Tabor parameter of a sphere: how far its adhesive neck stands out, over the range of the attraction.
+    r"""Tabor parameter of a sphere: height of its adhesive neck over the range of the attraction.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def tabor_parameter(
     Returns
     -------
     float
-        :math:`\mu = (R w^2 / E^{*2} z^3)^{1/3}`: JKR holds far above one, DMT far below. [-]
+        :math:`\mu = (R w^2 / E^{*2} z^3)^{1/3}`: JKR is valid far above one, DMT far below. [-]
 
     References
     ----------
@@ -129,7 +129,7 @@ def punch_pull_off(radius: Quantity, contact_modulus: Quantity, work_of_adhesion
 
 @quantities(force="N", pull_off="N")
 def adhesive_load(force: ArrayLike, pull_off: ArrayLike) -> Array:
-    r"""Load that would press a sphere as far without adhesion (JKR).
+    r"""Load that gives the same contact radius of a sphere without adhesion (JKR).
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ def sliding_cylinder(radius: Quantity, material: Prony, load: Quantity, speed: Q
     radius : float or str
         Of the cylinder. [m]
     material : Prony
-        A solid of one retardation time, with a compliance at once.
+        A solid with one retardation time and an instantaneous compliance.
     load : float or str
         Per length of the cylinder. [N/m]
     speed : float or str
@@ -81,8 +81,8 @@ def sliding_cylinder(radius: Quantity, material: Prony, load: Quantity, speed: Q
 
     Notes
     -----
-    Hunter's problem, by the equations of this module, which were derived anew. Load and friction follow from moments of
-    :math:`f` over the contact:
+    Hunter's problem, by the equations of this module, which are a new derivation. Load and friction follow from moments
+    of :math:`f` over the contact:
 
     .. math:: W = \frac{\pi c_0}{C_0 + C_1}, \qquad
               \mu = \frac1R \left[ \frac{\pi a c_1 / 2 - C_0 V \tau W}{(C_0 + C_1) W} - e \right].

@@ -103,7 +103,7 @@ def punch_dissipation(radius: Quantity, material: Prony, amplitude: Quantity, pe
 
 @quantities(amplitude="m", wavenumber="rad/m", t="s")
 def full_contact_wave(amplitude: Quantity, wavenumber: Quantity, material: Prony, t: ArrayLike) -> Array:
-    r"""Amplitude of the pressure that holds a wave of the surface flat, after full contact was made at once.
+    r"""Amplitude of the pressure that keeps a wave flat after a jump to full contact.
 
     Parameters
     ----------

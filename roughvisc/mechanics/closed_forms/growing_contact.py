@@ -123,7 +123,7 @@ class StepLoad:
 
 @quantities(sphere_radius="m", force="N")
 def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity) -> StepLoad:
-    r"""A sphere on a viscoelastic half-space under a load applied at once and kept (Lee and Radok).
+    r"""A sphere on a viscoelastic half-space under a step load (Lee and Radok).
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity)
 
 @dataclass(frozen=True)
 class KelvinVoigtStep(StepLoad):
-    """A load applied at once and kept on a Kelvin-Voigt solid, which does not yield at once."""
+    """Step load on a Kelvin-Voigt solid, which has no instantaneous deformation."""
 
     def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
         """Pressure at ``r`` [m] and ``t > 0``; infinite at the edge. [Pa]"""
@@ -185,7 +185,7 @@ class KelvinVoigtStep(StepLoad):
 
 @quantities(sphere_radius="m", force="N")
 def kelvin_voigt_step(sphere_radius: Quantity, material: Prony, force: Quantity) -> KelvinVoigtStep:
-    r"""A sphere on a Kelvin-Voigt half-space under a load applied at once and kept.
+    r"""A sphere on a Kelvin-Voigt half-space under a step load.
 
     Parameters
     ----------

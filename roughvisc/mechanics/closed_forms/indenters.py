@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Indenter(Hashable, Protocol):
-    """What the closed forms ask of an axisymmetric indenter."""
+    """Axisymmetric indenter for the closed forms."""
 
     def height(self, r: ArrayLike) -> Array:
         """Gap ``f(r)`` to the plane it touches. [m]"""

@@ -20,7 +20,7 @@ _WIDEST = 10.0
 
 @quantities(compliance="1/Pa", force="N", approach="m")
 def half_space_excess(sheet: Sheet, compliance: Quantity, force: Quantity, approach: Quantity) -> float:
-    r"""By how much the approach is too large that a contact has on a half-space, in place of the sheet that there is.
+    r"""Relative excess of the approach on a half-space over that on the real sheet, at the same load.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def half_space_excess(sheet: Sheet, compliance: Quantity, force: Quantity, appro
 
 @quantities(compliance="1/Pa", force="N", approach="m")
 def half_space_shortfall(sheet: Sheet, compliance: Quantity, force: Quantity, approach: Quantity) -> float:
-    r"""Part of the force that is missing on a half-space at a given approach, in place of the sheet that there is.
+    r"""Relative shortfall of the force on a half-space against that on the real sheet, at the same approach.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def half_space_shortfall(sheet: Sheet, compliance: Quantity, force: Quantity, ap
 
 @quantities(compliances="1/Pa")
 def dundurs_coupling(compliances: Sequence[Quantity], poissons: Sequence[float]) -> float:
-    r"""How far the pressure on one or two bodies displaces their interface sideways: Dundurs' second constant.
+    r"""Dundurs' second constant, for the sideways displacement of an interface under pressure.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def sticking_stiffness(poisson: float) -> float:
 
 @quantities(radius="m", shear_modulus="Pa", density="kg/m^3")
 def radiation_lag(radius: Quantity, shear_modulus: Quantity, density: Quantity) -> float:
-    r"""Time by which the force on a round punch runs ahead of its approach, as waves carry energy away.
+    r"""Time by which the force on a round punch leads its approach, because waves carry energy away.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def radiation_lag(radius: Quantity, shear_modulus: Quantity, density: Quantity) 
 
 @quantities(speed="m/s", shear_modulus="Pa", density="kg/m^3")
 def moving_load_excess(speed: Quantity, shear_modulus: Quantity, density: Quantity, poisson: float) -> float:
-    r"""Part by which waves add to the displacement under a load that moves along a half-space.
+    r"""Relative increase of the displacement by waves under a load that moves along a half-space.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def moving_load_excess(speed: Quantity, shear_modulus: Quantity, density: Quanti
     Returns
     -------
     float
-        Displacement under a moving normal line load over that of one at rest, less one; infinite from the speed of
+        Displacement under a moving normal line load over that of one at rest, minus one; infinite from the speed of
         Rayleigh waves on. [-]
 
     Notes
@@ -258,7 +258,7 @@ def flash_temperature(
     heat_conductivity: Quantity,
     volumetric_heat_capacity: Quantity,
 ) -> float:
-    r"""Mean rise of temperature of a round spot that slides on a half-space and heats it evenly.
+    r"""Mean temperature rise of a round spot that slides on a half-space and heats it evenly.
 
     Parameters
     ----------
