@@ -20,7 +20,7 @@ _WIDEST = 10.0
 
 @quantities(compliance="1/Pa", force="N", approach="m")
 def half_space_excess(sheet: Sheet, compliance: Quantity, force: Quantity, approach: Quantity) -> float:
-    r"""Relative excess of the approach on a half-space over that on the real sheet, at the same load.
+    r"""Excess of the approach on a half-space over that on the real sheet, over the former, at the same load.
 
     Parameters
     ----------

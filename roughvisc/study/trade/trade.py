@@ -191,7 +191,7 @@ def _labelled(
         "result_format": RESULT_FORMAT,
         "title": case.title,
         "source": f"roughvisc {metadata.version('roughvisc')}",
-        "comment": "One case computed under many settings, each timed and held against 'reference'; attribute 'case' "
+        "comment": "One case computed under many settings, each timed and compared with 'reference'; attribute 'case' "
         "states it (JSON, SI units).",
         "case": case.to_json(),
         "grid_is_data": int(is_data(case)),

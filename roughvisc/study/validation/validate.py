@@ -17,7 +17,7 @@ _FEWEST = 33
 
 @dataclass(frozen=True)
 class Comparison:
-    """One quantity of one case, held against its closed form.
+    """One quantity of one case, compared with its closed form.
 
     Attributes
     ----------

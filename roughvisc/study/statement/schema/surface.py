@@ -68,7 +68,7 @@ def _channel(value: Any) -> Any:
 
 
 class Raw(Section):
-    """Whence heights come."""
+    """Source of the heights."""
 
     def raw(self) -> xr.DataArray:
         """The heights as read or made. [m]"""
