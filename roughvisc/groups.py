@@ -1,8 +1,9 @@
-"""Groups of a result: at the root what a user wants; beside it every accepted step, the parts of the error, the cost.
+"""Groups of a result: at the root what a user wants; beside it steps, energies, the parts of the error, the cost.
 
 Inside the package a result is one Dataset, the whole of it, in which names of what lies over the accepted steps begin
-with ``step_``. In a file, and in what a user gets, the root and each group are Datasets of their own. A root carries
-its groups in ``encoding``: xarray keeps that through selections and copies, and writes it to no file.
+with ``step_``, and in which each attribute stands by itself. In a file, and in what a user gets, the root and each
+group are Datasets of their own. A root carries its groups in ``encoding``: xarray keeps that through selections and
+copies, and writes it to no file.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.variables import STEPPED, of_step
+from roughvisc.variables.attributes import attributes_of, for_root
 from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 #: Name of each group -> what it holds.
 GROUPS = {
     "steps": "histories of every accepted step",
+    "energy": "work and energies since the start",
     "accuracy": "stated errors, their parts, and bounds",
     "cost": "iterations, convolutions and time that the rows have cost",
 }
@@ -38,6 +41,7 @@ def split(whole: xr.Dataset) -> dict[str, xr.Dataset]:
     root = whole.drop_vars([name for group, members in names.items() if group for name in members])
     root = root.drop_vars("step", errors="ignore")
     root.encoding.pop(_CARRIED, None)
+    root.attrs = for_root(whole.attrs)
     parts = {"": root}
     for group in [group for group in GROUPS if group in names]:
         part = whole[names[group]]
@@ -96,8 +100,10 @@ def whole_of(dataset: xr.Dataset) -> xr.Dataset:
     What xarray puts together of several results keeps the encoding of the first: its groups belong to that alone.
     """
     rows, found = axis_of(dataset.variables), {}
+    whole = dataset.copy(deep=False)
+    whole.attrs = attributes_of(dataset.attrs)
     if not _is_known(dataset, rows):
-        return dataset
+        return whole
     for group, part in groups_of(dataset).items():
         here = _selected(part, dataset, rows)
         assert here is not None, "its rows and cases are those of the root"
@@ -105,7 +111,7 @@ def whole_of(dataset: xr.Dataset) -> xr.Dataset:
         left_out = dataset.variables.keys() | (() if prefix else here.coords.keys())
         names = {f"{prefix}{name}": one for name, one in here.variables.items() if name != "case_key"}
         found |= {name: one for name, one in names.items() if name not in left_out}
-    return dataset.assign(found)
+    return whole.assign(found)
 
 
 def _is_known(dataset: xr.Dataset, rows: str) -> bool:

@@ -110,7 +110,7 @@ def test_exponentials_over_24_decades(count, duration):
     material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, times)
     ds, exact = step_load(material, duration)
     assert_follows(ds, exact)
-    assert ds.attrs["memory"].startswith(f"{count} exponential")
+    assert ds.roughvisc.attributes["memory"].startswith(f"{count} exponential")
 
 
 def test_steps_of_all_sizes_in_one_program():
@@ -161,7 +161,7 @@ def test_cycles__settle(count):
     ds = simulate(punch, ZENER, program, times=ends, tolerance=1e-2)
     assert_a_contact_state(ds)
     assert ds.force.values[2:] == pytest.approx(ds.force.values[-1], rel=1e-2)
-    work = np.diff(ds.work.values)
+    work = np.diff(ds.roughvisc.energy.work.values)
     assert work[1:] == pytest.approx(work[-1], rel=1e-2)
     exact = closed_forms.punch_dissipation(1.0, ZENER, 5e-3, 1.0) * count / 4
     # a punch of cells has a radius right to half a cell; the error of the force acts over the path of all cycles
@@ -365,18 +365,18 @@ def test_slopes_that_are_not_small__warn(slope, warns, caplog):
     with caplog.at_level(logging.WARNING, "roughvisc"):
         ds = simulate(height, ELASTIC, rv.Program().load(0.01 * slope, over=0), boundary="periodic")
     assert ("rms slope of the loaded surface is" in caplog.text) is warns
-    assert ("slope_note" in ds.attrs) is warns
+    assert ("slope_note" in ds.roughvisc.attributes) is warns
 
 
 def test_slopes_that_are_not_loaded__do_not_warn():
     """A ball whose flanks are steep, pressed at its tip; a flat punch whose sides are absent."""
     ball = rv.sphere(1.0, 1.9, (65, 65))
     tip = simulate(ball, ELASTIC, rv.Program().load(1e-3, over=0))
-    assert "slope_note" not in tip.attrs
+    assert "slope_note" not in tip.roughvisc.attributes
     deep = simulate(ball, ELASTIC, rv.Program().load(0.5, over=0))
-    assert "slope_note" in deep.attrs
+    assert "slope_note" in deep.roughvisc.attributes
     punch = simulate(rv.flat_punch(1.0, SIZE, SHAPE), ELASTIC, rv.Program().load(1.0, over=0))
-    assert "slope_note" not in punch.attrs
+    assert "slope_note" not in punch.roughvisc.attributes
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -427,8 +427,8 @@ def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
     ds, steps = counted(BALL, ELASTIC, rv.Program().load(0.1, over=1.0).load(0.01, over=1.0), times=5)
     assert set(kept) == {0}
     assert steps == 5
-    assert ds.attrs["memory"] == "no memory: elastic"
-    assert "past pressures: not needed, the material is elastic" in ds.attrs["left_out"]
+    assert ds.roughvisc.attributes["memory"] == "no memory: elastic"
+    assert "past pressures: not needed, the material is elastic" in ds.roughvisc.attributes["left_out"]
 
 
 def test_constant_load__takes_few_steps_once_relaxed():
@@ -447,9 +447,11 @@ def test_fields_not_kept__are_neither_stored_nor_paid_for():
     none, every = (simulate(BALL, ZENER, program, fields=f) for f in ((), ("pressure", "gap", "displacement")))
     assert not {"pressure", "gap", "displacement"} & set(none.variables)
     assert int(none.roughvisc.cost.convolutions.sum()) == int(every.roughvisc.cost.convolutions.sum())
-    assert "pressure and gap and displacement: not kept" in none.attrs["left_out"]
-    assert "not kept" not in every.attrs["left_out"].replace("fields between the kept times: not kept", "")
-    assert "past pressures: remembered by 1 exponential, at no cost" in every.attrs["left_out"]
+    assert "pressure and gap and displacement: not kept" in none.roughvisc.attributes["left_out"]
+    assert "not kept" not in every.roughvisc.attributes["left_out"].replace(
+        "fields between the kept times: not kept", ""
+    )
+    assert "past pressures: remembered by 1 exponential, at no cost" in every.roughvisc.attributes["left_out"]
 
 
 def test_periodic__is_not_padded(monkeypatch):
@@ -463,7 +465,7 @@ def test_periodic__is_not_padded(monkeypatch):
     monkeypatch.setattr(halfspace, "transforms", lambda mirrored: watched)
     ds = simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
     assert sizes == {ROUGH.shape}
-    assert "padding" in ds.attrs["left_out"]
+    assert "padding" in ds.roughvisc.attributes["left_out"]
 
 
 def test_left_out__is_what_plan_says(tmp_path):
@@ -476,7 +478,7 @@ def test_left_out__is_what_plan_says(tmp_path):
     case = rv.read_study(study)
     ds = rv.run(case, tmp_path / "out", progress=False)
     planned = str(rv.plan([case], tmp_path / "out").left_out.values[0])
-    assert ds.attrs["left_out"] == planned
+    assert ds.roughvisc.attributes["left_out"] == planned
     assert planned == (
         "past pressures: not needed, the material is elastic; "
         "padding of the transforms: not needed, the surface repeats; "

@@ -16,6 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.groups import GROUPS, group_of, split, whole_of
 from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.attributes import AT_ROOT, WARNINGS
 
 FORMER = Path(__file__).parent / "study" / "storage" / "format_2"
 BALL, RUBBER = rv.sphere(1e-2, 2e-3, (17, 15)), rv.zener(1e6, 1e6, 1e6)
@@ -23,8 +24,8 @@ PROGRAM = rv.Program().load(0.01, over=0.5).hold(2.0)
 _NEW = "use_new_combine_kwarg_defaults"
 #: What a user wants first, and no more.
 ROOT = {
-    *("force", "nominal_pressure", "approach", "work", "stored_energy", "dissipated_energy"),
-    *("contact_area", "contact_area_counted", "contact_fraction", "mean_gap", "stated_error", "status"),
+    *("force", "nominal_pressure", "approach", "contact_area", "contact_area_counted"),
+    *("contact_fraction", "mean_gap", "stated_error", "status"),
     *("height", "pressure", "gap"),
 }
 
@@ -42,6 +43,7 @@ def heavier(ball):
 
 def test_root__holds_what_a_user_wants_first(ball):
     assert set(ball.data_vars) == ROOT
+    assert set(ball.roughvisc.energy.data_vars) == {"work", "stored_energy", "dissipated_energy"}
     assert set(ball.roughvisc.cost.data_vars) == {"iterations", "convolutions", "wall_time"}
     accuracy = ball.roughvisc.accuracy
     assert {"time_error", "residual", "pressure_error", "contact_area_solver_lower"} <= set(accuracy.data_vars)
@@ -64,7 +66,7 @@ def test_steps__of_a_result_that_keeps_them_all_are_its_rows():
     assert "step" not in whole_of(every).dims
     steps = every.roughvisc.steps
     np.testing.assert_array_equal(steps.time, every.time)
-    np.testing.assert_array_equal(steps.work, every.work)
+    np.testing.assert_array_equal(steps.work, every.roughvisc.energy.work)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +112,7 @@ def test_what_is_put_together_of_results__carries_nothing(ball, heavier, combine
 
 def test_group__that_there_is_not_is_refused(ball, tmp_path):
     path = write_result(ball, tmp_path / "ball.nc")
-    with pytest.raises(InputError, match="group is 'errors': expected one of steps, accuracy, cost"):
+    with pytest.raises(InputError, match="group is 'errors': expected one of steps, energy, accuracy, cost"):
         rv.open_result(path, group="errors")
 
 
@@ -118,7 +120,7 @@ def test_file__has_the_groups_and_gives_them_back(ball, tmp_path):
     path = write_result(ball, tmp_path / "ball.nc")
     with netCDF4.Dataset(path) as file:
         assert list(file.groups) == list(GROUPS)
-        assert set(file.variables) == ROOT | {"time", "x", "y"}
+        assert set(file.variables) == ROOT | {"time", "x", "y", "x_bounds", "y_bounds"}
         assert "step" not in file.dimensions
         assert file["steps"].dimensions["step"].size == ball.roughvisc.steps.sizes["step"]
     found = rv.open_result(path)
@@ -153,7 +155,8 @@ def test_variables__refer_to_those_of_their_own_group(ball):
 def test_friction__has_groups_over_speed():
     rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
     curve = rv.friction(rough, RUBBER, speeds=[1e-4, 1e-3], load=0.02, grid_error=True, progress=False)
-    assert {"friction_coefficient", "friction_residual", "pressure_residual"} <= set(curve.data_vars)
+    assert {"friction_coefficient", "stated_error", "dissipated_power"} <= set(curve.data_vars)
+    assert {"friction_residual", "pressure_residual"} <= set(curve.roughvisc.accuracy.data_vars)
     assert curve.roughvisc.accuracy.grid_error_friction.dims == ("speed",)
     assert (curve.isel(speed=1).roughvisc.cost.outer_iterations > 0).all()
     with pytest.raises(InputError, match="carries no group 'steps'"):
@@ -183,7 +186,7 @@ def test_former_result__is_sorted_into_groups(kind, tmp_path):
         file.set_auto_mask(False)
         stored = {name: np.asarray(one[...]) for name, one in file.variables.items() if name != "case_key"}
     root = rv.open_result(path)
-    assert root.attrs["result_format"] == 3
+    assert root.attrs["result_format"] == 4
     assert not {"time_error", "step"} & set(root.variables)
     for name, values in stored.items():
         if name.startswith("step_"):
@@ -270,3 +273,95 @@ def test_result_rewritten_without_its_groups__is_summed_up_all_the_same(tmp_path
     assert rv.open_result(path).status.size > 1
     with pytest.raises(InputError, match="carries no group 'cost'"):
         rv.open_result(path, group="cost")
+
+
+#: A scan of one tilt: periodic, it repeats with a step, and its slopes are steep.
+TILTED = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.4, rolloff=5e-4, seed=1)
+
+
+def test_root__has_few_attributes_and_says_first_what_warns(tmp_path):
+    tilted = TILTED.copy(data=TILTED.values + 3e-4 * np.arange(24)[:, None] / 24)
+    ds = rv.simulate(
+        tilted,
+        RUBBER,
+        rv.Program().pressure(1e4, over=0.1),
+        boundary="periodic",
+        numerics=rv.Numerics(time_step=0.05),
+        progress=False,
+    )
+    assert set(ds.attrs) <= set(AT_ROOT)
+    known = ds.roughvisc.attributes
+    warned = [name for name in WARNINGS if name in known]
+    assert {"slope_note", "border_note", "accuracy_note"} <= set(warned)
+    lines = ds.attrs["notes"].splitlines()
+    assert lines == [f"{name.removesuffix('_note')}: {known[name]}" for name in warned]
+    assert "notes:" in repr(ds)
+    found = rv.open_result(write_result(ds, tmp_path / "tilted.nc"))
+    assert found.attrs.items() >= ds.attrs.items()
+    assert found.roughvisc.attributes == known
+    with xr.open_dataset(tmp_path / "tilted.nc") as plain:
+        assert len(plain.attrs) <= 12
+        assert "notes:" in repr(plain)
+        assert plain.roughvisc.attributes == known
+
+
+def test_attributes__of_a_user_stay_where_they_were_put(ball, tmp_path):
+    mine = ball.assign_attrs(sample="A7", notes="slope: by eye\nmine: dusty")
+    with xr.open_dataset(write_result(mine, tmp_path / "mine.nc")) as plain:
+        assert plain.attrs["sample"] == "A7"
+        assert plain.attrs["notes"] == "slope: by eye\nmine: dusty"
+        assert plain.roughvisc.attributes["slope_note"] == "by eye"
+        assert plain.roughvisc.attributes["notes"] == "mine: dusty"
+
+
+def test_details__that_are_no_table_are_refused(ball, tmp_path):
+    path = tmp_path / "odd.nc"
+    ball.assign_attrs(details="[1]").to_netcdf(path)
+    with pytest.raises(InputError, match=r"odd\.nc: has an attribute details that is no table in JSON"):
+        rv.open_result(path)
+
+
+def test_sheet_opened_by_xarray_alone__is_no_half_space(tmp_path):
+    """What a body is stands with the root, not in a group: whoever copies the root keeps it."""
+    rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    ds = rv.simulate(
+        rough,
+        rv.sheet(RUBBER, thickness=1e-4, base="bonded"),
+        rv.Program().pressure(1e4, over=0.1),
+        boundary="periodic",
+        progress=False,
+    )
+    write_result(ds, tmp_path / "sheet.nc")
+    with xr.open_dataset(tmp_path / "sheet.nc") as plain:
+        plain.load().to_netcdf(tmp_path / "copy.nc")
+    with xr.open_dataset(tmp_path / "copy.nc") as plain:
+        assert (plain.roughvisc.attributes["thickness"], plain.roughvisc.attributes["base"]) == (1e-4, "bonded")
+        with pytest.raises(InputError, match="the theories are of a half-space: found a result with the thickness"):
+            rv.observables.area_by_theory(plain, material=RUBBER)
+
+
+@pytest.mark.parametrize("kind", ["creep", "friction", "slide"])
+def test_result_of_format_3__is_sorted_as_those_of_today(kind, tmp_path):
+    (path,) = (FORMER.parent / "format_3" / kind).glob("*.nc")
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_mask(False)
+        assert file.result_format == 3
+        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+        stored = {name: np.asarray(one[...]) for name, one in file.variables.items()}
+        groups = {name: {key: one[...] for key, one in part.variables.items()} for name, part in file.groups.items()}
+    root = rv.open_result(path)
+    assert set(root.attrs) <= set(AT_ROOT)
+    assert not {"work", "stored_energy", "friction_work", "friction_residual"} & set(root.variables)
+    known = root.roughvisc.attributes
+    assert known == attributes | {"result_format": 4}
+    whole = whole_result(path)
+    for name, values in stored.items():
+        np.testing.assert_array_equal(whole[name], values)
+    for group, members in groups.items():
+        part = getattr(root.roughvisc, group)
+        for name, values in members.items():
+            np.testing.assert_array_equal(part[name], values)
+    again = rv.open_result(write_result(root, tmp_path / "again.nc"))
+    xr.testing.assert_identical(again.load(), root.load())
+    for group in [name for name in GROUPS if name in groups or (name == "energy" and "work" in stored)]:
+        xr.testing.assert_identical(getattr(again.roughvisc, group), getattr(root.roughvisc, group))

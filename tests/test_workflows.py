@@ -47,7 +47,7 @@ def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     assert first.max() < 1.02 * ends[0]
     assert again.max() > 1.04 * ends[0], "contact has grown in the rest"
     assert np.trapezoid(steps.friction_force, steps.sliding_distance) == pytest.approx(
-        float(ds.friction_work[-1]), rel=0.01
+        float(ds.roughvisc.energy.friction_work[-1]), rel=0.01
     )
     assert float(ds.sliding_distance[-1]) == pytest.approx(1.8e-3)
     assert float(ds.force.min()) == 0

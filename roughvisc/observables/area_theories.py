@@ -15,6 +15,7 @@ from roughvisc.observables.derived import material_of, need_history
 from roughvisc.observables.response import history
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.variables.attributes import attributes_of
 
 
 def persson_fraction(strain: ArrayLike) -> Any:
@@ -75,9 +76,10 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
     if dataset.attrs.get("boundary") != "periodic":
         raise InputError("the theories are of surfaces without borders: expected a result with periodic boundaries")
+    attributes = attributes_of(dataset.attrs)
     for body in ("thickness", "kernel"):
-        if body in dataset.attrs:
-            raise InputError(f"the theories are of a half-space: found a result with the {body} {dataset.attrs[body]}")
+        if body in attributes:
+            raise InputError(f"the theories are of a half-space: found a result with the {body} {attributes[body]}")
     steps, kept = history(dataset), dataset["time"].values
     area = nominal_area_of(dataset)
     known = material_of(dataset) if material is None else material

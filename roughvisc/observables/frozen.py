@@ -15,6 +15,7 @@ from roughvisc.observables.derived import frame_by_frame, material_of
 from roughvisc.observables.spots import contact
 from roughvisc.topography.grid import spacing
 from roughvisc.units import quantity
+from roughvisc.variables.attributes import attributes_of
 
 
 def incremental_stiffness(
@@ -89,14 +90,15 @@ def _kernel_of(dataset: xr.Dataset, kernel: Any) -> Any:
     """Kernel of the body of a result; None: a half-space."""
     if kernel is not None:
         return kernel
-    if "kernel" in dataset.attrs:
-        raise InputError(f"the result is of the kernel {dataset.attrs['kernel']}: give kernel=")
-    if "thickness" not in dataset.attrs:
+    attributes = attributes_of(dataset.attrs)
+    if "kernel" in attributes:
+        raise InputError(f"the result is of the kernel {attributes['kernel']}: give kernel=")
+    if "thickness" not in attributes:
         return None
     from roughvisc.mechanics.bodies.body import sheet
 
     material = material_of(dataset, "the result is of a sheet and does not record its material: give kernel=")
-    return sheet(material, float(dataset.attrs["thickness"]), dataset.attrs["base"]).kernel
+    return sheet(material, float(attributes["thickness"]), attributes["base"]).kernel
 
 
 def _modulus_at_once(dataset: xr.Dataset) -> float:

@@ -23,8 +23,9 @@ NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 #: Number of the meaning that the names below have, and of their groups; results state it in the attribute
 #: ``result_format``. Raised by whoever gives a name another meaning or another group:
 #: :mod:`roughvisc.study.storage.formats` then reads what was written before.
-RESULT_FORMAT = 3
-#: Format from which on names have the meaning that they have today; groups came with format 3.
+RESULT_FORMAT = 4
+#: Format from which on names have the meaning that they have today; groups came with format 3, with format 4 a group
+#: of energies and few attributes.
 NAMES_OF_TODAY = 2
 #: Older names of variables, which may be given until release 0.1.0, and what they are called now.
 OLDER_NAMES = {"contact_area_corrected": "contact_area"}
@@ -39,13 +40,15 @@ VARIABLES: dict[str, Variable] = {
     "time": Variable(
         ("time",),
         "s",
-        "time since the start of the program",
-        "at a jump the right-hand state is kept",
-        axis="T",
+        "time",
+        "since the start of the program; at a jump the right-hand state is kept",
+        axis="T",  # no standard_name "time": CF wants a date then that times count from, and a program has none
         in_table="last",
     ),
-    "x": Variable(("x",), "m", "position of the cell centre along x", axis="X"),
-    "y": Variable(("y",), "m", "position of the cell centre along y", axis="Y"),
+    "x": Variable(("x",), "m", "x", "of the cell centre", axis="X"),
+    "y": Variable(("y",), "m", "y", "of the cell centre", axis="Y"),
+    "x_bounds": Variable(("x", "bnds"), "", "borders of the cells along x", "in files alone"),
+    "y_bounds": Variable(("y", "bnds"), "", "borders of the cells along y", "in files alone"),
     "step": Variable(("step",), "1", "number of the accepted step", "counted from 0", dtype="int32"),
     "case_key": Variable((), "", "key of the case", "what the file is named by", dtype="str"),
     "roughvisc_version": Variable(
@@ -55,9 +58,9 @@ VARIABLES: dict[str, Variable] = {
     "height": Variable(
         _GRID,
         "m",
-        "height of the rigid profile, peaks up",
+        "height",
+        "of the rigid profile, peaks up; "
         "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
-        short="height",
         may_be_missing=True,
     ),
     "taper_x": Variable(
@@ -67,7 +70,14 @@ VARIABLES: dict[str, Variable] = {
         "of a tapered surface: heights less their mean were multiplied by taper_x times taper_y",
     ),
     "taper_y": Variable(("y",), "1", "weight of the taper along y", "as taper_x"),
-    "filled": Variable(_GRID, "", "whether the height was missing and has been filled in", dtype="int8"),
+    "filled": Variable(
+        _GRID,
+        "",
+        "filled points",
+        "where the height was missing and has been filled in",
+        dtype="int8",
+        meanings=("measured", "filled"),
+    ),
     # fields
     "pressure": Variable(
         _FRAME,
@@ -76,21 +86,23 @@ VARIABLES: dict[str, Variable] = {
         "zero outside the contact and where the profile is absent",
         ancillary=("pressure_error",),
         short="pressure",
+        cell_methods="x: y: mean",
     ),
     "gap": Variable(
         _FRAME,
         "m",
-        "gap between the surfaces",
-        "zero inside the contact; missing where the profile is absent",
-        short="gap",
+        "gap",
+        "between the surfaces; zero inside the contact; missing where the profile is absent",
         may_be_missing=True,
+        cell_methods="x: y: point",
     ),
     "displacement": Variable(
         _FRAME,
         "m",
-        "normal displacement of the half-space's surface",
-        "positive into the half-space; with periodic boundaries its mean is zero",
+        "normal displacement",
+        "of the half-space's surface; positive into the half-space; with periodic boundaries its mean is zero",
         short="displacement",
+        cell_methods="x: y: point",
     ),
     # histories
     "force": Variable(
@@ -106,7 +118,8 @@ VARIABLES: dict[str, Variable] = {
     "approach": Variable(
         _SERIES,
         "m",
-        "rigid-body approach from first touch",
+        "rigid-body approach",
+        "from first touch; "
         "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
         "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
         "absent; while the contact is open: the value at which it would just close; first touch is at the highest "
@@ -128,35 +141,42 @@ VARIABLES: dict[str, Variable] = {
     "work": Variable(
         _SERIES,
         "J",
-        "work of the force on the approach since the start",
+        "work of the force",
+        "on the approach since the start; "
         "over every accepted step, kept or not, as that of the pressure on the displacement: stored_energy plus "
         "dissipated_energy, with that of the friction force in a slide; a jump is quasi-static; with periodic "
         "boundaries without the uniform displacement",
         ancillary=("work_error",),
+        group="energy",
         short="work",
         every_step=True,
     ),
     "stored_energy": Variable(
         _SERIES,
         "J",
-        "energy stored in the springs of the material",
+        "stored energy",
+        "in the springs of the material; "
         "exact for pressure linear in each step; missing where the memory is the direct history",
+        group="energy",
         every_step=True,
         may_be_missing=True,
     ),
     "dissipated_energy": Variable(
         _SERIES,
         "J",
-        "energy dissipated in the material since the start",
+        "dissipated energy",
+        "in the material since the start; "
         "exact for pressure linear in each step; missing where the memory is the direct history",
         ancillary=("dissipated_energy_error",),
+        group="energy",
         every_step=True,
         may_be_missing=True,
     ),
     "contact_area": Variable(
         _SERIES,
         "m^2",
-        "real contact area, corrected for the grid",
+        "real contact area",
+        "corrected for the grid: "
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
         ancillary=(
@@ -173,28 +193,26 @@ VARIABLES: dict[str, Variable] = {
     "contact_area_counted": Variable(
         _SERIES,
         "m^2",
-        "area of the cells in contact",
+        "contact area, counted",
         "the cells that carry pressure, counted; larger than contact_area, since cells at the edge count as a whole",
-        short="contact area, counted",
         every_step=True,
     ),
     "contact_fraction": Variable(
         _SERIES,
         "1",
-        "contact area over the area of the surface",
+        "contact fraction",
         "contact_area over the area of the whole grid, absent cells included; on a tapered surface each cell counts by "
         "its weight, taper_x times taper_y, in both areas",
-        short="contact fraction",
         every_step=True,
         in_table="last",
     ),
     "mean_gap": Variable(
         _SERIES,
         "m",
-        "mean gap over the present cells",
+        "mean gap",
+        "over the present cells; "
         "with periodic boundaries and no cells absent: the separation of the mean planes of both surfaces",
         ancillary=("approach_error",),
-        short="mean gap",
         every_step=True,
         may_be_missing=True,
         in_table="last",
@@ -202,21 +220,24 @@ VARIABLES: dict[str, Variable] = {
     "mean_plane_separation": Variable(
         _SERIES,
         "m",
-        "separation of the mean plane of the profile and the undeformed plane of the half-space",
+        "mean-plane separation",
+        "of the mean plane of the profile and the undeformed plane of the half-space; "
         "free space alone: mean undeformed gap over the present cells minus approach; negative once the mean plane has "
         "passed the other; not stated of an indenter that is known beyond its grid: its mean would be that of the grid",
         ancillary=("approach_error",),
-        short="mean-plane separation",
         every_step=True,
         in_table="last",
     ),
     **SLIDES,
     # accuracy and cost
-    "iterations": Variable(_SERIES, "1", "solver iterations since the previous kept time", dtype="int32", group="cost"),
+    "iterations": Variable(
+        _SERIES, "1", "solver iterations", "since the previous kept time", dtype="int32", group="cost"
+    ),
     "convolutions": Variable(
         _SERIES,
         "1",
-        "convolutions since the previous kept time",
+        "convolutions",
+        "since the previous kept time: "
         "displacements and preconditioner applications, each one forward and one inverse transform",
         dtype="int32",
         group="cost",
@@ -224,7 +245,8 @@ VARIABLES: dict[str, Variable] = {
     "stated_error": Variable(
         _SERIES,
         "1",
-        "stated relative error: the largest of pressure (L1), force and approach",
+        "stated relative error",
+        "the largest of pressure (L1), force and approach: "
         "sum of what time steps, contact solver and series leave, over the largest force and the largest approach so "
         "far; comparable to the tolerance; the grid's part is stated apart",
         may_be_missing=True,
@@ -233,7 +255,8 @@ VARIABLES: dict[str, Variable] = {
     "time_error": Variable(
         _SERIES,
         "1",
-        "part of the error that is due to time steps",
+        "error due to time steps",
+        "part of stated_error, "
         "from the difference to a companion march in steps twice as long; over what is largest so far",
         group="accuracy",
         every_step=True,
@@ -243,8 +266,8 @@ VARIABLES: dict[str, Variable] = {
     "residual": Variable(
         _SERIES,
         "1",
-        "part of the error that is due to the contact solver",
-        "estimated error of the pressure (L1), over its sum",
+        "error due to the contact solver",
+        "part of stated_error: estimated error of the pressure (L1), over its sum",
         group="accuracy",
         may_be_missing=True,
         in_table="largest",
@@ -252,7 +275,8 @@ VARIABLES: dict[str, Variable] = {
     "residual_bound": Variable(
         _SERIES,
         "1",
-        "bound on the relative error of the pressure, in the energy norm, left by the contact solver",
+        "bound on the contact solver's error",
+        "of the pressure, relative, in the energy norm: "
         "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
         group="accuracy",
         may_be_missing=True,
@@ -283,7 +307,8 @@ VARIABLES: dict[str, Variable] = {
     "contact_area_lower": Variable(
         _SERIES,
         "m^2",
-        "lower bound in practice on the contact area",
+        "lower bound on the contact area",
+        "in practice: "
         "contact_area_solver_lower less the error of the grid: grid_error_area times the largest contact area",
         group="accuracy",
         may_be_missing=True,
@@ -292,7 +317,8 @@ VARIABLES: dict[str, Variable] = {
     "contact_area_upper": Variable(
         _SERIES,
         "m^2",
-        "upper bound in practice on the contact area",
+        "upper bound on the contact area",
+        "in practice: "
         "contact_area_solver_upper and the error of the grid: grid_error_area times the largest contact area",
         group="accuracy",
         may_be_missing=True,
@@ -301,7 +327,7 @@ VARIABLES: dict[str, Variable] = {
     "contact_area_solver_lower": Variable(
         _SERIES,
         "m^2",
-        "lower bound on the contact area that this grid gives",
+        "lower bound on this grid's contact area",
         "the contact area without the cells that time steps and contact solver leave in doubt; without the error of "
         "the grid, which is mostly larger",
         group="accuracy",
@@ -311,7 +337,7 @@ VARIABLES: dict[str, Variable] = {
     "contact_area_solver_upper": Variable(
         _SERIES,
         "m^2",
-        "upper bound on the contact area that this grid gives",
+        "upper bound on this grid's contact area",
         "the contact area with the cells that time steps and contact solver leave in doubt; without the error of the "
         "grid, which is mostly larger",
         group="accuracy",
@@ -321,7 +347,8 @@ VARIABLES: dict[str, Variable] = {
     "grid_error": Variable(
         _SERIES,
         "1",
-        "bound in practice on the relative error of pressure (L1) and approach due to the grid",
+        "error due to the grid",
+        "bound in practice on the relative error of pressure (L1) and approach: "
         "from the same history on cells twice and four times as long (grid convergence index), and from the force on "
         "cells at the contact's edge; the pressure over the largest force; of a scan it holds what roughness its "
         "coarser copies have lost",
@@ -332,13 +359,14 @@ VARIABLES: dict[str, Variable] = {
     "grid_error_area": Variable(
         _SERIES,
         "1",
-        "bound in practice on the error of the contact area due to the grid, over the largest contact area",
+        "error of the contact area due to the grid",
+        "bound in practice, over the largest contact area: "
         "as grid_error, and from the number of faces at the contact's edge",
         group="accuracy",
         may_be_missing=True,
     ),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8", every_step=True, meanings=STATUS_MEANINGS),
-    "wall_time": Variable(_SERIES, "s", "wall-clock time since the start of the run", short="wall time", group="cost"),
+    "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run", group="cost"),
     # derived from a result: see roughvisc.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
@@ -372,14 +400,16 @@ VARIABLES: dict[str, Variable] = {
     "secant_stiffness": Variable(
         _SERIES,
         "N/m",
-        "slope of force over approach along the history",
+        "secant stiffness",
+        "slope of force over approach along the history; "
         "includes the creep between kept times; missing while the approach stands still",
     ),
     "contact_stiffness": Variable(_SERIES, "N/m", "older name of secant_stiffness"),
     "trapezoidal_work": Variable(
         _SERIES,
         "J",
-        "work done by the force since the first kept time",
+        "work by the trapezoidal rule",
+        "work done by the force since the first kept time: "
         "trapezoidal integral of force over approach; over a closed loop it is the energy dissipated",
     ),
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
@@ -388,17 +418,18 @@ VARIABLES: dict[str, Variable] = {
     "cycle_closure": Variable(
         ("cycle",),
         "1",
-        "how far force and approach at the ends of the cycle are apart",
+        "closure of the loop",
+        "how far force and approach at the ends of the cycle are apart, "
         "over their ranges in the cycle; 0: the loop is closed",
     ),
     "cycle_dissipated_energy": Variable(
         ("cycle",), "J", "energy dissipated in the cycle", "missing where the loop does not close"
     ),
     "percolates_x": Variable(
-        _SERIES, "1", "whether the region out of contact connects opposite sides along x", dtype="int8"
+        _SERIES, "1", "percolation along x", "whether the region out of contact connects opposite sides", dtype="int8"
     ),
     "percolates_y": Variable(
-        _SERIES, "1", "whether the region out of contact connects opposite sides along y", dtype="int8"
+        _SERIES, "1", "percolation along y", "whether the region out of contact connects opposite sides", dtype="int8"
     ),
     **TRANSPORT,
     **SPOTS,
@@ -414,7 +445,7 @@ VARIABLES: dict[str, Variable] = {
     "precision": Variable(_RUNS, "1", "relative precision of the fields in the file", "missing where exact"),
     "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
     "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
-    "run_time": Variable(_RUNS, "s", "wall time of computing the result and writing its file"),
+    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result and writing its file"),
     "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
     "steps": Variable(_RUNS, "1", "accepted time steps"),
     "peak_memory": Variable(_RUNS, "byte", "memory of the process at its peak", "counted from the arrays it needs"),
@@ -437,14 +468,14 @@ VARIABLES: dict[str, Variable] = {
     "reference_time_uncertainty": Variable(
         ("quantity",),
         "1",
-        "how far the reference itself may be off due to time steps",
-        "by Richardson extrapolation; zero if exact",
+        "uncertainty of the reference due to time steps",
+        "how far it may be off: by Richardson extrapolation; zero if exact",
     ),
     "reference_grid_uncertainty": Variable(
         ("quantity",),
         "1",
-        "how far the reference itself may be off due to the grid",
-        "by Richardson extrapolation; zero if exact; of a scan: what its spacing leaves unknown",
+        "uncertainty of the reference due to the grid",
+        "how far it may be off: by Richardson extrapolation; zero if exact; of a scan: what its spacing leaves unknown",
     ),
 }
 
@@ -486,8 +517,10 @@ VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
 #: Variables whose values are words, and these in order.
 FLAGS = {name: variable.meanings for name, variable in VARIABLES.items() if variable.meanings}
 
+#: Dimensions that a result of one case may have beside that of its rows.
+OTHER_DIMS = ("step", "x", "y", "bnds")
 #: Of the surface, whatever the rows lie over.
-_SURFACE = ("x", "y", "height", "filled", "taper_x", "taper_y")
+_SURFACE = ("x", "y", "x_bounds", "y_bounds", "height", "filled", "taper_x", "taper_y")
 #: What is derived of a row alone, whatever the rows lie over.
 OF_A_ROW = (
     *(name for name in VARIABLES if name.startswith(("cluster_", "pressure_", "gap_")) and "error" not in name),

@@ -20,7 +20,7 @@ class Variable:
         What it is called where there is no room for `long_name`.
     axis : str
         The axis that a coordinate lies on.
-    group : {"", "accuracy", "cost", "steps"}
+    group : {"", "accuracy", "cost", "energy", "steps"}
         Group of the file that holds it; empty: the root, which holds what a user wants first.
     may_be_missing : bool
         Whether NaN says that a value is missing: a fill value is declared of no other variable.
@@ -30,6 +30,8 @@ class Variable:
         What the table of a sweep has of each case: its value in the last row, or its largest one.
     meanings : tuple of str
         Of the values 0, 1, ... of a flag.
+    cell_methods : str
+        What its values are of the cells that they stand for, in CF's words.
     """
 
     dims: tuple[str, ...]
@@ -40,11 +42,12 @@ class Variable:
     ancillary: tuple[str, ...] = ()
     short: str = ""
     axis: str = ""
-    group: Literal["", "accuracy", "cost", "steps"] = ""
+    group: Literal["", "accuracy", "cost", "energy", "steps"] = ""
     may_be_missing: bool = False
     every_step: bool = False
     in_table: Literal["", "last", "largest"] = ""
     meanings: tuple[str, ...] = ()
+    cell_methods: str = ""
 
     @property
     def label(self) -> str:
@@ -54,9 +57,5 @@ class Variable:
 
     def attributes(self) -> dict[str, Any]:
         """CF attributes of this variable."""
-        attrs: dict[str, Any] = {"long_name": self.long_name}
-        if self.units:
-            attrs["units"] = self.units
-        if self.comment:
-            attrs["comment"] = self.comment
-        return attrs
+        names = ("long_name", "units", "cell_methods", "comment")
+        return {name: value for name in names if (value := getattr(self, name))}

@@ -10,38 +10,38 @@ SLIDES: dict[str, Variable] = {
     "sliding_distance": Variable(
         _SERIES,
         "m",
-        "distance slid since the start",
-        "along the path, whatever its direction; in whole cells of the grid",
-        short="sliding distance",
+        "sliding distance",
+        "since the start, along the path, whatever its direction; in whole cells of the grid",
         every_step=True,
         in_table="last",
     ),
     "friction_force": Variable(
         _SERIES,
         "N",
-        "friction force against the motion",
+        "friction force",
+        "against the motion; "
         "of pressure on inclined faces alone, by the slope of the body's surface; in a hold against the last slide, "
         "before the first one against that",
         ancillary=("friction_force_error",),
-        short="friction force",
         every_step=True,
         in_table="last",
     ),
     "friction_force_across": Variable(
         _SERIES,
         "N",
-        "force across the motion that keeps the profile on its path",
+        "force across the motion",
+        "keeps the profile on its path; "
         "positive to the left of the motion, 90 degrees counter-clockwise from it with x to the right and y upwards: "
         "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards; "
         "in a hold by the same slide as friction_force",
-        short="force across the motion",
         every_step=True,
         in_table="last",
     ),
     "slope_friction_force": Variable(
         _SERIES,
         "N",
-        "friction force by pressure times slope of the profile",
+        "friction force by the slope",
+        "pressure times slope of the profile; "
         "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
         may_be_missing=True,
     ),
@@ -50,7 +50,6 @@ SLIDES: dict[str, Variable] = {
         "1",
         "friction coefficient",
         "friction_force over force: without shear at the interface; missing while the surfaces are apart",
-        short="friction coefficient",
         every_step=True,
         may_be_missing=True,
         in_table="last",
@@ -66,9 +65,11 @@ SLIDES: dict[str, Variable] = {
     "friction_work": Variable(
         _SERIES,
         "J",
-        "work of the friction force since the start",
+        "work of the friction force",
+        "since the start, "
         "by the balance of energy: what the body has stored and dissipated in slides, less the work of the normal "
         "force; the integral of friction_force over sliding_distance checks it",
+        group="energy",
         every_step=True,
     ),
 }

@@ -27,53 +27,53 @@ SLIDING: dict[str, Variable] = {
     "reduced_speed": Variable(
         ("speed",),
         "m/s",
-        "speed times the shift factor of the material",
-        "curves of several temperatures fall on one over it",
-        short="reduced speed a_T V",
+        "reduced speed a_T V",
+        "speed times the shift factor of the material: curves of several temperatures fall on one over it",
     ),
     "friction_coefficient": Variable(
         ("speed",),
         "1",
-        "friction coefficient of steady sliding",
+        "friction coefficient",
+        "of steady sliding: "
         "friction_force over the load: of pressure on inclined faces alone, without shear at the interface",
         ancillary=("friction_residual", "grid_error_friction"),
-        short="friction coefficient",
         may_be_missing=True,
         in_table="last",
     ),
     "friction_force": Variable(
         ("speed",),
         "N",
-        "friction force against the motion",
-        "the power that the material dissipates, over the speed",
+        "friction force",
+        "against the motion: the power that the material dissipates, over the speed",
         ancillary=("friction_residual", "grid_error_friction"),
-        short="friction force",
         in_table="last",
     ),
     "friction_force_across": Variable(
         ("speed",),
         "N",
-        "force across the motion that keeps the profile on its path",
+        "force across the motion",
+        "keeps the profile on its path; "
         "positive to the left of the motion, 90 degrees counter-clockwise from it with x to the right and y upwards: "
         "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards",
-        short="force across the motion",
         in_table="last",
     ),
     "slope_friction_force": Variable(
         ("speed",),
         "N",
-        "friction force by pressure times slope of the profile",
+        "friction force by the slope",
+        "pressure times slope of the profile; "
         "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
         may_be_missing=True,
     ),
     **over_axis("speed", _SHARED),
-    "dissipated_power": Variable(("speed",), "W", "power dissipated in the material", short="dissipated power"),
-    "loss_tangent": Variable(("speed",), "1", "largest loss tangent over the waves of the grid"),
+    "dissipated_power": Variable(("speed",), "W", "dissipated power", "in the material"),
+    "loss_tangent": Variable(("speed",), "1", "largest loss tangent", "over the waves of the grid"),
     "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32", group="cost"),
     "stated_error": Variable(
         ("speed",),
         "1",
-        "stated relative error: the larger one of pressure (L1) and friction",
+        "stated relative error",
+        "the larger one of pressure (L1) and friction: "
         "what the iteration leaves; comparable to the tolerance; the grid's part is stated apart",
         may_be_missing=True,
         in_table="largest",
@@ -81,21 +81,30 @@ SLIDING: dict[str, Variable] = {
     "pressure_residual": Variable(
         ("speed",),
         "1",
-        "error of the pressure that the iteration leaves",
+        "iteration's error of the pressure",
         "estimated, L1, over the load",
+        group="accuracy",
         in_table="largest",
     ),
     "friction_residual": Variable(
-        ("speed",), "1", "error of the friction that the iteration leaves", "estimated, relative", in_table="largest"
+        ("speed",),
+        "1",
+        "iteration's error of the friction",
+        "estimated, relative",
+        group="accuracy",
+        in_table="largest",
     ),
     "persson_friction_coefficient": Variable(
-        ("speed",), "1", "friction coefficient by Persson's theory of the same waves"
+        ("speed",), "1", "friction coefficient, Persson", "by Persson's theory of the same waves"
     ),
-    "persson_contact_fraction": Variable(("speed",), "1", "contact area over nominal area, by Persson's theory"),
+    "persson_contact_fraction": Variable(
+        ("speed",), "1", "contact fraction, Persson", "contact area over nominal area, by Persson's theory"
+    ),
     "grid_error_friction": Variable(
         ("speed",),
         "1",
-        "bound in practice on the relative error of friction due to the grid",
+        "error of the friction due to the grid",
+        "bound in practice, relative: "
         "from the same speed on cells twice and four times as long (grid convergence index); of a scan it holds what "
         "roughness its coarser copies have lost",
         group="accuracy",
@@ -105,15 +114,16 @@ SLIDING: dict[str, Variable] = {
     "grid_error_area": Variable(
         ("speed",),
         "1",
-        "bound in practice on the relative error of the contact area due to the grid",
-        "as grid_error_friction, and from the number of faces at the contact's edge",
+        "error of the contact area due to the grid",
+        "bound in practice, relative: as grid_error_friction, and from the number of faces at the contact's edge",
         group="accuracy",
         may_be_missing=True,
     ),
     "last_octave_friction": Variable(
         ("speed",),
         "1",
-        "part of the friction that the shortest octave of waves adds",
+        "friction by the shortest octave",
+        "part that the shortest octave of waves adds",
         group="accuracy",
         may_be_missing=True,
         in_table="last",
@@ -121,7 +131,8 @@ SLIDING: dict[str, Variable] = {
     "last_octave_area": Variable(
         ("speed",),
         "1",
-        "part of the contact area that the shortest octave of waves adds",
+        "contact area by the shortest octave",
+        "part that the shortest octave of waves adds",
         group="accuracy",
         may_be_missing=True,
     ),

@@ -20,10 +20,9 @@ def _of(kind: str, units: str) -> dict[str, Variable]:
         name: Variable(
             _SERIES,
             units,
-            f"{kind} conductance of the contact spots",
-            _MEANT,
+            f"{kind} conductance",
+            f"of the contact spots; {_MEANT}",
             ancillary=(f"{name}_error",),
-            short=f"{kind} conductance",
             in_table="last",
         ),
         f"{name}_error": Variable(
@@ -35,16 +34,15 @@ def _of(kind: str, units: str) -> dict[str, Variable]:
         f"{name}_holm": Variable(
             _SERIES,
             units,
-            f"{kind} conductance by Holm's estimate",
+            f"{kind} conductance, Holm",
+            "Holm's estimate: "
             "many round spots side by side, in series with the disc that they lie in; the latter in free space only",
-            short=f"{kind} conductance, Holm",
         ),
         f"{name}_greenwood": Variable(
             _SERIES,
             units,
-            f"{kind} conductance by Greenwood's estimate",
-            "round spots that interact as points, currents in proportion to the radii",
-            short=f"{kind} conductance, Greenwood",
+            f"{kind} conductance, Greenwood",
+            "Greenwood's estimate: round spots that interact as points, currents in proportion to the radii",
         ),
     }
 
@@ -53,10 +51,10 @@ SPOTS: dict[str, Variable] = {
     "incremental_stiffness": Variable(
         _SERIES,
         "N/m",
-        "stiffness against a fast increment, the contact frozen",
+        "incremental stiffness",
+        "against a fast increment, the contact frozen: "
         "frozen_stiffness times the contact modulus, unless given that at once; missing where the material has none",
         ancillary=("incremental_stiffness_error",),
-        short="incremental stiffness",
     ),
     "incremental_stiffness_error": Variable(
         _SERIES, "N/m", "stated error of the incremental stiffness", "of the grid and of the solver"
@@ -64,7 +62,8 @@ SPOTS: dict[str, Variable] = {
     "frozen_stiffness": Variable(
         _SERIES,
         "m",
-        "stiffness of the frozen contact over the contact modulus",
+        "frozen stiffness",
+        "of the frozen contact, over the contact modulus: "
         "of a disc, twice its radius; infinite in full contact where uniform pressure displaces nothing",
         ancillary=("frozen_stiffness_error",),
     ),
@@ -74,16 +73,14 @@ SPOTS: dict[str, Variable] = {
     "persson_contact_area": Variable(
         _SERIES,
         "m^2",
-        "contact area by Persson's theory",
-        "at the rms slope of the surface; missing once the load has fallen",
-        short="contact area, Persson",
+        "contact area, Persson",
+        "by Persson's theory, at the rms slope of the surface; missing once the load has fallen",
     ),
     "asperity_contact_area": Variable(
         _SERIES,
         "m^2",
-        "contact area at low loads by Bush, Gibson and Thomas",
-        "at the rms slope of the surface; missing once the load has fallen",
-        short="contact area, Bush, Gibson and Thomas",
+        "contact area, Bush, Gibson and Thomas",
+        "at low loads, at the rms slope of the surface; missing once the load has fallen",
     ),
     **_of("thermal", "W/K"),
     **_of("electrical", "S"),

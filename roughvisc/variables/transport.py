@@ -14,22 +14,22 @@ TRANSPORT: dict[str, Variable] = {
     "leak_rate": Variable(
         _SERIES,
         "m^3/s",
-        "leak rate: volume of fluid that flows through the gap in unit time",
+        "leak rate",
+        "volume of fluid that flows through the gap in unit time, "
         "with the pressure drop over the length of the map along the flow; zero where leak_status says closed",
         ancillary=("leak_rate_solver_lower", "leak_rate_solver_upper", "leak_status"),
-        short="leak rate",
         in_table="last",
     ),
     "leak_rate_solver_lower": Variable(
         _SERIES,
         "m^3/s",
-        "lower bound on the leak rate that the equations of this grid have",
+        "lower bound on this grid's leak rate",
         "of the solution of these equations alone (Thomson): without the error of the grid and that of the gap",
     ),
     "leak_rate_solver_upper": Variable(
         _SERIES,
         "m^3/s",
-        "upper bound on the leak rate that the equations of this grid have",
+        "upper bound on this grid's leak rate",
         "of the solution of these equations alone (Dirichlet): without the error of the grid and that of the gap",
     ),
     "leak_status": Variable(
@@ -44,7 +44,8 @@ TRANSPORT: dict[str, Variable] = {
     "transmissivity": Variable(
         _SERIES,
         "m^3",
-        "hydraulic transmissivity of the gap",
+        "hydraulic transmissivity",
+        "of the gap: "
         "leak rate times viscosity over the pressure gradient and the width across the flow: the cube of a parallel "
         "gap over 12; independent of the fluid",
         short="transmissivity",
@@ -53,29 +54,30 @@ TRANSPORT: dict[str, Variable] = {
     "hydraulic_aperture": Variable(
         _SERIES,
         "m",
-        "hydraulic aperture: the parallel gap that leaks as much",
-        "the cube root of 12 times the transmissivity; independent of the fluid",
-        short="hydraulic aperture",
+        "hydraulic aperture",
+        "the parallel gap that leaks as much: the cube root of 12 times the transmissivity; independent of the fluid",
         in_table="last",
     ),
     "flux": Variable(
         _FRAME,
         "m^2/s",
-        "size of the volume flux of the fluid, over the height of the gap",
-        "missing in contact",
+        "volume flux",
+        "its size, of the fluid, over the height of the gap; missing in contact",
         short="flux",
     ),
     "flux_x": Variable(
         _FRAME,
         "m^2/s",
-        "volume flux of the fluid along x, over the height of the gap",
+        "volume flux along x",
+        "of the fluid, over the height of the gap: "
         "mean of the two faces of the cell; zero in contact and where nothing flows through",
         short="flux along x",
     ),
     "flux_y": Variable(
         _FRAME,
         "m^2/s",
-        "volume flux of the fluid along y, over the height of the gap",
+        "volume flux along y",
+        "of the fluid, over the height of the gap: "
         "mean of the two faces of the cell; zero in contact and where nothing flows through",
         short="flux along y",
     ),

@@ -41,8 +41,8 @@ def test_dataset__is_labelled_and_in_the_order_given(curve):
     assert curve.friction_coefficient.attrs["units"] == "1"
     assert curve.status.attrs["flag_meanings"].split()[0] == "converged"
     assert (curve.status == 0).all()
-    assert curve.attrs["direction"] == "x"
-    assert "No shear at the interface" in curve.attrs["model_note"]
+    assert curve.roughvisc.attributes["direction"] == "x"
+    assert "No shear at the interface" in curve.roughvisc.attributes["model_note"]
     assert float(curve.friction_coefficient[0]) == float(curve.friction_coefficient.max())
 
 
@@ -149,7 +149,7 @@ def test_temperature__shifts_the_speed(curve):
 
 def test_sheet__rubs_less_as_it_is_thinner(curve):
     thin = friction_whole(ROUGH, rv.sheet(RUBBER, 2e-5), pressure=2e4, speeds=0.2)
-    assert (thin.attrs["thickness"], thin.attrs["base"]) == (2e-5, "bonded")
+    assert (thin.roughvisc.attributes["thickness"], thin.roughvisc.attributes["base"]) == (2e-5, "bonded")
     assert float(thin.contact_area[0]) < 0.9 * float(curve.contact_area[0])
     thick = friction_whole(ROUGH, rv.sheet(RUBBER, 1e-2), pressure=2e4, speeds=0.2)
     assert float(thick.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
@@ -176,8 +176,8 @@ def test_last_octave__is_the_change_from_a_surface_without_it():
     assert (exact > 0.2).all()
     np.testing.assert_allclose(found.last_octave_friction, exact, rtol=1e-6)
     np.testing.assert_allclose(found.last_octave_area, 0, atol=1e-12)
-    assert found.attrs["last_octave"] == "waves shorter than 0.0004 m"
-    assert "last_octave" not in less.attrs
+    assert found.roughvisc.attributes["last_octave"] == "waves shorter than 0.0004 m"
+    assert "last_octave" not in less.roughvisc.attributes
     assert set(found.variables) <= set(SLIDING)
     press["pressure"] = 1e3
     found, less = friction_whole(two, RUBBER, **press, last_octave=True), friction_whole(long, RUBBER, **press)
@@ -211,7 +211,10 @@ def test_measured_material__is_fitted_once_a_speed(monkeypatch):
 
 def test_seam__is_told():
     tilted = ROUGH.copy(data=ROUGH.values + 1e-4 * np.arange(40)[:, None] / 40)
-    assert "repeats with a step" in friction_whole(tilted, RUBBER, pressure=2e3, speeds=1e-2).attrs["border_note"]
+    assert (
+        "repeats with a step"
+        in friction_whole(tilted, RUBBER, pressure=2e3, speeds=1e-2).roughvisc.attributes["border_note"]
+    )
 
 
 @pytest.mark.parametrize(

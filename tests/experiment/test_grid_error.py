@@ -191,7 +191,7 @@ def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
 def test_direct_memory__gives_the_same_contact():
     settings = {"grid_error": False, "tolerance": 1e-4}
     series, direct = pressed((33, 31), **settings), pressed((33, 31), numerics=rv.Numerics(memory="direct"), **settings)
-    assert "direct history" in direct.attrs["memory"]
+    assert "direct history" in direct.roughvisc.attributes["memory"]
     assert direct.approach.values == pytest.approx(series.approach.values, rel=2e-4)
 
 

@@ -56,8 +56,8 @@ def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch
     if name == "grown":
         assert whole.sizes["x"] > height.sizes["x"]
     assert found.sizes == whole.sizes
-    assert "mirror images" in found.attrs["left_out"]
-    assert "mirror images" not in whole.attrs["left_out"]
+    assert "mirror images" in found.roughvisc.attributes["left_out"]
+    assert "mirror images" not in whole.roughvisc.attributes["left_out"]
     # the contact of each step is solved to 3e-8 in energy, 2e-4 in the norm of energy
     scales = dict.fromkeys(("gap", "displacement", "mean_gap"), float(whole.displacement.max()))
     for field in FIELDS:

@@ -20,7 +20,7 @@ def press(material, **settings):
 def test_note__is_left_out_where_every_row_keeps_the_tolerance():
     ds = press(rv.zener(3e6, 1e6, 1e5))
     assert (ds.stated_error <= 1e-2).all()
-    assert "accuracy_note" not in ds.attrs
+    assert "accuracy_note" not in ds.roughvisc.attributes
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_note__is_left_out_where_every_row_keeps_the_tolerance():
     ],
 )
 def test_note__names_what_jumps(material, says):
-    note = press(material).attrs["accuracy_note"]
+    note = press(material).roughvisc.attributes["accuracy_note"]
     assert says in note
     assert "The approach meets the tolerance" in note
 
@@ -41,9 +41,9 @@ def test_note__counts_the_rows_that_state_more_than_the_tolerance():
     errors = ds.stated_error.values
     missed = np.count_nonzero(errors > 1e-2)
     assert missed
-    assert f"{missed} of 3 rows state" in ds.attrs["accuracy_note"]
-    assert f"{errors.max():.2g} at worst" in ds.attrs["accuracy_note"]
-    assert "time step is fixed" in ds.attrs["accuracy_note"]
+    assert f"{missed} of 3 rows state" in ds.roughvisc.attributes["accuracy_note"]
+    assert f"{errors.max():.2g} at worst" in ds.roughvisc.attributes["accuracy_note"]
+    assert "time step is fixed" in ds.roughvisc.attributes["accuracy_note"]
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def pressed(height, boundary="periodic"):
 def test_border_note__is_of_periodic_surfaces_that_repeat_with_a_step(caplog):
     part = ROUGH.isel(x=slice(0, 33), y=slice(0, 25))
     ds = pressed(part)
-    note = ds.attrs["border_note"]
+    note = ds.roughvisc.attributes["border_note"]
     assert "repeats with a step" in note
     assert note in caplog.text
     seam = [ds.pressure[-1].isel({axis: [0, -1]}).mean() for axis in ("x", "y")]
@@ -92,20 +92,20 @@ def test_edge_note__says_when_contact_came_to_the_border(caplog):
     """A ball reaches the middle of its nearer side, at 7 um, when its approach is ``a^2 / R``: Hertz."""
     depth = 4 * (7e-6) ** 2 / 1e-3
     ds = ball_pressed(depth, edge="accept")
-    assert ds.attrs["edge"] == "accept"
+    assert ds.roughvisc.attributes["edge"] == "accept"
     assert float(ds.pressure[0, :, [0, -1]].max()) == 0.0  # at the kept times it is not at the border
     assert float(ds.pressure[-1, :, [0, -1]].max()) == 0.0
-    began = float(re.search(r"first in the step to ([\d.]+) s", ds.attrs["edge_note"])[1])
+    began = float(re.search(r"first in the step to ([\d.]+) s", ds.roughvisc.attributes["edge_note"])[1])
     assert 0.2 < began < 0.35
-    assert "there the surface acts as a punch of its outline" in ds.attrs["edge_note"]
-    assert ds.attrs["edge_note"] in caplog.text
+    assert "there the surface acts as a punch of its outline" in ds.roughvisc.attributes["edge_note"]
+    assert ds.roughvisc.attributes["edge_note"] in caplog.text
     caplog.clear()
     inside = ball_pressed(0.2 * depth, edge="accept")
-    assert inside.attrs["edge"] == "accept"
-    assert "edge_note" not in inside.attrs
+    assert inside.roughvisc.attributes["edge"] == "accept"
+    assert "edge_note" not in inside.roughvisc.attributes
     assert "edge" not in ball_pressed(0.2 * depth).attrs
     periodic = ball_pressed(0.05 * depth, edge="accept", boundary="periodic")
-    assert (periodic.attrs["edge"], "edge_note" in periodic.attrs) == ("accept", False)
+    assert (periodic.roughvisc.attributes["edge"], "edge_note" in periodic.roughvisc.attributes) == ("accept", False)
     assert "punch" not in caplog.text
 
 
@@ -113,6 +113,6 @@ def test_section__is_not_cut_along_the_seam():
     part = ROUGH.isel(x=slice(0, 33), y=slice(0, 25))
     part = part.where(part.y > part.y[1], part + 1e-6)  # a ridge along one border
     ds = pressed(part)
-    assert ds.attrs["border_note"]
+    assert ds.roughvisc.attributes["border_note"]
     assert int(ds.pressure[-1].sum("x").values.argmax()) < 2
     assert 2 <= cut_position(ds, 0, "y") < 23

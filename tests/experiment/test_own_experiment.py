@@ -93,7 +93,7 @@ def test_run__gives_what_a_load_gives(study, tmp_path):
         assert off < 2e-3
         assert float(ds.approach[number]) == pytest.approx(float(one.approach[-1]), rel=1e-3)
     assert (ds.stated_error < 1e-3).all()
-    assert ds.attrs["comment"].startswith("Elastic contact at once")
+    assert ds.roughvisc.attributes["comment"].startswith("Elastic contact at once")
 
 
 def test_resume__ends_with_the_same_bits(study, tmp_path):

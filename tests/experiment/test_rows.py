@@ -86,7 +86,7 @@ def test_dent_left_by_a_load__is_as_uncertain_as_the_load_made_it():
     ds = simulate_whole(BALL, MATERIALS["power_law"], program, times=[0.6, 30.6], tolerance=1e-2, progress=False)
     loaded, left = ds.approach.values
     assert left < 0.1 * loaded
-    assert ds.approach_error[-1] > ds.attrs["series_error"] * loaded > 0
+    assert ds.approach_error[-1] > ds.roughvisc.attributes["series_error"] * loaded > 0
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])

@@ -135,8 +135,8 @@ def test_work__is_that_of_the_force_on_the_approach():
     """Hertz: two fifths of force times approach, for an elastic ramp."""
     program = rv.Program().load(2e-3, over=1.0)
     ds = simulate(BALL, rv.elastic(1e6), program, times=81, tolerance=1e-6)
-    assert float(ds.work[-1]) == pytest.approx(0.4 * float(ds.force[-1] * ds.approach[-1]), rel=1e-2)
-    assert (np.diff(ds.work) >= 0).all()
+    assert float(ds.roughvisc.energy.work[-1]) == pytest.approx(0.4 * float(ds.force[-1] * ds.approach[-1]), rel=1e-2)
+    assert (np.diff(ds.roughvisc.energy.work) >= 0).all()
 
 
 def test_zero_load__is_open():

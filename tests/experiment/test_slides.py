@@ -76,7 +76,7 @@ def test_result__holds_friction_over_time_and_steps():
     assert float(abs(steps.friction_force_across).max()) < 1e-9 * float(ds.friction_force.max())
     assert abs(ds.friction_force[-1]) < 1e-3 * ds.friction_force.max(), "what is left of the slide fades in a rest"
     integral = np.trapezoid(steps.friction_force, steps.sliding_distance)
-    assert ds.friction_work[-1] == pytest.approx(integral, rel=0.02)
+    assert ds.roughvisc.energy.friction_work[-1] == pytest.approx(integral, rel=0.02)
     assert (ds.friction_force_error >= 0).all()
     for name in ("friction_force", "step_friction_force"):
         assert ds[name].attrs["units"] == "N"
@@ -100,12 +100,12 @@ def test_every_step_of_a_slide__is_a_row_where_all_are_kept():
     inside = ds.time > 2e-3 * (1 + 1e-9)
     assert int(inside.sum()) == 12
     assert float(ds.stated_error.where(inside).max()) > 1e-4
-    assert "one cell a step" in ds.attrs["accuracy_note"]
+    assert "one cell a step" in ds.roughvisc.attributes["accuracy_note"]
 
 
 def test_distance__is_told_where_it_is_not_of_whole_cells():
     ds = slid(PRESS.slide(0.49 * SIDE, speed=0.1), times=1)
-    assert ds.attrs["slide_note"] == "program.2 slides 500 µm, 12 whole cells, of 490 µm"
+    assert ds.roughvisc.attributes["slide_note"] == "program.2 slides 500 µm, 12 whole cells, of 490 µm"
     assert ds.sliding_distance.item() == pytest.approx(0.5 * SIDE)
     assert ds.time.item() == pytest.approx(2e-3 + 4.9e-3), "its time is as asked for"
     assert "slide_note" not in slid(PRESS.slide(0.5 * SIDE, speed=0.1), times=1).attrs

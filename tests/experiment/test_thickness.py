@@ -106,7 +106,7 @@ def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base):
     # the mean of the gap is zero: the highest cell has sunk by its height and by the sheet's compression
     sunk = 3 * crest / modulus * sheet.uniform_displacement
     assert float(ds.approach[0]) == pytest.approx(float(wave.max()) + sunk, rel=1e-3)
-    assert ("compression of the sheet" in ds.attrs["body_note"]) == (sheet.uniform_displacement > 0)
+    assert ("compression of the sheet" in ds.roughvisc.attributes["body_note"]) == (sheet.uniform_displacement > 0)
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -122,7 +122,7 @@ def test_thick_sheet__tends_to_the_half_space(boundary):
     assert float(abs(thick.approach / half.approach - 1).max()) < 1e-3
     endless = pressed(WAVY, rubber, load, boundary=boundary, times=[0.1, 0.3], thickness=math.inf, **edge)
     np.testing.assert_array_equal(endless.pressure, half.pressure)
-    assert "thickness" not in endless.attrs
+    assert "thickness" not in endless.roughvisc.attributes
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -211,12 +211,12 @@ def case(tmp_path):
 def test_study__presses_the_sheet_that_it_states(case, tmp_path):
     assert case.body().kernel == Sheet(1e-4, 0.5, "slipping")
     ds = run_whole(case, out=tmp_path / "out", progress=False)
-    assert (ds.attrs["thickness"], ds.attrs["base"]) == (1e-4, "slipping")
-    assert "kernel" not in ds.attrs
+    assert (ds.roughvisc.attributes["thickness"], ds.roughvisc.attributes["base"]) == (1e-4, "slipping")
+    assert "kernel" not in ds.roughvisc.attributes
     same = pressed(case.height(), case.material(), case.program(), base="slipping", times=[0, 0.5])
     np.testing.assert_array_equal(ds.pressure, same.pressure)
     assert Case.from_json(ds.attrs["case"]).body() == case.body()
-    assert "base matters" in ds.attrs["body_note"]
+    assert "base matters" in ds.roughvisc.attributes["body_note"]
 
 
 def test_key__knows_the_sheet_and_leaves_half_spaces_as_they_were(case):
@@ -257,7 +257,7 @@ def test_plan_and_result__say_whether_a_half_space_would_have_done(case, thickne
     other = vary(case, {"material.thickness": thickness})
     assert words in str(rv.plan([other]).body_note.values[0])
     ds = pressed(other.height(), other.material(), other.program(), thickness=thickness, base="slipping")
-    assert words in ds.attrs["body_note"]
+    assert words in ds.roughvisc.attributes["body_note"]
 
 
 def test_screens_of_plan_and_run__show_what_the_base_does(case, tmp_path):
@@ -276,7 +276,7 @@ def test_note__bounds_what_a_half_space_has_more(case):
             pressed(case.height(), rv.elastic(1e6), rv.Program().load(1e-3, over=0), thickness=h)
             for h in (thickness, None)
         )
-        said = float(on_sheet.attrs["body_note"].split("up to ")[1].split(" %")[0]) / 100
+        said = float(on_sheet.roughvisc.attributes["body_note"].split("up to ")[1].split(" %")[0]) / 100
         true = float(half.approach[0] / on_sheet.approach[0]) - 1
         assert true < said * 1.01
         assert said < 2 * true

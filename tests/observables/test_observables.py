@@ -151,7 +151,6 @@ def test_percolation__is_of_the_region_out_of_contact():
     found = observables.percolation(from_maps(wall, RING[1:, :], np.ones((4, 5))))
     assert found["percolates_x"].values.tolist() == [0, 1, 0]
     assert found["percolates_y"].values.tolist() == [1, 1, 0]
-    assert "comment" not in found["percolates_y"].attrs
     assert found["percolates_x"].dtype == np.int8
 
 

@@ -25,7 +25,7 @@ from roughvisc.topography.grid import nominal_area, spacing, taper_weights
 from roughvisc.topography.parameters import parameters, rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.topography.synthesis import is_analytic
-from roughvisc.variables import of_step
+from roughvisc.variables import OTHER_DIMS, of_step
 from roughvisc.variables.axes import axis_of
 
 #: Part of the mean square slope beyond the shortest wave of a recipe, up to which it is the recipe's surface.
@@ -505,7 +505,7 @@ def _check(dataset: Any) -> None:
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"audit: found {type(dataset).__name__}: expected a result (xarray.Dataset), or a Case")
     axis = axis_of(dataset.variables)
-    if extra := [str(dim) for dim in dataset.dims if dim not in (axis, "step", "x", "y")]:
+    if extra := [str(dim) for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]:
         raise InputError(
             f"audit: found a dimension {extra[0]!r}: expected the result of one case, as open_result opens its file"
         )

@@ -365,6 +365,7 @@ def _row(
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
     quarter = work(cells / 4) / work(cells)
+    seconds = wall_time(settings, solved, found, choice, convolution)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     if needed(cells) > PART * there.size:
         row["refusal"] = too_large(shape, needed, there, [])
@@ -381,13 +382,13 @@ def _row(
         "rows": found.rows,
         **_contact(found, marched),
         "convolutions": found.convolutions,
-        "wall_time": wall_time(settings, solved, found, choice, convolution),
+        "wall_time": seconds,
         "memory": needed(cells),
         "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter),
         "half_memory": needed(cells // 4),
         "rms_slope": surface.slope,
         "half_rms_slope": surface.half_slope,
-        "disk": disk(case, cells, found),
+        "disk": disk(case, cells, found, seconds),
     }
 
 
@@ -452,7 +453,7 @@ def _general_row(
         "convolutions": found.convolutions,
         "wall_time": found.convolutions * convolution,
         "memory": needed(cells),
-        "disk": disk(case, cells, found),
+        "disk": disk(case, cells, found, found.convolutions * convolution),
     }
 
 

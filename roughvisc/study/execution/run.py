@@ -41,6 +41,7 @@ from roughvisc.study.storage.store import (
     write_result,
 )
 from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
@@ -283,7 +284,7 @@ def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
     if not path.exists() or _problem(case, path):
         return False
     with open_result(path) as dataset:
-        made_with = str(dataset.attrs.get("transforms", ""))
+        made_with = str(attributes_of(dataset.attrs).get("transforms", ""))
     if made_with != transform_library():
         warn_once(path, f"{path}: {other_transforms([made_with])}")
         return not same_bits

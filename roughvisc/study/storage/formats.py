@@ -4,7 +4,8 @@ The attribute ``result_format`` of a result is a number that says which meaning 
 :data:`roughvisc.variables.RESULT_FORMAT` today. Results of format 1 have no number. In them ``contact_area`` is the
 count of cells; ``contact_fraction``, ``contact_area_lower`` and ``contact_area_upper`` belong to that count; and
 ``contact_area_corrected`` is the corrected area. ``leak_rate_lower`` and ``leak_rate_upper`` are bounds by the flow
-solver. Files of format 2 have no groups: all their variables are at the root.
+solver. Files of format 2 have no groups: all their variables are at the root. In files of format 3 the energies are at
+the root, and every attribute stands by itself: what splits a result sorts both.
 """
 
 from __future__ import annotations
@@ -103,7 +104,6 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If its format is none that this version can read.
     """
-    import xarray as xr
 
     if "quantity" in dataset.coords:
         return _current_trade(dataset)
@@ -111,7 +111,7 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
     if found == RESULT_FORMAT:
         return dataset
     if found >= NAMES_OF_TODAY:
-        return dataset.assign_attrs(result_format=RESULT_FORMAT)
+        return _with_labels_of_today(dataset)
     former = [name for name in FORMER_NAMES if name in dataset.variables]
     read = {name: dataset[name].values for name in (*former, "grid_error_area") if name in dataset.variables}
     known = AXES[axis_of(dataset.variables)].variables
@@ -123,8 +123,20 @@ def to_current(dataset: xr.Dataset) -> xr.Dataset:
     }
     if "grid_error_area" in read:
         columns["grid_error_area"] = dataset["grid_error_area"].variable
-    converted = annotate(xr.Dataset(columns))
-    return dataset.drop_vars(former).assign(converted.data_vars).assign_attrs(result_format=RESULT_FORMAT)
+    return _with_labels_of_today(dataset.drop_vars(former).assign(columns))
+
+
+def _with_labels_of_today(dataset: xr.Dataset) -> xr.Dataset:
+    """A result whose names have the meaning of today, with their labels, too."""
+    import xarray as xr
+
+    known = AXES[axis_of(dataset.variables)].variables
+    declared = [name for name, one in dataset.variables.items() if name in known and one.dims == known[str(name)].dims]
+    labelled = annotate(xr.Dataset({name: dataset[name].variable for name in declared}))
+    found = dataset.assign_attrs(result_format=RESULT_FORMAT)
+    for name, one in labelled.variables.items():
+        found[name].attrs = dataset[name].attrs | one.attrs
+    return found
 
 
 def _current_trade(dataset: xr.Dataset) -> xr.Dataset:

@@ -27,13 +27,14 @@ from roughvisc.study.storage.checksum import UNSEALED, append_checksum, unsealed
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
 from roughvisc.variables import RESULT_FORMAT, of_step
+from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")
 
 INDEX, LATEST = ".index.npz", ".latest.json"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 5
+_LAYOUT = 6
 #: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
@@ -63,7 +64,7 @@ class Entry:
     stamp : tuple of int
         Its size [bytes] and its time of change [ns].
     attributes : dict
-        Of the file.
+        Of the file, each under its own name.
     fields : dict
         dtype of each variable over x and y.
     histories : dict
@@ -138,7 +139,7 @@ def read_entry(path: Path) -> Entry:
         sealed = verify_checksum(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
-            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+            attributes = attributes_of({name: file.getncattr(name) for name in file.ncattrs()})
             stored = _histories(file)
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]

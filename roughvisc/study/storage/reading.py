@@ -21,6 +21,9 @@ from roughvisc.errors import InputError
 from roughvisc.groups import carrying
 from roughvisc.study.storage.checksum import verify_checksum
 
+#: End of the name of the borders of cells in a file; a Dataset has none, its cells are all alike.
+BOUNDS = "_bounds"
+
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
     """Part of a variable of a result, as it is stored.
@@ -57,6 +60,8 @@ class ResultBackend(BackendEntrypoint):
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
     """The variables of a file, or of a group of it."""
     variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
+    for axis in [name for name, one in variables.items() if one.attrs.get("bounds") == f"{name}{BOUNDS}"]:
+        variables.pop(variables[axis].attrs.pop("bounds"), None)
     attributes = {name: file.getncattr(name) for name in file.ncattrs()}
     decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
     texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}

@@ -21,6 +21,7 @@ from roughvisc.study.storage.reading import read_variable
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.upkeep import counted_versions, version_of
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.attributes import for_root
 from roughvisc.variables.axes import AXES
 
 #: Coordinate that says which version computed each case.
@@ -38,6 +39,9 @@ _SHARED = (
     "tolerance",
     "method",
     "direction",
+    "thickness",
+    "base",
+    "kernel",
 )
 
 
@@ -222,4 +226,4 @@ def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArr
     for number, entry in enumerate(entries):
         node = _stacked(folder, [entry], {key: values[number : number + 1] for key, values in parameters.items()})
         nodes[entry.key] = node.isel(case=0)
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=_attributes(entries)), **nodes})
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=for_root(_attributes(entries))), **nodes})

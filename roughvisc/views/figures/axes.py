@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from roughvisc.errors import InputError, printable
 from roughvisc.labels import expect_declared_units, expect_history
 from roughvisc.units import Unit, unit_for
+from roughvisc.variables import OTHER_DIMS
 from roughvisc.variables.axes import AXES, axis_of
 
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
@@ -237,7 +238,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     axis = axis_of(names) if axis_of(names) in names else axis_of(dataset.variables)
     if axis not in dataset.variables:
         names = (axis, *names)
-    extra = [dim for dim in dataset.dims if dim not in (axis, "step", "x", "y")]
+    extra = [dim for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]
     if extra:
         raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
     for name in names:

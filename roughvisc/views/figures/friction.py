@@ -16,6 +16,7 @@ from roughvisc.groups import whole_of
 from roughvisc.observables import history
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -82,7 +83,7 @@ def _chosen(dataset: xr.Dataset, speeds: float | Sequence[float] | None) -> list
 
 def _title(dataset: xr.Dataset, row: int) -> str:
     """Arrow of the motion, speed and friction."""
-    speed, arrow = float(dataset["speed"][row]), _ARROWS[str(dataset.attrs.get("direction", "x"))]
+    speed, arrow = float(dataset["speed"][row]), _ARROWS[str(attributes_of(dataset.attrs).get("direction", "x"))]
     number, _, power = f"{float(dataset['friction_coefficient'][row]):.2g}".partition("e")
     friction = rf"{number}$\times 10^{{{int(power)}}}$" if power else number
     return f"{arrow} V = {unit_for([speed], 'm/s').text(speed, 3)}\nµ = {friction}"

@@ -22,6 +22,7 @@ from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -317,9 +318,10 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
 
 def _end(dataset: xr.Dataset) -> str:
     """What the last point is, with the work that the result states."""
-    if "work" not in dataset:
+    whole = whole_of(dataset)
+    if "work" not in whole:
         return "end"
-    work = float(dataset["work"][-1])
+    work = float(whole["work"][-1])
     return f"end: {unit_for([work], 'J').text(work)} of work done"
 
 
@@ -436,9 +438,16 @@ def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     first = next(iter(cases.values()))
     alike = all(one.get("material") == stated[0].get("material") for one in stated)
     rough = stated[0].get("surface", {}).get("generate") not in _SMOOTH
-    if not (
-        "material" in stated[0] and alike and rough and first.attrs.get("boundary") == "periodic" and "height" in first
-    ) or {"thickness", "kernel"} & set(first.attrs):
+    if (
+        not (
+            "material" in stated[0]
+            and alike
+            and rough
+            and first.attrs.get("boundary") == "periodic"
+            and "height" in first
+        )
+        or {"thickness", "kernel"} & attributes_of(first.attrs).keys()
+    ):
         return {}
     material = material_of(first)
     end = max(float(one["time"][-1]) for one in cases.values())

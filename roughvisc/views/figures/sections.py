@@ -14,6 +14,7 @@ from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import VARIABLES
+from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
@@ -54,7 +55,7 @@ def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
     """Which lines of a direction are not at a seam: all of them, where the surface itself repeats."""
     inner = np.ones(count, dtype=bool)
     mirrored = "mirrored along x and y" in str(dataset.attrs.get("history", ""))
-    if (dataset.attrs.get("border_note") or mirrored) and count > 8:
+    if ("border_note" in attributes_of(dataset.attrs) or mirrored) and count > 8:
         margin = max(2, count // 16)
         inner[:margin] = inner[-margin:] = False
     return inner

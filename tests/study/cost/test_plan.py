@@ -264,7 +264,7 @@ def test_plan__counts_the_window_that_follows_a_small_contact(study):
     assert "too deep" not in str(planned.left_out.values[1])
     assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
     ds = run_whole(case, progress=False)
-    assert ds.attrs["left_out"] == planned.left_out.values[0]
+    assert ds.roughvisc.attributes["left_out"] == planned.left_out.values[0]
 
 
 def said_of(planned):
@@ -398,11 +398,13 @@ def test_bytes__are_fields_of_the_cells_and_what_the_process_takes(study):
 
 def test_disk__takes_the_fields_and_fifteen_histories_of_each_row(study):
     case = vary(study(ROUGH)[0], {"keep.fields": ["pressure", "gap"], "keep.precision": None})
-    empty, ten = (estimate.disk(case, 1000, CostEstimate(20, rows, 400, 0.0, 0.1, True)) for rows in (0, 10))
+    empty, ten = (estimate.disk(case, 1000, CostEstimate(20, rows, 400, 0.0, 0.6, True)) for rows in (0, 10))
     assert empty == 40e3 + 8 * 1000 + 8 * 20 * len(STEPPED), "and the histories of twenty steps"
     assert ten - empty == 10 * (2 * 8 * 1000 + 15 * 8)
     rare = estimate.disk(case, 1000, CostEstimate(20, 10, 400, 0.0, 0.01, True))
     assert rare - empty == pytest.approx(10 * (1.02 * 8 * 1000 + 15 * 8)), "a sparse pressure is compressed"
+    slow = estimate.disk(case, 1000, CostEstimate(20, 10, 400, 0.0, 0.6, True), seconds=1.0)
+    assert slow - empty == pytest.approx(10 * (2 * 0.7 * 8 * 1000 + 15 * 8)), "there is time to compress the others"
 
 
 def test_wall_time__is_that_of_the_convolutions_of_the_fields_passed_through_and_of_writing(study):

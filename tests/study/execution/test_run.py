@@ -36,7 +36,7 @@ def test_run__keeps_a_file_that_is_whole_in_itself(study):
         assert "generated: sphere\n" in read.attrs["history"]
         assert read.attrs["history"].endswith("run of ball.toml")
         assert read.attrs["case_key"] == case.key
-        assert read.attrs["surface_sha256"] == case.surface_sha256
+        assert read.roughvisc.attributes["surface_sha256"] == case.surface_sha256
         assert (read.attrs["boundary"], read.attrs["tolerance"]) == ("free", 1e-3)
         again = Case.from_json(read.attrs["case"])
     assert again == case

@@ -526,7 +526,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     assert stop.asked == steps - steps // 2
     assert not caplog.records
     with whole_result(path) as mixed:
-        assert mixed.attrs["transforms"] == f"{here}; then {there}"
+        assert mixed.roughvisc.attributes["transforms"] == f"{here}; then {there}"
         force = mixed.pressure.sum(("x", "y")).values
     assert run_case(case, tmp_path, stop=stop) == path
     assert stop.asked == steps - steps // 2, "it is finished"
@@ -535,7 +535,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     assert values(run_case(case, tmp_path, same_bits=True)) == expected
     with whole_result(path) as same:
-        assert same.attrs["transforms"] == here
+        assert same.roughvisc.attributes["transforms"] == here
         np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
 
 
@@ -545,7 +545,7 @@ def test_other_transforms__begin_again_where_bits_are_asked_for(whole, tmp_path,
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
     stop = Stop()
     with whole_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
-        assert ds.attrs["transforms"] == transform_library()
+        assert ds.roughvisc.attributes["transforms"] == transform_library()
     assert stop.asked == steps
 
 

@@ -74,9 +74,9 @@ def test_former_result__has_the_names_of_today(kind):
         np.testing.assert_array_equal(found[f"{step}contact_area"], area)
         np.testing.assert_array_equal(found[f"{step}contact_area_counted"], counted)
         np.testing.assert_allclose(found[f"{step}contact_fraction"], area / size, rtol=1e-12)
-        assert found[f"{step}contact_area_counted"].attrs["long_name"] == "area of the cells in contact"
+        assert found[f"{step}contact_area_counted"].attrs["long_name"] == "contact area, counted"
     assert not {"contact_area_corrected", "step_contact_area_corrected", "leak_rate_lower"} & set(found.variables)
-    assert found.attrs["result_format"] == 3
+    assert found.attrs["result_format"] == 4
     assert {name for name in stored if name not in FORMER_NAMES} <= {*found.variables, "string16", "step"}
 
 
@@ -124,7 +124,7 @@ def test_former_and_new_results_of_one_folder__have_one_meaning(folder):
     assert len(index_of(folder).entries) == 3
     found = rv.open_results(folder, cases="all").load()
     assert found.sizes["case"] == 3
-    assert found.attrs["result_format"] == 3
+    assert found.attrs["result_format"] == 4
     rows = [zip(*case, strict=True) for case in zip(found.gap.values, found.force.values, strict=True)]
     by_hand = np.array([[area_by_hand(*row) for row in case] for case in rows])
     np.testing.assert_allclose(found.contact_area, by_hand, rtol=1e-12)
@@ -155,7 +155,7 @@ def test_former_index_and_table__are_made_anew(folder):
 def test_former_result__written_again_is_of_the_present_format(kind, tmp_path):
     found = whole_result(file_of(kind)).load()
     with xr.open_dataset(write_result(found, tmp_path / "again.nc"), decode_timedelta=False) as plain:
-        assert plain.attrs["result_format"] == 3
+        assert plain.attrs["result_format"] == 4
     again = whole_result(tmp_path / "again.nc").load()
     assert set(again.variables) == set(found.variables)
     np.testing.assert_array_equal(again.contact_area, found.contact_area)
@@ -184,16 +184,16 @@ def test_former_result__in_the_report_has_one_area():
 def test_former_trade__has_the_names_of_today():
     found, stored = open_trade(FORMER / "trade.nc"), raw(FORMER / "trade.nc")
     former = [str(name) for name in stored["quantity"]]
-    assert found.attrs["result_format"] == 3
+    assert found.attrs["result_format"] == 4
     for name, old in (("contact_area", "contact_area_corrected"), ("contact_area_counted", "contact_area")):
         np.testing.assert_array_equal(found.error.sel(quantity=name), stored["error"][:, former.index(old)])
 
 
-@pytest.mark.parametrize("number", [4, 0, 1.5, "two"])
+@pytest.mark.parametrize("number", [5, 0, 1.5, "two"])
 def test_unknown_format__is_refused_with_its_number(number, tmp_path):
     path = tmp_path / "later.nc"
     whole_result(file_of("slide")).load().assign_attrs(result_format=number).to_netcdf(path)
-    with pytest.raises(InputError, match=rf"later\.nc: result_format is {number!r}: expected 1 to 3"):
+    with pytest.raises(InputError, match=rf"later\.nc: result_format is {number!r}: expected 1 to 4"):
         whole_result(path)
     os.replace(path, tmp_path / "0123456789abcdef.nc")
     assert index_of(tmp_path).entries == {}

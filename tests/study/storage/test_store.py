@@ -71,8 +71,8 @@ def test_write_result__follows_the_conventions(tmp_path):
             assert (variable.chunking() == "contiguous") is not large, name
             assert variable.filters()["zlib"] is large, name
             assert variable.filters()["complevel"] == large
-            assert variable.long_name
-            assert name == "status" or variable.units
+            assert name.endswith("_bounds") or variable.long_name
+            assert name.endswith("_bounds") or name == "status" or variable.units
             assert "axis" not in variable.ncattrs()
 
 
@@ -183,6 +183,19 @@ def test_field__is_compressed_where_that_pays(tmp_path):
             assert {name for name in ("pressure", "gap") if raw[name].filters()["zlib"]} == compressed
             assert raw["gap"].chunking() == [6, 64, 64], "12 frames in equal parts of at most 8"
     assert path.stat().st_size < 0.5 * (ds["gap"].nbytes + ds["pressure"].nbytes)
+
+
+@pytest.mark.parametrize(("seconds", "compressed"), [(1e-3, {"pressure"}), (60.0, {"pressure", "gap"})])
+def test_field__is_compressed_where_that_is_little_of_the_run(tmp_path, seconds, compressed):
+    """A pressure that takes next to nothing always is; a dense gap where its run took far longer than that."""
+    ds = hertz_creep((128, 128), 12)
+    ds["gap"].values[:] = np.random.default_rng(1).uniform(1.0, 2.0, ds["gap"].shape).astype("float32")
+    ds["pressure"].values[:] = 0.0
+    ds["wall_time"].values[:] = np.linspace(0.0, seconds, 12)
+    path = write_result(ds, tmp_path / "r.nc")
+    with netCDF4.Dataset(path) as raw:
+        assert {name for name in ("pressure", "gap") if raw[name].filters()["zlib"]} == compressed
+    xr.testing.assert_equal(whole_result(path).load(), ds)
 
 
 def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, monkeypatch):
