@@ -1,6 +1,7 @@
 """The accessor ``h.roughvisc``: conditioning and numbers of a height grid as methods, so that steps can be chained.
 
-``h.roughvisc.level().roughvisc.fill()`` is ``rv.fill(rv.level(h))``. ``import roughvisc.topography`` registers it, and
+``h.roughvisc.level().roughvisc.fill()`` is ``rv.fill(rv.level(h))``; ``h.roughvisc.plot()`` draws the heights, and
+``ds.pressure.isel(time=-1).roughvisc.plot()`` a field of a result. ``import roughvisc.topography`` registers it, and
 with it whatever gives heights: ``rv.open_scan``, ``rv.sphere``, the xarray engine. It imports nothing but xarray.
 """
 
@@ -25,6 +26,8 @@ METHODS = {
     }.items()
     for name in names.split()
 }
+#: The figure of heights, or of a field of a result: method -> module and function.
+_PLOT = ("roughvisc.views.figures.quick_plot", "quick_plot")
 
 
 @xr.register_dataarray_accessor("roughvisc")
@@ -34,19 +37,21 @@ class HeightAccessor:
     Parameters
     ----------
     height : xarray.DataArray
-        Height over (x, y). [m]
+        Height over (x, y); for ``plot`` a field of a result, too. [m]
     """
 
     def __init__(self, height: xr.DataArray) -> None:
         self._height = height
 
     def __getattr__(self, name: str) -> Any:
-        if name not in METHODS:
-            raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(METHODS)}")
-        function = getattr(import_module(METHODS[name]), name)
+        known = {method: (module, method) for method, module in METHODS.items()} | {"plot": _PLOT}
+        if name not in known:
+            raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(known)}")
+        module, called = known[name]
+        function = getattr(import_module(module), called)
         method = partial(function, self._height)
         method.__doc__ = function.__doc__
         return method
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *METHODS]
+        return [*super().__dir__(), *METHODS, "plot"]
