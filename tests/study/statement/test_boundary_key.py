@@ -134,5 +134,5 @@ def test_result__says_the_word(study):
 
 def test_card__that_cannot_be_read_is_named(study, tmp_path):
     (tmp_path / "scan.toml").write_text("file = ")
-    with pytest.raises(rv.InputError, match=r"study\.toml: solve: .*scan\.toml: is no surface card in TOML"):
+    with pytest.raises(rv.InputError, match=r"study\.toml: solve: .*scan\.toml: is not .*surface card in TOML"):
         read_study(study('[surface]\nfile = "scan.toml"\n' + BODY))
