@@ -38,7 +38,7 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
     assert f"Result: results/ball/{result.name}\n" in out
     for words in (
         "24 x 21 cells, free",
-        "3, up to t = 200 ms",
+        "to t = 200 ms",
         "5 mN",
         "worst stated error",
         "tolerance 0.001",
@@ -51,8 +51,8 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
 def test_run__of_what_is_finished_says_that_nothing_is_computed(invoke):
     sweep = '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]'
     for text, options, said in (
-        (BALL, ("--no-plots",), "Finished before: nothing has to be computed"),
-        (BALL + sweep, ("--workers", 0), "2, all before: nothing had to be computed"),
+        (BALL, ("--no-plots",), "Already finished: nothing to compute"),
+        (BALL + sweep, ("--workers", 0), "2, all before: nothing to compute"),
     ):
         study = write_study(text)
         first, again = (invoke("run", study, *options)[1] for _ in range(2))
@@ -75,16 +75,16 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     assert err.startswith("roughvisc: case 2 of 3: ")
     assert err.endswith("roughvisc: 1 of 3 cases failed\n")
     for words in (
-        "case 2 of 3 (program.0.load = 50.0): failed: ",
+        "case 2 of 3 (program.0.load = 50 N): failed: ",
         "2 of 3 cases done, 1 failed",
         "2, 0 of them before",
     ):
         assert words in out
-    assert "Results: results/ball\nTable of the cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
+    assert "Results: results/ball\nTable of cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
 
     status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
     assert (status, out) == (1, "")
-    assert "case 2 of 3, as before (--retry-failed tries again): " in err
+    assert "case 2 of 3, as before (use --retry-failed to try again): " in err
     assert "as before" not in invoke("run", "ball.toml", "--workers", 0, "--retry-failed")[2]
 
 
@@ -92,7 +92,7 @@ def test_run__sweep_in_which_all_is_wrong_is_status_2(invoke):
     sweep = '[sweep]\n"program.0.load" = ["50 N", "60 N"]'
     status, _, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
     assert status == 2
-    assert err.endswith("roughvisc: no case could be computed: the input is wrong\n")
+    assert err.endswith("roughvisc: no case could be computed: the input is invalid\n")
 
 
 def test_run__scheduler_that_is_not_there_is_status_2(invoke, tmp_path):
@@ -105,7 +105,7 @@ def test_plan__says_what_will_be_modelled_and_what_it_costs(invoke, tmp_path):
     sweep = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]'
     status, out, err = invoke("plan", write_study(BALL + sweep))
     assert (status, err) == (0, "")
-    for words in ("2, ", "free, transforms padded", "1 exponential", "24 x 21 cells", "Convolutions", "Disk", "0.004"):
+    for words in ("2, ", "free, FFTs padded", "1 exponential", "24 x 21 cells", "Convolutions", "Disk", "load", "[mN]"):
         assert words in out
     assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"], "nothing is written"
     status, _, err = invoke("plan", write_study(BALL, ("level = 0", "crop = 3")))
@@ -132,14 +132,14 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
     study = write_study(BALL, ("level = 0", "crop = { x = ['2 mm', '3 mm'] }"))
     status, out, err = invoke("plan", study)
     assert (status, out) == (2, "")
-    assert err.startswith("roughvisc: ball.toml: cannot run as it stands: surface: crop")
+    assert err.startswith("roughvisc: ball.toml: cannot run: surface: crop")
     ramp = 'approach = "1 um"'
     text = BALL.replace('load = "5 mN"', ramp).replace('"zener"\nshear', '"kelvin_voigt"\nshear')
     text = text.replace('kelvin_modulus = "1 MPa"\nkelvin_', "")
     sweep = '[sweep]\n"program.0.over" = [0, 0.1]'
     status, out, err = invoke("plan", write_study(text + sweep))
     assert status == 2
-    assert "cannot run as it stands: 1 of 2 cases: at 0 s the approach jumps" in err
+    assert "cannot run: 1 of 2 cases: at 0 s the approach jumps" in err
     assert [line.split()[-2:] for line in out.splitlines() if "cannot" in line] == [["cannot", "run"]]
 
 
@@ -184,7 +184,7 @@ def test_run__interrupted_is_status_130(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr(run_module, "solve", interrupted)
     status, _, err = invoke("run", write_study())
     assert status == 130
-    assert err == "roughvisc: interrupted; what was finished is kept\n"
+    assert err == "roughvisc: interrupted; finished work is kept; repeat the command to resume\n"
     assert [p.name for p in tmp_path.iterdir()] == ["ball.toml"]
 
 
@@ -267,8 +267,8 @@ def test_new__presses_to_the_contact_that_is_asked_for(invoke, tmp_path, scan_fi
 def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan_file):
     (tmp_path / "mine.toml").write_text("# mine\n")
     for arguments, words in (
-        ([scan_file, "-o", "mine.toml"], "mine.toml: exists already"),
-        ([scan_file, "-o", "mine.txt"], "expected the name of a study, .toml"),
+        ([scan_file, "-o", "mine.toml"], "mine.toml: already exists"),
+        ([scan_file, "-o", "mine.txt"], "expected a study file, .toml"),
         ([scan_file, "--channel", "7"], "--channel is 7"),
         ([scan_file, "--contact", "5 um"], "--contact: found '5 um': expected a part such as 1% or 0.01"),
         ([scan_file, "--contact", "120 %"], "--contact: found '120 %': expected a part such as 1% or 0.01"),
@@ -291,8 +291,8 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"
     (tmp_path / "focus_variation.x3p").write_bytes(b"mine")
     for arguments, words in (
-        (["-o", "third.toml"], "focus_variation.x3p: exists already, and is not written over"),
-        (["-o", "third.toml", "--unit", "um"], "--unit: says how a file is read, and none is named: expected FILE"),
+        (["-o", "third.toml"], "focus_variation.x3p: already exists and differs from the example"),
+        (["-o", "third.toml", "--unit", "um"], "--unit: has no meaning without FILE: expected FILE"),
     ):
         status, _, err = invoke("new", *arguments)
         assert status == 2
@@ -358,7 +358,7 @@ def test_scan__writes_a_card(invoke, tmp_path, scan_file):
     before = card.read_text()
     status, _, err = invoke("scan", scan_file, "--card")
     assert status == 2
-    assert "tilted.toml: exists already" in err
+    assert "tilted.toml: already exists" in err
     assert card.read_text() == before
 
 
@@ -369,7 +369,7 @@ def test_scan__lists_channels_and_parameters(invoke, tmp_path):
     status, out, err = invoke("scan", "two.x3p")
     assert (status, err) == (0, "")
     for words in (
-        "layer 0, of these:",
+        "layer 0, one of:",
         "layer 1: height in m, 30 x 20 points",
         "Sa, ",
         "Ssk, ",
@@ -404,12 +404,12 @@ def test_scan__takes_a_unit_of_heights_and_says_what_a_large_slope_means(invoke,
     height = rv.open_scan(tmp_path / "points.toml")
     np.testing.assert_allclose(height, 1e-6 * z, atol=1e-15)
     np.testing.assert_allclose(height.x, (np.arange(17) + 0.5) * 1e-6)
-    assert re.search(r"Slope +the rms slope is 0\.\d+ after these steps *\n +-> nothing to do", out)
+    assert re.search(r"Slope +the rms slope is 0\.\d+ after these steps *\n +-> no action needed", out)
     table = out[out.index("[surface]") : out.index("Picture:")]
     (tmp_path / "study.toml").write_text(table + BALL[BALL.index("[material]") :])
     np.testing.assert_allclose(rv.read_study(tmp_path / "study.toml").settings.surface.raw(), 1e-6 * z, atol=1e-15)
     steep = invoke("scan", "points.xyz", "--unit", "um,mm", "--force")[1]
-    assert "check the units of x, y and of the heights, and the spacing" in " ".join(steep.split())
+    assert "check the spacing and the units of x, y and height" in " ".join(steep.split())
     status, _, err = invoke("scan", "points.xyz", "--unit", "mm,parsec per")
     assert status == 2
     assert "--unit is '1 parsec per'" in err
@@ -418,9 +418,9 @@ def test_scan__takes_a_unit_of_heights_and_says_what_a_large_slope_means(invoke,
 def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_path, scan_file):
     content = scan_file.read_bytes()
     for arguments, words in (
-        (["--to", "tilted.nc"], "exists already"),
+        (["--to", "tilted.nc"], "already exists"),
         (["--to", "scan.stl"], "expected one of .nc, .x3p, .sdf"),
-        (["--plot", "tilted.nc"], "exists already"),
+        (["--plot", "tilted.nc"], "already exists"),
     ):
         status, _, err = invoke("scan", scan_file, *arguments)
         assert status == 2

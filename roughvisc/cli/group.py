@@ -76,10 +76,10 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}" + ("" if count == 1 else "s")
 
 
-def say(console: Console, what: str, path: Path) -> None:
-    """A path on one line of its own, whole, so that it can be copied or cut out by a program."""
+def say(console: Console, what: str, path: Path, *, before: str = "") -> None:
+    """A path, or a command on one, on one line of its own, so that it can be copied or cut out by a program."""
     shown = os.path.relpath(path)
-    line = printable(f"{what}: {path if shown.startswith('..') else shown}")
+    line = printable(f"{what}: {before}{path if shown.startswith('..') else shown}")
     console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
@@ -104,7 +104,7 @@ class _Screen(logging.Handler):
                 self._otherwise.handle(record)
         elif message not in self._said:
             self._said.add(message)
-            complain(message)
+            complain(naming_keys(message))
 
 
 @contextmanager
@@ -133,23 +133,21 @@ class Commands(click.Group):
             named = naming_options if ctx.invoked_subcommand in _READING else naming_keys
             raise Failure(named(str(error)), 2) from error
         except RoughviscError as error:
-            raise Failure(str(error), 1) from error
+            raise Failure(naming_keys(str(error)), 1) from error
         except OSError as error:  # a full disk, a file taken away
             if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
                 raise
             raise Failure(f"{error.filename or 'input or output'}: {error.strerror or error}", 1) from error
         except MemoryError as error:
-            raise Failure("not enough memory: roughvisc plan says how much a study needs", 1) from error
+            raise Failure("not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1) from error
         except RecursionError as error:
-            raise Failure("the input is nested too deeply: expected tables of a few levels", 2) from error
+            raise Failure("the input is nested too deeply: expected a few levels of tables", 2) from error
         except OverflowError as error:
-            raise Failure(
-                f"a number of the input is too large ({error}): expected one that a double can hold", 2
-            ) from error
+            raise Failure(f"a number in the input is too large ({error}): expected one below 1e308", 2) from error
         except RuntimeError as error:
             if not str(error).startswith("NetCDF: "):
                 raise
-            advice = "a file is damaged, and roughvisc verify says which"
+            advice = "a file is damaged; run `roughvisc verify FOLDER` to find it"
             raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
         except KeyboardInterrupt as error:
             status = 143 if isinstance(error, Terminated) else 130
@@ -161,7 +159,7 @@ class Commands(click.Group):
 def main() -> None:
     """Contact of measured rough surfaces with viscoelastic materials.
 
-    A scan and a study file in; labelled (time, x, y) NetCDF results and figures out.
+    Reads a scan and a study file. Writes NetCDF results over (time, x, y) and figures.
 
     \b
     Example:

@@ -13,10 +13,10 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-INTERRUPTED = "interrupted; what was finished is kept"
+INTERRUPTED = "interrupted; finished work is kept; repeat the command to resume"
 
 #: An interrupt that came during an import is tried again after so long. [s]
-_AGAIN = 0.02
+_AGAIN = 0.01
 
 
 class Terminated(KeyboardInterrupt):

@@ -14,22 +14,23 @@ from roughvisc.errors import InputError, printable
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="The study. [default: FILE's name-study.toml, here]")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), help="Study file to write. [default: FILE's name-study.toml, here]"
+)
 @click.option(
     "--contact",
     metavar="PART",
     default="5 %",
     show_default=True,
-    help="Part of the area to be in contact in the end: the pressure is chosen for it.",
+    help="Part of the area in contact at the end, which sets the pressure.",
 )
 @reading_options
 def new(file: Path | None, out: Path | None, contact: str, **given: str | None) -> None:
-    """Write a first study for a scan, to be run and to be changed.
+    """Write a first study for a scan.
 
-    The study has comments. The scan is looked at as `roughvisc scan` does, and conditioned accordingly. It is pressed
-    on a rubber with a pressure that brings about 5 per cent of its area into contact, or the part that --contact says;
-    it is found by pressing the scan. FILE is an instrument file or a surface card; without one a scan is written here
-    to try things with, focus_variation.x3p.
+    The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends
+    and presses the scan on a rubber, at a pressure that brings the part --contact of the area into contact. FILE is an
+    instrument file or a surface card. Without FILE, the command also writes an example scan, focus_variation.x3p.
 
     \b
     Example:
@@ -53,12 +54,12 @@ def new(file: Path | None, out: Path | None, contact: str, **given: str | None) 
     wanted = file or Path(EXAMPLE)
     out = out or Path(f"{wanted.stem}-study.toml")
     if out.suffix.lower() != ".toml":
-        raise InputError(f"{out}: found the suffix {out.suffix!r}: expected the name of a study, .toml")
+        raise InputError(f"{out}: has the suffix {out.suffix!r}: expected a study file, .toml")
     if out.exists():
-        raise InputError(f"{out}: exists already, and is not written over: expected another name (--out)")
+        raise InputError(f"{out}: already exists: expected another name (--out)")
     if file is None:
         for option in (name for name, value in given.items() if value):
-            raise InputError(f"--{option}: says how a file is read, and none is named: expected FILE")
+            raise InputError(f"--{option}: has no meaning without FILE: expected FILE")
         _write_example(wanted)
     scan = open_scan(wanted, **options)
     found = inspect_scan(scan)
@@ -85,4 +86,6 @@ def _write_example(path: Path) -> None:
         with atomic_write(path) as temporary:
             shutil.copyfile(held, temporary)
     elif path.read_bytes() != held.read_bytes():
-        raise InputError(f"{path}: exists already, and is not written over: expected an empty folder, or your own FILE")
+        raise InputError(
+            f"{path}: already exists and differs from the example: expected an empty folder, or your own FILE"
+        )

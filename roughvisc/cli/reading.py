@@ -11,14 +11,14 @@ import click
 from roughvisc.errors import InputError
 
 _OPTIONS = (
-    click.option(
-        "--unit", help="Unit of length, where the file states none: um; or of x and y, and of heights: mm,um."
-    ),
+    click.option("--unit", help="Unit of length if the file states none: um; or of x, y and of heights: mm,um."),
     click.option("--channel", help="Name or number of the channel. [default: the height]"),
-    click.option("--spacing", help="Distance of the points, where the file states none: 1um, or 1um,2um."),
-    click.option("--format", help="Format, where the suffix does not tell; auto: have it guessed."),
+    click.option("--spacing", help="Distance between points if the file states none: 1um, or 1um,2um."),
+    click.option("--format", help="Format if the suffix does not tell it; auto: detect it."),
 )
 _NAMES = "unit|height_unit|spacing|format|channel"
+#: Settings of which messages speak as Python does -> table of a study that has them.
+_TABLES = {"boundary": "solve", "edge": "solve", "method": "solve", "memory": "solve", "missing": "surface"}
 
 
 def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -48,7 +48,7 @@ def _sides(text: str | None) -> Any:
         return None
     sides = [float(part) if part.strip().replace(".", "").isdecimal() else part for part in text.split(",")]
     if len(sides) > 2:
-        raise InputError(f"--spacing: found {text!r}: expected one length, or two with a comma between them")
+        raise InputError(f"--spacing: found {text!r}: expected one length, or two separated by a comma")
     metres = [quantity(side, "m", "--spacing") for side in sides]
     return metres[0] if len(metres) == 1 else tuple(metres)
 
@@ -75,14 +75,20 @@ def naming_options(message: str) -> str:
 
 
 def naming_keys(message: str) -> str:
-    """The same with the keys of a study's ``[surface]``.
+    """The same with the keys of a study, and with the options of a command.
 
     Examples
     --------
     >>> naming_keys("it states no unit of its heights: pass unit= (such as unit='um')")
     'it states no unit of its heights: pass the key unit (such as unit = "um")'
+    >>> naming_keys("contact at the border: use boundary='periodic'")
+    'contact at the border: use [solve] boundary = "periodic"'
     """
     message = re.sub(r"\bspacing=(\(dx, dy\))? \[m\]", 'the key spacing (such as spacing = "1 um")', message)
     message = message.replace(" (see supported_formats())", "")
     message = re.sub(rf"\b({_NAMES})='(\w+)'", r'\1 = "\2"', message)
+    message = re.sub(
+        rf"\b({'|'.join(_TABLES)})=(['\"])(\w+)\2", lambda m: f'[{_TABLES[m[1]]}] {m[1]} = "{m[3]}"', message
+    )
+    message = message.replace("same_bits=True (--same-bits)", "--same-bits")
     return re.sub(rf"\b({_NAMES})=(?=\W|$)", r"the key \1", message)

@@ -1,4 +1,4 @@
-"""Commands on results, ``plot``, ``report`` and ``audit``, and on this machine, ``validate``."""
+"""Commands on results, ``plot``, ``report`` and ``audit``, and ``validate``."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from roughvisc.cli.group import Failure, say, say_figures
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the figures. [default: beside the result]")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the figures. [default: beside the result]")
 @click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
 def plot(result: Path, out: Path | None, every: bool) -> None:
-    """Draw the figures of a result, of a folder, or of a trade.
+    """Draw figures of a result, a folder of results, or a trade.
 
-    Of several cases also the figures of the sweep: quantities against what was varied, histories of all cases. What
-    was varied in a case stands above its figures and in the names of their files.
+    Draws two figures of each result: history and maps, or curve and maps of friction. --all draws the rest. For a
+    folder with several cases, also draws figures of the sweep: quantities against the varied settings, and histories
+    of all cases. File names and titles state the varied settings.
 
     \b
     Example:
@@ -52,13 +53,15 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Page. [default: report.html in the folder]")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Page to write. [default: report.html in the folder]"
+)
 def report(results: Path, output: Path | None) -> None:
-    """Write one page (HTML) about a result, or about a folder.
+    """Write an HTML report of a result or a folder of results.
 
-    What was run, the surface and its conditioning, figures, cases with accuracy and cost, and how to run them again;
-    case and time can be picked. The page is one file, with all results of the folder. Nothing is fetched
-    from anywhere when the page is looked at.
+    The report shows the contact at any case and time, the accuracy and cost of each case, the surface and its
+    conditioning, figures, assumptions, and how to repeat the study. It is one self-contained file that loads nothing
+    from the network.
 
     \b
     Example:
@@ -73,22 +76,22 @@ def report(results: Path, output: Path | None) -> None:
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
-@click.option("--work-of-adhesion", metavar="W", help='Of the two surfaces: "50 mJ/m^2".')
-@click.option("--yield-strength", metavar="Y", help='In tension, of the body that yields first: "40 MPa".')
-@click.option("--thickness", metavar="H", help='True thickness of what was taken for a half-space: "5 mm".')
-@click.option("--base", help="What it lies on: bonded or slipping. [default: bonded]")
-@click.option("--density", metavar="RHO", help='Of the body: "1100 kg/m^3".')
-@click.option("--linear-strain", metavar="STRAIN", help='Up to which the material is linear: 0.05, or "5 %".')
-@click.option("--heat-conductivity", metavar="K", help='Of the body: "0.2 W/m/K".')
-@click.option("--volumetric-heat-capacity", metavar="C", help='Of the body: "1.8 MJ/m^3/K".')
+@click.option("--work-of-adhesion", metavar="W", help='Work of adhesion of the two surfaces: "50 mJ/m^2".')
+@click.option("--yield-strength", metavar="Y", help='Tensile yield strength of the softer body: "40 MPa".')
+@click.option("--thickness", metavar="H", help='Actual thickness of the body modelled as a half-space: "5 mm".')
+@click.option("--base", help="Support of that body: bonded or slipping. [default: bonded]")
+@click.option("--density", metavar="RHO", help='Density of the body: "1100 kg/m^3".')
+@click.option("--linear-strain", metavar="STRAIN", help='Strain limit of linear behaviour: 0.05, or "5 %".')
+@click.option("--heat-conductivity", metavar="K", help='Heat conductivity of the body: "0.2 W/m/K".')
+@click.option("--volumetric-heat-capacity", metavar="C", help='Heat capacity of the body: "1.8 MJ/m^3/K".')
 @click.option(
-    "--study", type=click.Path(path_type=Path), help="Study whose [audit] counts, in place of the result's own."
+    "--study", type=click.Path(path_type=Path), help="Study file whose [audit] table to use instead of the stored one."
 )
 def audit(result: Path, study: Path | None, **stated: Any) -> None:
-    """Say what the model leaves out, and whether it matters.
+    """Check the assumptions of the model for a result.
 
-    For each assumption a number, a verdict (holds, doubtful, broken, not known) and a sentence. What is not given is
-    that of the table [audit] that the study had when it ran. Of a folder every result is told of.
+    Prints, for each assumption, a number, a verdict (holds, doubtful, broken, not known) and an explanation. Properties
+    not given as options come from the [audit] table of the study. For a folder, checks every result.
 
     \b
     Example:
@@ -112,12 +115,14 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 
 
 @click.command()
-@click.option("--cells", type=click.IntRange(33), default=129, show_default=True, help="Cells along the grids' sides.")
+@click.option(
+    "--cells", type=click.IntRange(33), default=129, show_default=True, help="Cells along each side of the grids."
+)
 def validate(cells: int) -> None:
-    """Hold the solver on this machine against analytic solutions.
+    """Compare the solver with closed-form solutions on this machine.
 
-    Takes less than a minute on most machines. The errors to expect follow from the grid and the tolerance; the exit
-    status is 1 if any is larger.
+    Takes less than a minute on most machines. The expected errors follow from the grid and the tolerance. The exit
+    status is 1 if any error is larger than expected.
 
     \b
     Example:

@@ -13,9 +13,9 @@ from roughvisc.errors import InputError
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--plot", type=click.Path(path_type=Path), help="Quick-look picture. [default: FILE's name.png, here]")
-@click.option("--to", type=click.Path(path_type=Path), help="Convert: write the heights to a .nc, .x3p or .sdf file.")
-@click.option("--force", is_flag=True, help="Write over a picture or a converted file that is there.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture to save. [default: FILE's name.png, here]")
+@click.option("--to", type=click.Path(path_type=Path), help="Convert the heights to a .nc, .x3p or .sdf file.")
+@click.option("--force", is_flag=True, help="Overwrite an existing picture or converted file.")
 @click.option(
     "--card",
     type=click.Path(path_type=Path),
@@ -33,12 +33,11 @@ def scan(
     force: bool,
     **given: str | None,
 ) -> None:
-    """Say what is in a scan and what to do with it, and draw it.
+    """Summarise a scan, recommend preprocessing, save a picture.
 
-    Size, channels, missing points, areal parameters; spikes, tilt, form, borders and noise, each with what follows
-    from it; and a [surface] table that is ready for a study. The picture is of the scan less its mean plane, as the
-    parameters are. No file that is there already is written over without --force. FILE is an instrument file or a
-    surface card; it can be converted, and be given a surface card.
+    Prints size, channels, missing points and areal parameters; then spikes, tilt, form, borders and noise, each with
+    a recommendation; then a [surface] table to paste into a study. Parameters and picture refer to the scan without
+    its mean plane. Existing files are kept unless --force is given. FILE is an instrument file or a surface card.
 
     \b
     Example:
@@ -68,8 +67,8 @@ def scan(
         known_suffix(to)
     for out in filter(None, (to, card, picture if plot or force else None)):
         if out.exists() and (not force or out == card or out.samefile(file)):
-            advice = "expected another name" + (" (or --force)" if out != card and not out.samefile(file) else "")
-            raise InputError(f"{out}: exists already, and is not written over: {advice}")
+            advice = "expected another name" + (" or --force" if out != card and not out.samefile(file) else "")
+            raise InputError(f"{out}: already exists: {advice}")
     console = Console()
     levelled = level(height)
     console.print(scan_table(height, parameters(levelled), file.name, channels))
@@ -79,7 +78,7 @@ def scan(
     console.print()
     console.print(surface_table(file, Path(), options, found.steps), soft_wrap=True, highlight=False, markup=False)
     if picture.exists() and not force and not plot:
-        say(console, "Not written over (--force does)", picture)
+        say(console, "Existing picture kept (--force overwrites it)", picture)
     else:
         say(console, "Picture", write_figure(surface(levelled), picture))
     if to:

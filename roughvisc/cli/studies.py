@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say, say_figures
+from roughvisc.cli.reading import naming_keys
 from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -21,24 +22,26 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder of the results. [default: results/STUDY beside it]"
+    "--out", type=click.Path(path_type=Path), help="Folder for the results. [default: results/STUDY beside it]"
 )
-@click.option("--no-plots", is_flag=True, help="Write no figures.")
-@click.option("--workers", type=click.IntRange(0), help="Processes; 0: none but this one. [default: one a core]")
-@click.option("--threads", type=click.IntRange(1), help="Threads of a case on a large grid. [default: all cores]")
-@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on: tcp://host:8786.")
-@click.option("--scheduler-file", type=click.Path(path_type=Path), help="File that a Dask scheduler wrote.")
-@click.option("--retry-failed", is_flag=True, help="Compute cases again that failed before.")
-@click.option("--same-bits", is_flag=True, help="Compute again what other versions of the transforms have computed.")
-@click.option("--profile", is_flag=True, help="Say where the time went; computes in this process.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option("--no-plots", is_flag=True, help="Draw no figures.")
+@click.option(
+    "--workers", type=click.IntRange(0), help="Number of processes; 0: this one only. [default: one per core]"
+)
+@click.option("--threads", type=click.IntRange(1), help="Threads per case on a large grid. [default: all cores]")
+@click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
+@click.option("--scheduler-file", type=click.Path(path_type=Path), help="Scheduler file written by a Dask scheduler.")
+@click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
+@click.option("--same-bits", is_flag=True, help="Repeat cases computed with other versions of the FFT library.")
+@click.option("--profile", is_flag=True, help="Print where the time went; runs in this process.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: bool, **where: Any) -> None:
     """Compute all cases of a study file.
 
-    Each case ends in one NetCDF file, named by what determines its numbers; a single one also in figures beside it.
-    With a [sweep] the cases run side by side, on all cores of this machine or wherever a Dask scheduler has workers.
-    One that fails does not stop the others, and is not tried again without --retry-failed. Interrupted, the same
-    command goes on: what is finished is not computed again.
+    Writes one NetCDF file per case, named by the key of the case. A single case also gets two figures. The cases of a
+    [sweep] run in parallel, on all cores of this machine or on the workers of a Dask scheduler. If a case fails, the
+    others continue. Repeat the command to resume an interrupted run: finished cases are not computed again, failed
+    ones only with --retry-failed.
 
     \b
     Example:
@@ -56,7 +59,9 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
     console = Console(quiet=quiet)
     elsewhere = where["scheduler"] or where["scheduler_file"]
     if profile and (elsewhere or where["workers"]):
-        raise InputError("--profile: times this process only: expected no --scheduler, --scheduler-file or --workers")
+        raise InputError(
+            "--profile: measures this process only: expected no --scheduler, --scheduler-file or --workers"
+        )
     with _profile(console) if profile else nullcontext():
         if len(cases) == 1 and not elsewhere:
             complaint = _run_one(
@@ -92,7 +97,7 @@ def _run_one(
     from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key), same_bits):
-        console.print("Finished before: nothing has to be computed")
+        console.print("Already finished: nothing to compute")
         if not is_writable(folder):
             complain(f"{folder}: is not writable: the finished result is shown, and nothing is written")
             plots = False
@@ -110,7 +115,7 @@ def _run_one(
             from roughvisc.views.plot import save_figures
 
             say_figures(console, save_figures(dataset, folder, case.key, every=False))
-            say(console, "All figures: roughvisc plot --all", path)
+            say(console, "For all figures, run", path, before="roughvisc plot --all ")
         return unconverged(dataset) or missed
 
 
@@ -169,40 +174,40 @@ def _run_all(
             missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     say(console, "Results", folder)
-    for what, name in (("Table of the cases", CASES), ("Log", LOG)):
+    for what, name in (("Table of cases", CASES), ("Log", LOG)):
         if (folder / name).exists():
             say(console, what, folder / name)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
     told = []
     for outcome in bad:
-        again = ", as before (--retry-failed tries again)" if outcome.reused and outcome.kind == "failed" else ""
+        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
         where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
-        told.append(f"{where}: {outcome.message}")
+        told.append(f"{where}: {naming_keys(outcome.message)}")
     complain_of_all(told, folder / LOG)
     if missed:
         complain(missed)
     if all(outcome.error in REFUSED for outcome in outcomes.values()):
-        raise Failure("no case could be computed: the input is wrong", 2)
+        raise Failure("no case could be computed: the input is invalid", 2)
     if bad:
         kept = sum(outcome.kind == "held" for outcome in bad)
         failed = f"{len(bad) - kept} of {len(outcomes)} cases failed" if len(bad) > kept else ""
-        held = f"{kept} of {len(outcomes)} cases held by another run: give the command again when that has ended"
+        held = f"{kept} of {len(outcomes)} cases are in use by another run: repeat the command when it has ended"
         raise Failure("; ".join(filter(None, (failed, held if kept else ""))), 1)
     if missed:
-        raise Failure("not all could be observed", 1)
+        raise Failure("some observables could not be computed", 1)
 
 
 @click.command()
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the results, whose disk must hold them.")
-@click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the results; its disk must have room.")
+@click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
-    """Say what a study will model, and what it will cost.
+    """Show what a study will model and what it will cost.
 
-    Nothing is run or written. How much comes into contact is that of an elastic press on 256 cells a side at most.
-    Steps and transforms are those of coarse marches, seconds those of a solve that is timed here; a study that cannot
-    fit into memory or on the disk is refused with the reason, by exit status 2.
+    Runs and writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
+    of steps and FFTs by coarse runs, and the time by a solve timed on this machine. The exit status is 2 if the study
+    does not fit into memory or on the disk.
 
     \b
     Example:
@@ -219,23 +224,25 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     if costs.attrs["upgrade"]:
         complain(costs.attrs["upgrade"])
     if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
-        raise Failure(f"{study}: cannot run as it stands: {why}", 2)
+        raise Failure(f"{study}: cannot run: {why}", 2)
 
 
 @click.command()
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of what is found. [default: results/STUDY-trade]")
-@click.option("--apply", "target", metavar="PART", help="Write the setting for this accuracy into STUDY: 1%.")
-@click.option("--quantity", default="contact_area", help="Whose accuracy --apply means.", show_default=True)
-@click.option("--budget", metavar="TIME", default="5 min", help="Wall time of all runs together.", show_default=True)
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the measurements. [default: results/STUDY-trade]"
+)
+@click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
+@click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
+@click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
-    """Measure what accuracy costs, and say which setting to take.
+    """Measure what accuracy costs, and recommend a setting.
 
-    The case is computed under a ladder of settings: tolerances and grids; of a program also fixed steps, memories, the
-    seed paper's algorithm. Each is timed and held against a closed form where the case has one, else against its own
-    finest run.
-    A NetCDF and a figure are written; --apply sets the keys of STUDY, whose comments and layout stay.
+    Computes the case with several tolerances and grids; with a loading program also with fixed time steps, other
+    memory models and the seed paper's algorithm. Each run is timed and compared with a closed-form solution if there
+    is one, else with the finest run. Writes a NetCDF file and a figure. --apply changes the keys in STUDY and keeps its
+    comments and layout.
 
     \b
     Example:
@@ -272,7 +279,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
         index = recommend.cheapest(dataset, quantity, part)
         if index is None:
             shortfall = recommend.shortfall(dataset, quantity, part)
-            raise Failure(f"{study}: --apply {target}: {shortfall}; the study is as it was", 1)
+            raise Failure(f"{study}: --apply {target}: {shortfall}; the study is unchanged", 1)
         changes = apply(study, recommend.keys_of(dataset, index))
-        said = printable(f"{study}: {changes or 'as it should be already'}")
+        said = printable(f"{study}: {changes or 'already has this setting'}")
         console.print(said, soft_wrap=True, highlight=False, markup=False)

@@ -13,11 +13,11 @@ from roughvisc.errors import printable
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
 def verify(results: Path) -> None:
-    """Read results again, and say which are damaged.
+    """Check results for damage.
 
-    Every byte is held against the checksum that a file ends with when it is written. Nothing is changed; a run of
-    their study sets damaged results aside and computes them anew. The exit status is 1 if any is damaged. A file that
-    another program has changed has lost its checksum: it is named, and whether its values are right cannot be said.
+    Compares every file with its checksum and changes nothing. The exit status is 1 if a file is damaged. Run the study
+    again to replace damaged results. Files that another program has changed have no checksum; they are listed, and
+    cannot be checked.
 
     \b
     Example:
@@ -33,23 +33,22 @@ def verify(results: Path) -> None:
         complain(f"{one.path}: is damaged: {one.flaw}")
     for one in bare:
         complain(f"{one.path}: {UNSEALED}")
-    whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} whole"
+    whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} intact"
     click.echo(whole + (f", {len(bare)} of them without a checksum" if bare else ""))
     if bad:
-        raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to have the results computed anew", 1)
+        raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to replace the results", 1)
 
 
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--all", "everything", is_flag=True, help="Also checkpoints, damaged results and records of failures.")
-@click.option("--superseded", is_flag=True, help="Also results of other versions that this one has computed again.")
+@click.option("--all", "everything", is_flag=True, help="Also remove checkpoints, damaged results and failure records.")
+@click.option("--superseded", is_flag=True, help="Also remove results that this version has computed again.")
 def clean(results: Path, everything: bool, superseded: bool) -> None:
-    """Remove what killed runs and earlier versions left.
+    """Remove leftovers of interrupted runs and earlier versions.
 
-    Those are torn files, locks of dead runs, and checkpoints of cases that are finished or of an earlier version, from
-    which nothing goes on. Results stay, and so does what an unfinished case would go on from, unless --all is given.
-    Results of another version, whose cases this one computes again, are named; --superseded removes those that it has
-    computed again. A case that a run is at work on is left alone.
+    Removes incomplete files, locks of dead runs, and checkpoints that no run can use: of finished cases, or of earlier
+    versions. Keeps results, and checkpoints of unfinished cases unless --all is given. Lists results of other versions;
+    --superseded removes those that this version has computed again. Cases in use by a run are not touched.
 
     \b
     Example:

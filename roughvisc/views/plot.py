@@ -77,8 +77,8 @@ FIGURES = {
     "surface": (surface, ("height",), ()),
 }
 
-#: Those of them that a run draws, and `roughvisc plot` without --all.
-FIRST = ("friction", "pressure_maps", "history", "maps")
+#: Those of them that a run draws, and `roughvisc plot` without --all: two, and what a study has asked to be observed.
+FIRST = ("friction", "pressure_maps", "history", "maps", "leakage", "conductance")
 
 #: Those of them that are drawn only where they say something.
 TELLING = {
@@ -133,7 +133,7 @@ def save_figures(
     title : str
         What stands above each figure, such as the case that it shows.
     every : bool
-        False: only the first two, history and maps, or curve and maps of friction.
+        False: only the first two, history and maps, or curve and maps of friction, and those of observables.
 
     Returns
     -------

@@ -82,7 +82,7 @@ def test_run__serves_what_is_finished_on_a_disk_that_may_only_be_read(study, tmp
     status, out, err = invoke("run", study, "--out", folder)
     assert (status, err) == (0, "")
     assert out.count(f"{folder}: is not writable: all cases are finished, and nothing is written\n") == 1
-    assert "2, all before: nothing had to be computed" in out
+    assert "2, all before: nothing to compute" in out
     status, out, err = invoke("run", one, "--out", folder)
     assert (status, err.count("\n")) == (0, 1)
     assert "is not writable: the finished result is shown, and nothing is written" in err

@@ -232,11 +232,11 @@ def test_scan__writes_over_nothing_unless_asked_to(tmp_path, invoke, coarse_pict
         (tmp_path / name).write_text("mine")
     status, out, err = invoke("scan", "a.nc")
     assert (status, err) == (0, "")
-    assert "Not written over (--force does): a.png" in out
+    assert "Existing picture kept (--force overwrites it): a.png" in out
     for option in (["--plot", "a.png"], ["--to", "b.nc"]):
         status, out, err = invoke("scan", "a.nc", *option)
         assert (status, out) == (2, "")
-        assert f"{option[1]}: exists already, and is not written over: expected another name (or --force)" in err
+        assert f"{option[1]}: already exists: expected another name or --force" in err
     assert {(tmp_path / name).read_text() for name in ("a.png", "b.nc")} == {"mine"}
     assert invoke("scan", "a.nc", "--to", "b.nc", "--force")[0] == 0
     xr.testing.assert_allclose(rv.open_scan(tmp_path / "b.nc"), rv.open_scan(tmp_path / "a.nc"))
@@ -252,6 +252,9 @@ def test_run__an_interrupt_while_processes_start_is_quiet(tmp_path, after):
     process = subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True, start_new_session=True)
     time.sleep(after)
     os.killpg(process.pid, signal.SIGINT)
-    assert process.communicate(timeout=60) == ("", "roughvisc: interrupted; what was finished is kept\n")
+    assert process.communicate(timeout=60) == (
+        "",
+        "roughvisc: interrupted; finished work is kept; repeat the command to resume\n",
+    )
     # Python ends by the signal itself where that struck within exec, as modules that make code do; 130 for a shell too
     assert process.returncode in (130, -signal.SIGINT)

@@ -44,9 +44,9 @@ def terminated(folder, *options, whole_group, after):
 def test_run__writes_its_checkpoint_and_ends_quietly(tmp_path, text, options, whole_group):
     (tmp_path / "s.toml").write_text(text)
     cases = read_cases(tmp_path / "s.toml")
-    for after in (0.2, 0.4, 0.6, 0.8):  # on a busy machine there is no step to keep so early
+    for after in (0.2, 0.4, 0.8, 1.6, 3.2):  # on a busy machine there is no step to keep so early
         ended = terminated(tmp_path, *options, whole_group=whole_group, after=after)
-        assert ended == ("", "roughvisc: interrupted; what was finished is kept\n", 143)
+        assert ended == ("", "roughvisc: interrupted; finished work is kept; repeat the command to resume\n", 143)
         if all([*tmp_path.glob(f"out/.{case.key}.unfinished/checkpoint.*")] for case in cases):
             break
     for case in read_cases(tmp_path / "s.toml"):
@@ -102,7 +102,11 @@ def test_run__signalled_during_an_import_ends_quietly(tmp_path, module, number, 
     script = SIGNALLED.replace("MODULE", repr(module)).replace("NUMBER", str(int(number)))
     process = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, stdout=-1, stderr=-1, text=True)
     out, err = process.communicate(timeout=100)
-    assert (out, err, process.returncode) == ("", "roughvisc: interrupted; what was finished is kept\n", status)
+    assert (out, err, process.returncode) == (
+        "",
+        "roughvisc: interrupted; finished work is kept; repeat the command to resume\n",
+        status,
+    )
     assert not (tmp_path / "results").exists(), "nothing has begun"
 
 

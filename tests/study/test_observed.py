@@ -96,7 +96,7 @@ def test_another_viscosity__keeps_the_run(invoke, study, tmp_path, counted, solv
     thick = LEAKAGE.replace("1 mPa s", "4 mPa s")
     status, told, _ = invoke("run", study(thick), "--out", "out", "--no-plots")
     assert (status, solved_on) == (0, [])
-    assert "Finished before" in told
+    assert "Already finished" in told
     with rv.open_result(path) as ds:
         np.testing.assert_allclose(4 * ds.leak_rate, before.leak_rate, rtol=1e-12, atol=0)
         assert json.loads(ds.attrs["case"])["observe"]["leakage"]["viscosity"] == 4e-3

@@ -59,7 +59,7 @@ def test_one_row__has_one_area_and_one_share_everywhere(folder):
         assert printed(row["fraction"]) == pytest.approx(share, rel=5e-3)
         numbers = dict(_numbers(ds, -1)["numbers"])
         assert printed(numbers["Contact area"]) == pytest.approx(area, rel=5e-3)
-        assert printed(numbers["Of nominal"]) == pytest.approx(share, rel=5e-3)
+        assert printed(numbers["Contact fraction"]) == pytest.approx(share, rel=5e-3)
         panel = next(ax for ax in rv.plot.history(ds).axes if ax.get_ylabel().startswith("Contact area ["))
         drawn = dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))["corrected for the grid"]
         unit = printed(f"1 {panel.get_ylabel().partition('[')[2]}")

@@ -143,8 +143,8 @@ class LiveMonitor:
 
 
 def _name(case: Case, number: int, total: int) -> str:
-    """``case 3 of 12 (program.0.load = 0.02)``."""
-    varied = ", ".join(f"{key} = {json.dumps(value)}" for key, value in case.varied.items())
+    """``case 3 of 12 (program.0.load = 20 mN)``."""
+    varied = ", ".join(f"{key} = {case.written.get(key) or json.dumps(value)}" for key, value in case.varied.items())
     if len(varied) > 60:
         varied = f"{varied[:57]}..."
     return f"case {number} of {total}" + (f" ({varied})" if varied else "")

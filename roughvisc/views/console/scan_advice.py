@@ -13,7 +13,7 @@ from roughvisc.topography.inspection import MOST_SPIKES, RESOLVED, Inspection
 from roughvisc.views.console.tables import readable
 
 #: What is to be done where nothing is.
-_NOTHING = "nothing to do"
+_NOTHING = "no action needed"
 #: Root mean square slope above which a unit or the spacing is mostly wrong. [-]
 _STEEP = 1.0
 
@@ -32,7 +32,7 @@ def advice_table(found: Inspection) -> Group:
     for what, seen, do in advice(found):
         table.add_row(what, Text(seen))
         table.add_row("", Text(f"-> {do}", style="" if do == _NOTHING else "bold"))
-    return Group(Text("What is seen, and what to do", style="bold"), table)
+    return Group(Text("Findings and recommendations", style="bold"), table)
 
 
 def advice(found: Inspection) -> Iterator[tuple[str, str, str]]:
@@ -49,25 +49,25 @@ def advice(found: Inspection) -> Iterator[tuple[str, str, str]]:
 
 
 def _holes(found: Inspection) -> tuple[str, str, str]:
-    seen = f"{100 * found.holes:.2g} % of the scan lie in holes that are wider than a few points"
+    seen = f"{100 * found.holes:.2g} % of the scan lies in holes wider than a few points"
     if "crop" in found.steps:
         nx, ny = found.shape if "mirror" not in found.steps else (found.shape[0] // 2, found.shape[1] // 2)
         return (
             "Holes",
             seen,
             (
-                f"crop to the largest part without them, {nx} x {ny} points, which all that follows is of; or keep the "
-                'whole with missing = "absent" if there is no material there'
+                f"crop to the largest part without holes, {nx} x {ny} points (the findings below refer to it); or keep "
+                'the whole scan with missing = "absent" if there is no material in the holes'
             ),
         )
-    return "Holes", seen, "too few of them to crop: they are filled in with the other missing points"
+    return "Holes", seen, "too small to crop; fill them with the other missing points"
 
 
 def _missing(found: Inspection) -> tuple[str, str, str]:
     if not found.missing:
         return "Missing points", "none", _NOTHING
     seen = f"{found.missing} ({100 * found.missing / found.points:.2g} %)"
-    return "Missing points", seen, 'fill = "harmonic"; the result keeps the mask of the points filled in'
+    return "Missing points", seen, 'fill = "harmonic"; the result marks the filled points'
 
 
 def _spikes(found: Inspection) -> tuple[str, str, str]:
@@ -78,11 +78,11 @@ def _spikes(found: Inspection) -> tuple[str, str, str]:
     if found.spikes > MOST_SPIKES * found.points:
         return (
             "Spikes",
-            f"{share} stand out of their neighbourhood",
-            ("too many for spikes: look at the picture; outliers = true only if the surface has no such features"),
+            f"{share} differ strongly from their neighbours",
+            ("too many to be spikes: check the picture; set outliers = true only if the surface has no such features"),
         )
-    effect = f"Sq is {_height(found.rms_levelled)} with them and {_height(found.rms_despiked)} without"
-    return "Spikes", f"{share}: {effect}", "outliers = true; in a contact a spike would carry the load"
+    effect = f"Sq is {_height(found.rms_levelled)} with and {_height(found.rms_despiked)} without them"
+    return "Spikes", f"{share}: {effect}", "outliers = true; otherwise the spikes carry the load"
 
 
 def _tilt(found: Inspection) -> tuple[str, str, str]:
@@ -94,18 +94,18 @@ def _tilt(found: Inspection) -> tuple[str, str, str]:
         return (
             "Tilt",
             seen,
-            "level = 0 takes off the mean alone: the surface repeats as it is, which a plane would end",
+            "level = 0 subtracts the mean only; subtracting a plane would break the periodicity",
         )
-    return "Tilt", seen, f"level = {order} takes the plane off{' too' if order > 1 else ''}"
+    return "Tilt", seen, f"level = {order} subtracts the plane{' too' if order > 1 else ''}"
 
 
 def _form(found: Inspection) -> tuple[str, str, str]:
-    seen = f"a quadratic form has {100 * found.form_share:.2g} % of Sq squared"
+    seen = f"a quadratic form accounts for {100 * found.form_share:.2g} % of Sq squared"
     if found.steps["level"] == 2:
         return (
             "Form",
             f"{seen}; Sq is {_height(found.rms_flat)} without it",
-            ('level = 2 for the roughness alone; level = 1 and boundary = "free" if the form itself is pressed'),
+            ('level = 2 for the roughness alone; level = 1 and boundary = "free" to press the form as well'),
         )
     return "Form", seen, _NOTHING
 
@@ -113,19 +113,19 @@ def _form(found: Inspection) -> tuple[str, str, str]:
 def _borders(found: Inspection) -> tuple[str, str, str]:
     (x, y), (nx, ny) = found.borders.of_rms, found.borders.of_neighbours
     seen = (
-        f"opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, {nx:.2g} and {ny:.2g} times as much as "
-        "neighbouring rows"
+        f"opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y: {nx:.2g} and {ny:.2g} times the "
+        "difference of neighbouring rows"
     )
     if found.borders.jumps:
         return (
             "Borders",
             seen,
             (
-                'for boundary = "periodic" mirror = true, at no more cost; without it the seam carries load that is '
-                "not real (a taper has no seam, but a smooth margin that changes the contact)"
+                'for boundary = "periodic" set mirror = true, at no extra cost; otherwise the step at the seam carries '
+                "load (taper removes the step too, but changes the contact near the border)"
             ),
         )
-    return "Borders", seen, 'boundary = "periodic" as it is: neither mirror nor taper'
+    return "Borders", seen, 'boundary = "periodic" needs neither mirror nor taper'
 
 
 def _slope(found: Inspection) -> tuple[str, str, str]:
@@ -134,9 +134,9 @@ def _slope(found: Inspection) -> tuple[str, str, str]:
         return "Slope", seen, _NOTHING
     return (
         "Slope",
-        f"{seen}, which is steeper than 45°: hardly a measured surface is",
-        "check the units of x, y and of the heights, and the spacing: one of them is mostly wrong; if they are right, "
-        "the small slopes that contact of half-spaces supposes are not there",
+        f"{seen}, which is steeper than 45°, unlike almost any measured surface",
+        "check the spacing and the units of x, y and height: one of them is probably wrong; if all are right, the "
+        "half-space model does not hold, since it assumes small slopes",
     )
 
 
@@ -147,19 +147,19 @@ def _noise(found: Inspection) -> Iterator[tuple[str, str, str]]:
         return
     if noise.floor:
         seen = (
-            f"a floor of {_height(noise.rms)} rms, which drowns the waves below {_height(noise.wavelength)}; they have "
-            f"{100 * noise.noisy_slopes:.2g} % of the mean square slope"
+            f"noise floor of {_height(noise.rms)} rms; wavelengths below {_height(noise.wavelength)} are noise "
+            f"and make {100 * noise.noisy_slopes:.2g} % of the mean square slope"
         )
-        do = "filter to the waves above it" if "filter" in found.steps else _NOTHING
+        do = "filter out these wavelengths" if "filter" in found.steps else _NOTHING
         yield "Noise", seen, do
     else:
-        yield "Noise", f"no floor is seen down to two cells; it is less than {_height(noise.rms)} rms", _NOTHING
+        yield "Noise", f"no noise floor down to two cells; noise is below {_height(noise.rms)} rms", _NOTHING
     seen = (
-        f"the shortest wave resolved is {_height(noise.wavelength)}; waves below {RESOLVED} cells have "
+        f"the shortest resolved wavelength is {_height(noise.wavelength)}; wavelengths below {RESOLVED} cells make "
         f"{100 * noise.fine_slopes:.2g} % of the mean square slope"
     )
     if noise.fine_slopes > 0.5 and "filter" not in found.steps:
-        do = "spots of contact will be about a cell wide: ask for grid_error = true, or filter to longer waves"
+        do = "contact spots will be about one cell wide: set grid_error = true, or filter to longer wavelengths"
     else:
         do = _NOTHING
     yield "Resolution", seen, do

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
 #: What is stated of accuracy, and its parts, each at its worst.
 _ERRORS = {
     "stated_error": "worst stated error",
-    "pressure_residual": "pressure, worst residual",
-    "friction_residual": "friction, worst residual",
-    "time_error": "time steps, worst",
-    "residual": "contact solver, estimated",
+    "pressure_residual": "worst residual of pressure",
+    "friction_residual": "worst residual of friction",
+    "time_error": "worst error of time steps",
+    "residual": "contact solver (estimate)",
 }
 
 
@@ -51,8 +52,8 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     entries = [outcome.entry for outcome in outcomes if outcome.entry]
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
-    alike = f" ({asked - len(outcomes)} alike, computed once)" if asked > len(outcomes) else ""
-    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing had to be computed"
+    alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
+    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
     rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
     for kind, label in (
         ("unconverged", "Not converged"),
@@ -63,7 +64,7 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
     rows += accuracy_rows([entry.histories for entry in entries])
     if spent:
-        rows.append(("Cost: sum of wall times", readable(sum(spent), "s")))
+        rows.append(("Cost: total wall time", readable(sum(spent), "s")))
     return two_columns(rows, title)
 
 
@@ -83,14 +84,14 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Grid", _range_of(costs, _grid)),
         ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
         ("Contact", _contact(costs)),
-        *((f"{name.capitalize()} a case", _span(costs[name], "")) for name in _counts(costs)),
-        ("Convolutions a case", _span(costs["convolutions"], "")),
-        ("Wall time a case", _span(costs["wall_time"], "s")),
-        ("Wall time of all", f"about {readable(attrs['wall_time'], 's')}"),
+        *((f"{name.capitalize()} per case", _span(costs[name], "")) for name in _counts(costs)),
+        ("Convolutions per case", _span(costs["convolutions"], "")),
+        ("Wall time per case", _span(costs["wall_time"], "s")),
+        ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}"),
         ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
         ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
         ("At half the resolution", _at_half(costs)),
-        ("Estimated from", f"coarse marches of {int(costs['marched'].sum())} of {total} cases"),
+        ("Estimated from", f"coarse runs of {int(costs['marched'].sum())} of {total} cases"),
     ]
     parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
     parts += [Text(f"Warning: {text}", style="bold red") for text in _warnings(costs)]
@@ -177,11 +178,11 @@ def _grid(row: xr.Dataset) -> str:
 
 def _contact(costs: xr.Dataset) -> str:
     """How much comes into contact, and on which cells that was found; on cells twice as long, if there is more."""
-    whole = "grid in the end" if (costs["final_cells_x"] > costs["cells_x"]).any() else "area"
+    whole = "final grid" if (costs["final_cells_x"] > costs["cells_x"]).any() else "area"
     own, longer = costs["contact_fraction"], costs["coarser_contact_fraction"]
     if not np.isfinite(own).any():
         return ""
-    text = f"about {_per_cent(own)} % of the {whole}, pressed on {_pressed_on(costs, own)} cells"
+    text = f"about {_per_cent(own)} % of the {whole}, estimated on {_pressed_on(costs, own)} cells"
     if not longer.max() > _FALLS * own.where(longer.notnull()).max():
         return text
     return f"{text}; {_per_cent(longer)} % on {_pressed_on(costs, longer)}: expect less on the finer grid of the run"
@@ -203,7 +204,7 @@ def _pressed_on(costs: xr.Dataset, found: xr.DataArray) -> str:
 def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
     """How many cases at once, and how many threads each may use."""
     large = bool(((costs["cells_x"] * costs["cells_y"]) >= _THREADED).any())
-    return f"{processes} side by side" + (f", {threads} threads each" if large and threads > 1 else "")
+    return f"{processes} in parallel" + (f", {threads} threads each" if large and threads > 1 else "")
 
 
 def _at_half(costs: xr.Dataset) -> str:
@@ -213,8 +214,8 @@ def _at_half(costs: xr.Dataset) -> str:
     kept = float((costs["half_rms_slope"] / costs["rms_slope"]).min())
     lost = f"the rms slope falls by {100 * (1 - kept):.2g} %; " if kept < 1 else ""
     return (
-        f"{_span(costs['half_wall_time'], 's')} and {size(float(costs['half_memory'].max()))} a case; {lost}"
-        "roughvisc trade measures what is lost"
+        f"{_span(costs['half_wall_time'], 's')} and {size(float(costs['half_memory'].max()))} per case; {lost}"
+        "`roughvisc trade` measures the loss of accuracy"
     )
 
 
@@ -234,7 +235,7 @@ def _alike(costs: xr.Dataset, name: str) -> str:
     found = list(dict.fromkeys(str(value).rstrip(".") for value in costs[name].values if value))
     text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     if name == "boundary":
-        text += ", transforms padded to twice the grid" if costs["padded"].any() else ", transforms not padded"
+        text += ", FFTs padded to twice the grid" if costs["padded"].any() else ", FFTs not padded"
         text += ", the grid may grow" if costs["grows"].any() else ""
     return text
 
@@ -258,22 +259,54 @@ def _counts(costs: xr.Dataset) -> list[str]:
 
 
 def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
+    """Settings and costs of each case: a column has one unit, in its heading."""
+    listed = costs.isel(case=slice(_LISTED))
+    refused = listed["refusal"].values != ""
+    last = [key.rpartition(".")[2] for key in varied]
+    names = [
+        name if last.count(name) == 1 and not name.isdecimal() else key for name, key in zip(last, varied, strict=True)
+    ]
+    settings = [
+        _column(listed[key].values, name.replace("_", " "), str(listed[key].attrs.get("units", "")))
+        for key, name in zip(varied, names, strict=True)
+    ]
+    counts = [(name, [f"{value:.0f}" for value in listed[name].values]) for name in (*_counts(costs), "convolutions")]
+    spent = {"wall_time": "s", "memory": "byte", "disk": "byte"}
+    costing = [
+        _column(np.where(refused, np.nan, listed[name].values), name.replace("_", " "), unit, 3)
+        for name, unit in spent.items()
+    ]
     table = Table(box=None, pad_edge=False)
-    counted = [*_counts(costs), "convolutions"]
-    for heading in (*varied, *counted, "wall time", "memory", "disk"):
-        table.add_column(heading, justify="right")
-    for i in range(min(costs.sizes["case"], _LISTED)):
-        row = costs.isel(case=i)
-        cells = [f"{row[key].item():.6g}" if row[key].dtype.kind in "if" else str(row[key].item()) for key in varied]
-        if row["refusal"].item():
-            table.add_row(*cells, Text("cannot run"))
-            continue
-        counts = [f"{float(row[name]):.0f}" for name in counted]
-        sizes = [size(float(row[name])) for name in ("memory", "disk")]
-        table.add_row(*cells, *counts, readable(float(row["wall_time"]), "s"), *sizes)
+    for heading, _ in (*settings, *counts, *costing):
+        table.add_column(Text(heading), justify="right", overflow="fold")
+    for i, cut in enumerate(refused):
+        found = [Text("cannot run")] if cut else [Text(cells[i]) for _, cells in (*counts, *costing)]
+        table.add_row(*(Text(cells[i]) for _, cells in settings), *found)
     if costs.sizes["case"] > _LISTED:
         table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))
     return table
+
+
+def _column(values: Any, name: str, si: str, digits: int = 6) -> tuple[str, list[str]]:
+    """Heading with the unit that suits all values of a column, and the values in it; texts as they are."""
+    if np.asarray(values).dtype.kind not in "iuf":
+        return name, [str(value) for value in values]
+    known = values[np.isfinite(values)]
+    if si == "byte":
+        factor, symbol = _bytes(float(known.max(initial=0.0)))
+    else:
+        unit = unit_for(known, si)
+        factor, symbol = unit.factor, unit.symbol
+    cells = [
+        "half-space" if value == math.inf else "" if np.isnan(value) else f"{value / factor:.{digits}g}"
+        for value in values
+    ]
+    return (f"{name}\n[{symbol}]" if symbol else name), cells
+
+
+def _bytes(count: float) -> tuple[float, str]:
+    """Unit that suits a number of bytes."""
+    return next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if count >= one[0]), (1e3, "kB"))
 
 
 def size(count: float) -> str:
@@ -284,10 +317,8 @@ def size(count: float) -> str:
     >>> size(2131948), size(24.5e9)
     ('2.13 MB', '24.5 GB')
     """
-    for factor, name in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
-        if count >= factor:
-            return f"{count / factor:.3g} {name}"
-    return f"{count / 1e3:.3g} kB"
+    factor, unit = _bytes(count)
+    return f"{count / factor:.3g} {unit}"
 
 
 def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
@@ -310,7 +341,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
-        ("Channel", str(height.attrs.get("channel", "")) + (", of these:" if len(channels) > 1 else "")),
+        ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
         ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
         *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
         ("Orientation", str(height.attrs.get("orientation", ""))),
@@ -329,7 +360,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
 
 
 def _channel_row(channel: Any) -> tuple[str, str]:
-    kind = f"height in {channel.unit}" if channel.unit else "height, of no stated unit"
+    kind = f"height in {channel.unit}" if channel.unit else "height without a unit"
     shape = " x ".join(map(str, channel.shape))
     described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
     return f"Channel {channel.index}", described
@@ -341,7 +372,7 @@ def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[
     for name, label in _ERRORS.items():
         values = [np.ravel(one[name]) for one in found if name in one]
         if values:
-            asked = f", tolerance {tolerance:g}" if tolerance and name == "stated_error" else ""
+            asked = f", tolerance {tolerance:g}" if tolerance and not rows else ""
             rows.append((f"Accuracy: {label}", number(np.concatenate(values)) + asked))
     return rows
 

@@ -49,14 +49,16 @@ def trade_table(dataset: xr.Dataset) -> Group:
         table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
     parts = [Text(printable(dataset.attrs.get("title") or "untitled"), style="bold"), table]
     rows = dataset.attrs.get("rows", "kept times")
-    text = f"Errors in %, the worst over the {rows}; * nothing is both faster and nearer in {WORDS[counts]}."
+    text = (
+        f"Errors in %, worst of all {rows}. * Pareto-optimal for {WORDS[counts]}: no setting is both faster and better."
+    )
     parts += [Text(text, style="italic"), Text()]
     parts += [
         Text(f"Not run: {name}: {why}")
         for name, why in zip(dataset["setting"].values, dataset["note"].values, strict=True)
         if why
     ]
-    parts += [Text(f"Measured against {text}.") for text in _references(dataset)]
+    parts += [Text(f"Reference: {text}.") for text in _references(dataset)]
     parts += [Text(), *(Text(line[:1].upper() + line[1:]) for line in dataset.attrs["recommendation"].splitlines())]
     return Group(*parts)
 

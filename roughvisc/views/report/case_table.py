@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.axes import AXES, Axis, axis_of
 from roughvisc.views.figures.axes import unit_for
 from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
@@ -20,8 +20,8 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     case = json.loads(dataset.attrs.get("case", "{}"))
     title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
     words = case_words(case)
-    over = axis_of(dataset)
-    last = dataset.isel({over: AXES[over].telling_row(dataset)})
+    axis = AXES[axis_of(dataset)]
+    last = dataset.isel({axis.name: axis.telling_row(dataset)})
     status = dataset["status"].values if "status" in dataset else np.zeros(0, int)
     bad = int((status == NOT_CONVERGED).sum())
     return {
@@ -32,19 +32,20 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "key": str(dataset.attrs.get("case_key", "")),
         "varied": varied_texts(case),
         "grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
-        "times": dataset.sizes[over],
-        "rows": "Times" if over == "time" else AXES[over].rows.capitalize(),
-        "friction": _friction(last) if over == "speed" else "",
+        "count": dataset.sizes[axis.name],
+        "rows": axis.rows.capitalize(),
+        "telling": _telling(last, axis) if axis.telling else "",
+        "telling_label": axis.variables[axis.telling].label.lower() if axis.telling else "",
         "force": _largest(dataset, "force", "N"),
         "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
         "approach": _last(last, "approach", "m"),
         "area": _last(last, "contact_area", "m^2"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
-        "stated_error": _worst(dataset, *_stated(dataset)),
+        "stated_error": _worst(dataset, *_stated(dataset, axis)),
         "time_error": _worst(dataset, "time_error"),
-        "residual": _worst(dataset, AXES[over].residual),
-        "missed": _missed(dataset),
-        "status": f"{bad} of {len(status)} {over}s not converged" if bad else "converged" if len(status) else "",
+        "residual": _worst(dataset, axis.residual),
+        "missed": _missed(dataset, axis),
+        "status": f"{bad} of {len(status)} {axis.rows} not converged" if bad else "converged" if len(status) else "",
         "bad": bool(bad),
         "convolutions": f"{int(dataset['convolutions'].sum())}" if "convolutions" in dataset else "",
         "wall_time": _largest(dataset, "wall_time", "s"),
@@ -53,14 +54,18 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     }
 
 
-def _stated(dataset: xr.Dataset) -> tuple[str, ...]:
-    """What is held against the tolerance; of sliding, earlier versions stated its parts alone."""
-    return ("stated_error",) if "stated_error" in dataset else ("pressure_residual", "friction_residual")
+def _stated(dataset: xr.Dataset, axis: Axis) -> list[str]:
+    """What is compared with the tolerance; earlier versions stated residuals of sliding alone."""
+    if "stated_error" in dataset:
+        return ["stated_error"]
+    return [name for name in axis.in_table("largest") if name.endswith("residual") and name in dataset]
 
 
-def _friction(row: xr.Dataset) -> str:
-    speed = float(row["speed"])
-    return f"{float(row['friction_coefficient']):.3g} at {unit_for([speed], 'm/s').text(speed, 3)}"
+def _telling(row: xr.Dataset, axis: Axis) -> str:
+    """Value by which a row stands for the result, and where that is."""
+    value = float(row[axis.telling])
+    text = unit_for([value], axis.variables[axis.telling].units).text(value)
+    return f"{text} at {axis.place(float(row[axis.name]), 3).partition(' = ')[2]}"
 
 
 def _largest(dataset: xr.Dataset, name: str, si: str) -> str:
@@ -79,8 +84,9 @@ def _worst(dataset: xr.Dataset, *names: str) -> str:
     return f"{max(known):.2g}" if known else "not known"
 
 
-def _missed(dataset: xr.Dataset) -> bool:
+def _missed(dataset: xr.Dataset, axis: Axis) -> bool:
     """Whether the stated error is above the tolerance asked for."""
     tolerance = dataset.attrs.get("tolerance")
-    stated = [name for name in _stated(dataset) if name in dataset]
-    return tolerance is not None and any(bool((dataset[name] > float(tolerance)).any()) for name in stated)
+    return tolerance is not None and any(
+        bool((dataset[one] > float(tolerance)).any()) for one in _stated(dataset, axis)
+    )

@@ -212,7 +212,7 @@ def test_plan__says_what_runs_side_by_side_and_what_half_the_resolution_costs(st
     console = Console(width=200, record=True, file=io.StringIO())
     console.print(plan_tables(planned))
     said = console.export_text()
-    assert "3, 2 side by side, 2 threads each" in said
+    assert "3, 2 in parallel, 2 threads each" in said
     assert "At half the resolution" in said
     assert "the rms slope falls by" in said
 
@@ -282,7 +282,7 @@ def test_plan__says_how_much_comes_into_contact(study):
     assert planned.contact_fraction.values == pytest.approx(taken, rel=0.02)
     low, high = (f"{float(f'{100 * one:.2g}'):g}" for one in planned.contact_fraction.values)
     said = said_of(planned)
-    assert f"Contact about {low} to {high} % of the area, pressed on a grid of 90 x 108 cells" in said
+    assert f"Contact about {low} to {high} % of the area, estimated on a grid of 90 x 108 cells" in said
     assert "at most" not in said
     free = rv.plan([vary(study(ROUGH)[0], {"solve.boundary": "free", "solve.edge": "accept"})])
     assert f"about {100 * float(free.contact_fraction[0]):.2g} % of the area" in said_of(free)
@@ -324,7 +324,7 @@ def test_contact__on_fewer_cells_than_the_run_is_said_with_how_it_falls(study, m
     numbers = [100 * float(planned[f"{name}contact_fraction"][0]) for name in ("", "coarser_")]
     first, second = (f"{float(f'{one:.2g}'):g} %" for one in numbers)
     expected = (
-        f"about {first} of the area, pressed on a grid of 72 x 65 cells; {second} on a grid of 36 x 32: expect less"
+        f"about {first} of the area, estimated on a grid of 72 x 65 cells; {second} on a grid of 36 x 32: expect less"
     )
     assert expected in said_of(planned)
 

@@ -201,7 +201,7 @@ def test_command__runs_plots_and_reports(invoke, tmp_path, coarse_pictures):
     drawn = {p.stem.rpartition("-")[2] for p in (tmp_path / "results" / "slide").glob("*.png")}
     assert drawn == {"friction", "pressure_maps", "history", "section", "distributions", "clusters", "surface"}
     status, out, _ = invoke("plan", "slide.toml")
-    assert (status, "Speeds a case" in out, "Steps a case" in out) == (0, True, False)
+    assert (status, "Speeds per case" in out, "Steps per case" in out) == (0, True, False)
     status, _, _ = invoke("report", "results/slide")
     page = (tmp_path / "results" / "slide" / "report.html").read_text()
     assert status == 0

@@ -135,7 +135,7 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     address = json.loads(by_hand.read_text())["address"]
     done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "4, all before: nothing had to be computed" in done.stdout
+    assert "4, all before: nothing to compute" in done.stdout
 
 
 def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):
@@ -304,7 +304,7 @@ def test_run__ctrl_c_is_status_130(study, tmp_path):
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: all processes get it
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert err == "roughvisc: interrupted; what was finished is kept\n"
+    assert err == "roughvisc: interrupted; finished work is kept; repeat the command to resume\n"
     assert time.monotonic() - began < 20
     until = time.monotonic() + 10
     while (left := alive(process.pid)) and time.monotonic() < until:
@@ -362,7 +362,7 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
     if not terminal:
         lines = stream.getvalue().splitlines()
         assert lines[0] == "Dashboard: http://127.0.0.1:8787/status"
-        assert lines[1].startswith("case 2 of 4 (program.0.load = 0.004, ")
+        assert lines[1].startswith("case 2 of 4 (program.0.load = 4 mN, ")
         assert lines[1].endswith("failed: too [much] load")
         assert lines[2].startswith("1 of 4 cases done, 1 failed, 1 running, about ")
         assert "left" in lines[2]

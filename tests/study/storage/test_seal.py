@@ -80,7 +80,7 @@ def test_changed_by_another_program__is_served_with_one_warning(tmp_path, caplog
     first = capfd.readouterr().err
     assert first == f"roughvisc: {changed} and 1 more: {trust.UNSEALED}\n"
     status, said, err = invoke("verify", out)
-    assert (status, said) == (0, "2 of 2 files whole, 2 of them without a checksum\n")
+    assert (status, said) == (0, "2 of 2 files intact, 2 of them without a checksum\n")
     assert set(err.splitlines()) == {f"roughvisc: {one}" for one in both}
 
 
@@ -210,7 +210,7 @@ def test_verify__names_what_is_damaged(tmp_path, invoke):
     (folder / "b.nc").write_bytes(content[:3000] + b"?" + content[3001:])
     status, out, err = invoke("verify", folder)
     assert status == 1
-    assert out == "2 of 3 files whole, 1 of them without a checksum\n"
+    assert out == "2 of 3 files intact, 1 of them without a checksum\n"
     assert err.splitlines()[0] == f"roughvisc: {folder / 'b.nc'}: is damaged: its bytes are not those that were written"
     (folder / "b.nc").unlink()
     assert invoke("verify", folder)[0] == 0

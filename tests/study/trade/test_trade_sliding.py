@@ -173,7 +173,7 @@ def test_table_and_figure__put_friction_first(tmp_path):
     words = re.sub(r"\s+", " ", text)
     (heading,) = (line for line in text.splitlines() if "transf." in line)
     assert heading.split()[-4:] == ["friction", "pressure", "approach", "area"]
-    assert "the worst over the speeds; * nothing is both faster and nearer in friction coefficient" in words
+    assert "worst of all speeds. * Pareto-optimal for friction coefficient" in words
     assert "For 1 % on friction coefficient" in words
     shown = [label for label in labels(rv.plot.trade(ds)) if label.startswith("Error")]
     assert shown == ["Error of friction coefficient [%]", "Error of contact area [%]"]
