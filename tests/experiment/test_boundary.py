@@ -46,10 +46,9 @@ def test_auto__asks_of_anything_else_and_nothing_is_computed(monkeypatch):
         assert str(asked.value) == name + ANSWER
 
 
-def test_auto__with_an_accepted_edge_is_free():
-    found = pressed(SCAN, edge="accept")
-    assert found.attrs["boundary"] == "free"
-    assert 'edge = "accept"' in found.attrs["edge_note"]
+def test_auto__with_an_accepted_edge_is_free(caplog):
+    assert pressed(SCAN, edge="accept").attrs["boundary"] == "free"
+    assert "Contact reached the border of the surface" in caplog.text, "the outline is that of a punch"
 
 
 def test_friction__is_periodic_whatever_slides():
