@@ -49,7 +49,7 @@ FIGURES = {
     "creeping_seal": {"leakage": rv.plot.leakage},
     "friction": {
         "curve": lambda ds: rv.plot.friction(ds, persson=True),
-        "maps": rv.plot.friction_maps,
+        "maps": rv.plot.maps,
     },
     "stability_map": {},  # drawn by its script
 }

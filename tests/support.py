@@ -177,7 +177,8 @@ def measured(case, *settings, **options):
 
 
 def labels(figure):
-    return [text for ax in figure.axes for text in (ax.get_xlabel(), ax.get_ylabel()) if text]
+    """Labels of all axes, whatever lines they are broken into."""
+    return [text.replace("\n", " ") for ax in figure.axes for text in (ax.get_xlabel(), ax.get_ylabel()) if text]
 
 
 def lines(ax):
@@ -225,7 +226,7 @@ def text_boxes(figure):
             found += [axis.label, axis.offsetText]
         found += [ax.title, ax._left_title, ax._right_title]
         found += ax.get_legend().get_texts() if ax.get_legend() else []
-    found += [figure._suptitle] if figure._suptitle else []
+    found += [text for text in (figure._suptitle, figure._supxlabel, figure._supylabel) if text]
     for legend in figure.legends:
         found += legend.get_texts()
     return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]

@@ -30,8 +30,9 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
     from roughvisc.study.storage.store import no_results, result_files, whole_result
     from roughvisc.study.trade.files import is_trade, open_trade
+    from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import cases_in, results_of, write_figure
+    from roughvisc.views.sweep_figures.files import cases_in, results_of
 
     paths = result_files(result) if result.is_dir() else [result]
     if not paths:

@@ -55,8 +55,8 @@ def scan(
     from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
     from roughvisc.views.console.scan_advice import advice_table
     from roughvisc.views.console.tables import scan_table
+    from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import surface
-    from roughvisc.views.sweep_figures.files import write_figure
 
     options = read_options(**given)
     height = open_scan(file, **options)

@@ -261,8 +261,8 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from roughvisc.study.trade.reference import quantities_of
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.trade_table import trade_table
+    from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import trade as figure
-    from roughvisc.views.sweep_figures.files import write_figure
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None

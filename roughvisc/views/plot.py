@@ -7,29 +7,36 @@ readable prefixes; nothing here touches matplotlib's global state.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
-from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.animate import animate, animation
 from roughvisc.views.figures.axes import fullest_frame, require, rows_of
-from roughvisc.views.figures.distributions import contact_clusters, distributions, has_clusters
-from roughvisc.views.figures.fields import maps
-from roughvisc.views.figures.friction import friction, friction_against_distance, friction_maps
-from roughvisc.views.figures.histories import area_against_load, has_loop, history, hysteresis
-from roughvisc.views.figures.sections import section
-from roughvisc.views.figures.stability import stability_map
-from roughvisc.views.figures.surfaces import surface
-from roughvisc.views.figures.trade import trade
-from roughvisc.views.figures.transport import conductance, leakage
-from roughvisc.views.sweep_figures.case_histories import histories_of_cases
-from roughvisc.views.sweep_figures.files import save_sweep_figures, write_figure
-from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
-from roughvisc.views.sweep_figures.sweeps import sweep
+from roughvisc.views.figures.files import write_figure
+
+if TYPE_CHECKING:  # for editors; at run time each is imported when it is first used
+    from matplotlib.figure import Figure
+
+    from roughvisc.views.figures.animate import animate, animation
+    from roughvisc.views.figures.diagnostics import diagnostics
+    from roughvisc.views.figures.distributions import contact_clusters, distributions
+    from roughvisc.views.figures.fields import maps
+    from roughvisc.views.figures.friction import friction, friction_against_distance
+    from roughvisc.views.figures.histories import area_against_load, history, hysteresis
+    from roughvisc.views.figures.sections import section
+    from roughvisc.views.figures.stability import stability_map
+    from roughvisc.views.figures.surfaces import surface
+    from roughvisc.views.figures.trade import trade
+    from roughvisc.views.figures.transport import conductance, leakage
+    from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+    from roughvisc.views.sweep_figures.files import save_sweep_figures
+    from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
+    from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
     "animate",
@@ -37,10 +44,10 @@ __all__ = [
     "area_against_load",
     "conductance",
     "contact_clusters",
+    "diagnostics",
     "distributions",
     "friction",
     "friction_against_distance",
-    "friction_maps",
     "friction_of_cases",
     "histories_of_cases",
     "history",
@@ -56,56 +63,110 @@ __all__ = [
     "trade",
 ]
 
+#: Modules that the figures are imported from -> their figures, and what tells whether one of them says anything.
+_MODULES = {
+    "figures.animate": ("animate", "animation"),
+    "figures.diagnostics": ("diagnostics",),
+    "figures.distributions": ("contact_clusters", "distributions", "has_clusters"),
+    "figures.fields": ("maps",),
+    "figures.friction": ("friction", "friction_against_distance"),
+    "figures.histories": ("area_against_load", "has_loop", "history", "hysteresis"),
+    "figures.sections": ("section",),
+    "figures.stability": ("stability_map",),
+    "figures.surfaces": ("surface",),
+    "figures.trade": ("trade",),
+    "figures.transport": ("conductance", "leakage"),
+    "sweep_figures.case_histories": ("histories_of_cases",),
+    "sweep_figures.files": ("save_sweep_figures",),
+    "sweep_figures.friction_curves": ("friction_of_cases",),
+    "sweep_figures.sweeps": ("sweep",),
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "friction_maps":
+        raise AttributeError("rv.plot.friction_maps is no more: write rv.plot.maps(ds), where times= takes speeds too")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(import_module(f"roughvisc.views.{_HOMES[name]}"), name)
+    return globals()[name]
+
 
 def __dir__() -> list[str]:
     return __all__
 
 
-#: What :func:`save_figures` draws: name -> (function, variables of which all, variables of which one is needed).
-FIGURES = {
-    "friction": (friction, ("speed", "friction_coefficient", "contact_fraction"), ()),
-    "pressure_maps": (friction_maps, ("speed", "x", "y", "pressure"), ()),
-    "history": (history, (), ("force", "approach", "contact_area")),
-    "maps": (maps, ("x", "y"), ("pressure", "gap")),
-    "section": (section, ("height",), ("gap", "displacement")),
-    "distributions": (distributions, (), ("pressure", "gap")),
-    "clusters": (contact_clusters, ("x", "y"), ("pressure", "gap")),
-    "hysteresis": (hysteresis, ("time", "force", "approach"), ()),
-    "leakage": (leakage, ("leak_rate", "gap"), ()),
-    "conductance": (conductance, (), CONDUCTANCES),
-    "slide": (friction_against_distance, ("time", "sliding_distance", "friction_coefficient"), ()),
-    "surface": (surface, ("height",), ()),
+#: What :func:`save_figures` draws: name -> (function, or the name of one of this module, variables of which all,
+#: variables of which one is needed).
+FIGURES: dict[str, tuple[Any, tuple[str, ...], tuple[str, ...]]] = {
+    "friction": ("friction", ("speed", "friction_coefficient", "contact_fraction"), ()),
+    "history": ("history", (), ("force", "approach", "contact_area")),
+    "maps": ("maps", ("x", "y"), ("pressure", "gap")),
+    "section": ("section", ("height",), ("gap", "displacement")),
+    "distributions": ("distributions", (), ("pressure", "gap")),
+    "clusters": ("contact_clusters", ("x", "y"), ("pressure", "gap")),
+    "hysteresis": ("hysteresis", ("time", "force", "approach"), ()),
+    "leakage": ("leakage", ("leak_rate", "gap"), ()),
+    "conductance": ("conductance", (), CONDUCTANCES),
+    "slide": ("friction_against_distance", ("time", "sliding_distance", "friction_coefficient"), ()),
+    "surface": ("surface", ("height",), ()),
+    "diagnostics": ("diagnostics", (), ("iterations", "convolutions", "stated_error")),
 }
-
-#: Those of them that a run draws, and `roughvisc plot` without --all: two, and what a study has asked to be observed.
-FIRST = ("friction", "pressure_maps", "history", "maps", "leakage", "conductance")
 
 #: Those of them that are drawn only where they say something.
-TELLING = {
-    "clusters": has_clusters,
-    "hysteresis": has_loop,
-    "maps": lambda dataset: "speed" not in dataset.dims,  # these have maps with arrows
+TELLING: dict[str, Any] = {
+    "clusters": "has_clusters",
+    "hysteresis": "has_loop",
 }
+
+#: What is drawn unless more is asked for, of each line the first that a result allows.
+DEFAULT = (("friction", "history"), ("maps",), ("leakage",), ("conductance",))
+
+
+def _function(named: Any) -> Any:
+    return named if callable(named) else globals().get(named) or __getattr__(named)
+
+
+def allowed_figures(dataset: xr.Dataset) -> list[str]:
+    """Names of the figures that the variables of a result allow."""
+    return [
+        name
+        for name, (_, needed, wanted) in FIGURES.items()
+        if all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
+    ]
+
+
+def default_figures(dataset: xr.Dataset) -> list[str]:
+    """Names of the few figures that are drawn unless more is asked for: histories, or a curve of friction, and maps."""
+    allowed = allowed_figures(dataset)
+    return [next(name for name in line if name in allowed) for line in DEFAULT if {*line} & {*allowed}]
 
 
 def figures_of(dataset: xr.Dataset, leave: str = "", *, every: bool = True) -> Iterator[tuple[str, Figure]]:
-    """Name and figure of all that the variables of a result allow and that says something of it, but of one to leave.
+    """Name and figure of all that the variables of a result allow and that says something of it.
 
-    Without `every`, only of the first ones. The section is drawn in the last row of the largest contact area.
+    The section is drawn in the last row of the largest contact area.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    leave : str
+        Name of one to leave out.
+    every : bool
+        False: only the few of :func:`default_figures`; others are not imported.
     """
-    for name, (draw, needed, wanted) in FIGURES.items():
-        if name == leave or not (every or name in FIRST):
-            continue
-        stored = all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
-        if not stored or (name in TELLING and not TELLING[name](dataset)):
+    for name in allowed_figures(dataset) if every else default_figures(dataset):
+        if name == leave or (name in TELLING and not _function(TELLING[name])(dataset)):
             continue
         options = {"time": float(rows_of(dataset)[fullest_frame(dataset)])} if name == "section" else {}
-        yield name, draw(dataset, **options)
+        yield name, _function(FIGURES[name][0])(dataset, **options)
 
 
 def save_figures(
     dataset: xr.Dataset,
-    folder,
+    folder: Any,
     stem: str,
     *,
     suffix: str = ".png",

@@ -13,46 +13,61 @@ from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
-from roughvisc.observables import contact, history
+from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
-    VERMILION,
     RowAxis,
     Unit,
+    at_rows,
+    broken,
     fullest_frame,
+    legend_above,
     letter_panels,
     new_figure,
+    note_below,
     require,
-    row_text,
     rows_of,
     spread_axis,
     spread_frames,
     styled,
     unit_for,
 )
-from roughvisc.views.figures.coarsened import note, present, touching
+from roughvisc.views.figures.coarsened import note, touching
 from roughvisc.views.figures.fields import (
+    Scale,
+    as_shown,
+    colour_bar,
     draw_map,
     draw_outline,
+    joint_scale,
     label_plane,
+    map_legend,
     measured_part,
-    outline_colour,
     plane_ratio,
     plane_unit,
     value_scale,
 )
-from roughvisc.views.figures.sections import cut_position, deformed_line
-from roughvisc.views.figures.transport import draw_flux, flux_of, rate_unit, visible, with_leak_rate
+from roughvisc.views.figures.histories import leave_room, steps_of
+from roughvisc.views.figures.sections import cut_position, deformed_line, draw_contact
+from roughvisc.views.figures.transport import (
+    draw_flux,
+    flow_legend,
+    flux_of,
+    flux_scale,
+    rate_unit,
+    visible,
+    with_leak_rate,
+)
 
 #: A map's side along y over that along x from which the map takes the whole height.
 _TALL = 1.2
-_HISTORIES = ("force", "approach", "contact_area")
-#: The same of a program that slides.
-_OF_SLIDES = ("friction_coefficient", "approach", "contact_area")
+#: The histories that move along, the most of them, and the first of them: the most telling that a result holds.
+_FIRST, _HISTORIES = ("leak_rate", "friction_coefficient", "force"), ("approach", "contact_area")
 
 
 def _writer(path: Path, rate: float):
@@ -151,20 +166,20 @@ def _moving(
     dataset: xr.Dataset, field: str | None, count: int
 ) -> tuple[Figure, Callable[[int], list[Artist]], list[int]]:
     """Figure, what draws a frame into it, and the frames."""
-    require(dataset, "time", "x", "y")
+    require(dataset, "x", "y")
+    dataset = dataset.sortby(str(rows_of(dataset).name))
     field = field or ("pressure" if "pressure" in dataset else "gap")
     if field not in (*FIELDS, "flux"):
         raise InputError(f"field is {field!r}: expected 'pressure', 'gap', 'displacement' or 'flux'")
     require(dataset, "gap" if field == "flux" else field)
-    chosen = [int(frame) for frame in spread_frames(dataset["time"], count)]
-    slides = "sliding_distance" in dataset
-    histories = [name for name in (_OF_SLIDES if slides else _HISTORIES) if name in dataset]
+    chosen = [int(frame) for frame in spread_frames(rows_of(dataset), count)]
     if field == "flux":
         dataset = with_leak_rate(dataset)
         dataset = dataset.assign(flux=flux_of(dataset))
-        histories = ["leak_rate", *histories[1:]]
     else:
         dataset = measured_part(dataset)
+    first = [name for name in _FIRST[field != "flux" :] if name in dataset][:1]
+    histories = first + [name for name in _HISTORIES if name in dataset]
     sectioned = "height" in dataset and ("gap" in dataset or "displacement" in dataset)
     figure, on_map, cuts, right = _panels(plane_ratio(dataset), sectioned, len(histories))
     movers = [
@@ -174,25 +189,44 @@ def _moving(
     ]
     letter_panels((on_map, *cuts, *right))
     figure.align_ylabels(right)
-    title, coarse = figure.suptitle("", fontsize=9), note(dataset, field)
-    if coarse:
-        figure.supxlabel(coarse, fontsize=6.5)
+    note_below(figure, note(dataset, field))
+    named = _legend(movers, on_map, cuts, right, chosen)
+    letter = on_map.get_title(loc="left")
+    title = on_map.set_title(letter, loc="left")
 
     def draw(frame: int) -> list[Artist]:
-        title.set_text(_heading(dataset, frame))
+        title.set_text(f"{letter}  {_heading(dataset, frame)}".lstrip())
         for move in movers:
             move(frame)
         return [title]
 
+    legend_above(figure, named)
     draw(chosen[0])
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the first picture's layout holds for all
     return figure, draw, chosen
 
 
+def _legend(
+    movers: list[Callable[[int], object]], on_map: Axes, cuts: list[Axes], right: list[Axes], chosen: list[int]
+) -> dict[str, Artist]:
+    """What the moving pictures show, of all of them: some show a thing that the first one has not."""
+    (image,) = on_map.images
+    named: dict[str, Artist] = {}
+    for frame in chosen:
+        movers[0](frame)
+        named |= flow_legend(image) if image.get_gid() == "flux" else map_legend([image])
+    for ax in cuts:
+        named |= {label: one for one, label in zip(*ax.get_legend_handles_labels(), strict=True) if label not in named}
+    if right:
+        named["shown on the map"] = Line2D([], [], color="k", ls="", marker="o", ms=5)
+    return named
+
+
 def _heading(dataset: xr.Dataset, frame: int) -> str:
     """Time of a frame, and the distance that is behind."""
-    text = row_text(rows_of(dataset)[frame])
+    rows = rows_of(dataset)
+    text = RowAxis.of(rows).text(rows[frame])
     if "sliding_distance" not in dataset:
         return text
     distance = dataset["sliding_distance"].values
@@ -205,7 +239,7 @@ def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes
         figure = new_figure(4.4, 0.8 + 3.3 * float(np.clip(ratio, 0.3, 1.3)) + 1.4 * sectioned)
         grid = figure.add_gridspec(1 + sectioned, 1, height_ratios=[3.3 * ratio, 1.4][: 1 + sectioned])
         return figure, figure.add_subplot(grid[0]), [figure.add_subplot(grid[1])] if sectioned else [], []
-    figure = new_figure(7.6, 4.2 if ratio <= _TALL else 5.2)
+    figure = new_figure(7.6, 4.6 if ratio <= _TALL else 6.4)
     if ratio > _TALL:  # the map takes a column, and the section stands above the histories
         columns = figure.add_gridspec(1, 2, width_ratios=[1, 1.3])
         on_map, rows = figure.add_subplot(columns[0]), histories + sectioned
@@ -217,38 +251,34 @@ def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes
     return figure, left[0], list(left[1:]), list(columns[1].subgridspec(histories, 1).subplots(squeeze=False)[:, 0])
 
 
-def _highest(dataset: xr.Dataset, name: str, chosen: list[int]) -> tuple[float, bool]:
-    """End of the scale that holds all pictures but for a few high values in each [SI], and whether there are any."""
-    fields = (present(dataset, name, frame).values for frame in chosen)
-    found = [(value_scale(name, known)[1], known.max(initial=0.0)) for known in (v[np.isfinite(v)] for v in fields)]
-    end, highest = np.max(found, axis=0)
-    return float(end), bool(highest > end)
+def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> Scale:
+    """The scale that suits all pictures; one is in memory at a time."""
+    fields = (as_shown(dataset, name, frame).values for frame in chosen)
+    return joint_scale([value_scale(name, values[np.isfinite(values)]) for values in fields])
 
 
 def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
-    highest, beyond = _highest(dataset, field, chosen)
-    unit, plane = unit_for(highest, VARIABLES[field].units), plane_unit(dataset)
-    top = float(unit(highest)) or 1.0
-    low = 1e-12 * top if field == "pressure" else 0.0
-    if field == "displacement":
-        low = min(float(unit(present(dataset, field, frame).min())) for frame in chosen)
-    first = present(dataset, field, chosen[0])
-    image = draw_map(ax, first, unit, plane, vmin=low, vmax=top if top > low else low + 1)
-    side = "right" if plane_ratio(dataset) > 0.4 else "top"
-    look = {"pad": 0.02, "aspect": 18, "extend": "max" if beyond else "neither"}
-    figure.colorbar(image, ax=ax, location=side, **look).set_label(unit.label(VARIABLES[field].label))
+    scale = _scale(dataset, field, chosen)
+    unit, plane = unit_for([scale.high], VARIABLES[field].units), plane_unit(dataset)
+    image = draw_map(ax, as_shown(dataset, field, chosen[0]), unit, plane, **scale.limits(unit))
+    colour_bar(figure, [image], scale, unit, location=_side(dataset))
     label_plane(ax, dataset, plane)
     outline = [None]
 
     def move(frame):
-        image.set_data(np.ma.masked_invalid(unit(present(dataset, field, frame).transpose("y", "x"))))
+        image.set_data(np.ma.masked_invalid(unit(as_shown(dataset, field, frame).transpose("y", "x"))))
         if outline[0] is not None:
             outline[0].remove()
         outline[0] = None
-        if "pressure" in dataset or "gap" in dataset:
-            outline[0] = draw_outline(ax, touching(dataset, frame), plane, outline_colour(field))
+        if field != "gap" and ("pressure" in dataset or "gap" in dataset):
+            outline[0] = draw_outline(ax, touching(dataset, frame), plane)
 
     return move
+
+
+def _side(dataset: xr.Dataset) -> str:
+    """Where the colour bar of the map stands."""
+    return "right" if plane_ratio(dataset) > 0.4 else "top"
 
 
 def _moving_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
@@ -256,14 +286,12 @@ def _moving_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chos
     plane = plane_unit(dataset)
 
     def part(frame: int) -> xr.DataArray:
-        flux = dataset[field].isel(time=frame).load()
+        flux = at_rows(dataset[field], frame).load()
         highest = float(np.nan_to_num(flux.values).max())
         return visible(flux / (highest or 1.0), 1.0).rename(field)
 
     image = draw_flux(ax, part(chosen[0]), Unit(1.0, ""), plane, 1.0)
-    side = "right" if plane_ratio(dataset) > 0.4 else "top"
-    bar = figure.colorbar(image, ax=ax, location=side, pad=0.02, aspect=18, extend="min")
-    bar.set_label("Flux over its largest at that time")
+    colour_bar(figure, [image], flux_scale(1.0), Unit(1.0, ""), "Flux over its largest", _side(dataset))
     label_plane(ax, dataset, plane)
 
     def move(frame):
@@ -286,11 +314,11 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     top = high + 2 * margin
     ax.set_xlim(limits[0], limits[-1])
     ax.set_ylim(low - margin, top)
-    ax.fill_between(x, unit(height), low - margin, color="0.72", lw=0)
+    ax.fill_between(x, unit(height), low - margin, color="0.72", lw=0, label="profile")
     ax.plot(x, unit(height), color="0.25", lw=0.9)
-    body = ax.fill_between(x, unit(surfaces[0]), top, color=BLUE, alpha=0.16, lw=0)
+    body = ax.fill_between(x, unit(surfaces[0]), top, color=BLUE, alpha=0.16, lw=0, label="half-space")
     (line,) = ax.plot(x, unit(surfaces[0]), color=BLUE, lw=1)
-    (marked,) = ax.plot(x, np.full(len(x), np.nan), color=VERMILION, lw=2.2, marker="o", ms=2.2, mew=0)
+    marked = draw_contact(ax, x, np.full(len(x), np.nan))
     ax.set_xlabel(plane.label("x"))
     ax.set_ylabel(unit.label("Height"))
     ax.set_title(f"y = {plane.text(float(dataset['y'][index]))}", loc="right")
@@ -300,36 +328,35 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
         surface = unit(by_frame[frame])
         line.set_ydata(surface)
         body.set_data(x, surface, top)
-        on_line = contact(dataset.isel(time=frame, y=index)).values
+        on_line = contact(at_rows(dataset, frame).isel(y=index)).values
         marked.set_ydata(np.where(on_line, unit(height), np.nan))
 
     return move
 
 
 def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
-    steps = history(dataset)
-    clock = steps["time"]
+    steps = steps_of(dataset)
+    clock = rows_of(steps)
     steps = steps if name in steps else dataset[[name]]
     axis, (unit, spans) = RowAxis.of(clock), rate_unit(steps[name])
-    times, shown = axis.unit(steps["time"]), unit(steps[name].values)
+    times, shown = axis.unit(rows_of(steps)), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
     (run,) = ax.plot([], [], color=BLUE, lw=1.4)
-    (now,) = ax.plot([], [], "o", color=VERMILION, ms=5)
+    (now,) = ax.plot([], [], "o", color="k", ms=5)
     axis.apply(ax, clock)
     ax.minorticks_off()  # each costs time in every picture
     if not lowest:
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
-    top = float(np.nanmax(np.abs(shown), initial=0.0)) or 1.0
     if spans:
         spread_axis(ax.yaxis, shown)
-        ax.set_ylim(shown[shown > 0].min() / 3, 3 * top)
+        ax.set_ylim(shown[shown > 0].min() / 3, 3 * shown.max())
     else:
-        ax.set_ylim(min(float(np.nanmin(shown, initial=0.0)) * 1.1, -0.05 * top), 1.15 * top)
-    ax.set_ylabel(unit.label(VARIABLES[name].label))
+        leave_room(ax, shown)
+    ax.set_ylabel(broken(unit.label(VARIABLES[name].label), 1.0))
     ax.grid(color="0.9", lw=0.5)
 
-    reached = np.searchsorted(steps["time"].values, dataset["time"].values, side="right")
+    reached = np.searchsorted(rows_of(steps).values, rows_of(dataset).values, side="right")
 
     def move(frame):
         run.set_data(times[: reached[frame]], shown[: reached[frame]])

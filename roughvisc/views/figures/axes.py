@@ -7,13 +7,16 @@ one axis and then used for every artist on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import string
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -29,20 +32,22 @@ from roughvisc.variables.axes import AXES, axis_of
 #: Print-ready: sans serif at the size of a caption, thin lines, ticks inwards, embedded fonts.
 STYLE = {
     "font.family": "sans-serif",
-    "font.size": 8.5,
-    "axes.labelsize": 8.5,
-    "axes.titlesize": 8.5,
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
     "axes.linewidth": 0.7,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "legend.fontsize": 7.5,
+    "legend.fontsize": 8,
+    "legend.title_fontsize": 8,
+    "figure.labelsize": 9,
     "legend.frameon": False,
     "lines.linewidth": 1.3,
     "lines.markersize": 3.5,
     "xtick.direction": "in",
     "ytick.direction": "in",
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
@@ -51,8 +56,15 @@ STYLE = {
 #: Okabe and Ito's colours: told apart by all common kinds of colour vision, and in grey.
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000")
-#: Cells where the profile is absent.
-ABSENT = "0.82"
+#: Contact in all figures, as lines and as areas; cells out of contact on a map of what is in contact alone; cells where
+#: the profile is missing.
+CONTACT, NO_CONTACT, ABSENT = VERMILION, "#dceaf5", "0.72"
+#: Size of notes in a figure. [point]
+SMALL = 8.0
+#: Mean width of a letter of a legend [inch], and what an entry takes beside its text.
+_LETTER, _ENTRY = 0.062, 0.46
+#: Mean width of a letter of an axis' label. [inch]
+_LABEL_LETTER = 0.073
 
 
 def styled(draw):
@@ -65,10 +77,59 @@ def new_figure(width: float, height: float, layout: str = "constrained") -> Figu
     return Figure(figsize=(width, height), layout=layout)
 
 
-def letter_panels(axes: Sequence[Axes]) -> None:
-    """Write (a), (b), ... at the top left of the panels."""
-    for letter, ax in zip("abcdefghijklmnopqrstuvwxyz", axes, strict=False):
-        ax.set_title(f"({letter})", loc="left", fontweight="bold", fontsize=8)
+def letter_panels(axes: Sequence[Axes], titles: Sequence[str] = ()) -> None:
+    """Write (a), (b), ... at the top left of the panels, and a title behind the letter; one panel needs no letter."""
+    for number, ax in enumerate(axes):
+        title = titles[number] if number < len(titles) else ""
+        letter = rf"$\mathbf{{({string.ascii_lowercase[number]})}}$" if 1 < len(axes) <= 26 else ""
+        ax.set_title("  ".join(filter(None, (letter, title))), loc="left")
+
+
+def _columns(labels: Sequence[str], width: float) -> int:
+    """As many columns of a legend as a width [inch] has room for: it is filled column by column."""
+    sizes = [_ENTRY + _LETTER * max(map(len, label.split("\n"))) for label in labels]
+    for count in range(len(sizes), 1, -1):
+        if sum(float(max(part)) for part in np.array_split(sizes, count)) <= width:
+            return count
+    return 1
+
+
+def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -> None:
+    """Legend above all panels, in as many columns as the figure has room for; long entries are broken."""
+    if not named:
+        return
+    width = figure.get_figwidth() - 0.3
+    labels = [textwrap.fill(label, max(16, int((width - _ENTRY) / _LETTER))) for label in named]
+    look: dict[str, Any] = {"ncols": _columns(labels, width), "handlelength": 1.5, "columnspacing": 1.2}
+    legend = figure.legend(list(named.values()), labels, loc="outside upper center", **look)
+    legend.set_title(title or None)
+
+
+def legend_over(ax: Axes, width: float) -> None:
+    """Legend of a panel of about that width [inch], above it and beside its letter; none where nothing is named."""
+    handles, labels = ax.get_legend_handles_labels()
+    if not labels:
+        return
+    look: dict[str, Any] = {"borderaxespad": 0.1, "handlelength": 1.4, "columnspacing": 1.0, "handletextpad": 0.5}
+    look["ncols"] = _columns(labels, width - 0.2)
+    ax.legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), **look)
+
+
+def broken(label: str, room: float) -> str:
+    """Label of an axis of about that length [inch]: its unit, or last word, in a second line where it is longer."""
+    return "\n".join(label.rsplit(" ", 1)) if len(label) * _LABEL_LETTER > room else label
+
+
+def note_below(figure: Figure, *notes: str) -> None:
+    """What a reader has to know besides, below all panels, in lines that are no longer than the figure is wide."""
+    width = int((figure.get_figwidth() - 0.2) / _LETTER)
+    if lines := [line for note in notes if note for line in textwrap.wrap(note, width)]:
+        figure.supxlabel("\n".join(lines), fontsize=SMALL)
+
+
+def say_inside(ax: Axes, text: str) -> None:
+    """Text in the middle of a panel that has nothing to show."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="0.4")
 
 
 # --------------------------------------------------------------------------------------------------------- time
@@ -87,9 +148,9 @@ def spans_decades(values) -> bool:
     return bool(unevenness(np.log(values)) < 0.7 * unevenness(values))
 
 
-def rows_of(dataset: xr.Dataset) -> xr.DataArray:
-    """The coordinate that the rows of a result lie over."""
-    return dataset[axis_of(dataset.variables)]
+def rows_of(dataset: xr.Dataset | xr.DataArray) -> xr.DataArray:
+    """The coordinate that the rows of a result, or of a history, lie over."""
+    return dataset[axis_of(dataset.variables if isinstance(dataset, xr.Dataset) else dataset.dims)]
 
 
 def at_rows(dataset: xr.Dataset | xr.DataArray, numbers) -> Any:
@@ -106,19 +167,25 @@ class RowAxis:
     logarithmic: bool
     first: float
     label: str = "Time"
+    symbol: str = "t"
 
     @classmethod
-    def of(cls, rows: xr.DataArray | ArrayLike) -> RowAxis:
-        """Axis for increasing times [s], or the places on another axis."""
-        name = getattr(rows, "name", "time")
+    def of(cls, rows: xr.DataArray | ArrayLike, name: str = "") -> RowAxis:
+        """Axis for increasing places on the axis of a name; by default that of the coordinate given, or times [s]."""
+        name = name or getattr(rows, "name", "time")
         name = name if name in AXES else "time"
         known = AXES[name].variables[name]
-        places = np.asarray(rows, dtype=float)
+        places = np.sort(np.asarray(rows, dtype=float).ravel())
         positive = places[places > 0]
         label = "Time" if name == "time" else known.label
+        symbol = AXES[name].symbol
         if spans_decades(places):
-            return cls(Unit(1.0, known.units), True, float(positive[0]), label)
-        return cls(unit_for(places, known.units), False, float(positive[0]) if len(positive) else 1.0, label)
+            return cls(Unit(1.0, known.units), True, float(positive[0]), label, symbol)
+        return cls(unit_for(places, known.units), False, float(positive[0]) if len(positive) else 1.0, label, symbol)
+
+    def text(self, place: float) -> str:
+        """A place as read in running text, in the unit of the axis, such as ``"t = 50 ms"``."""
+        return f"{self.symbol} = {self.unit.text(float(place), 3)}"
 
     def apply(self, ax: Axes, times, most: int = 7) -> None:
         """Set scale, limits, label and at most so many decades of the axis; zero keeps its place on a log one."""

@@ -15,15 +15,17 @@ from roughvisc.units import quantities
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures.axes import (
     BLUE,
-    VERMILION,
+    CONTACT,
     RowAxis,
     at_rows,
     frame_at,
+    legend_above,
+    legend_over,
     letter_panels,
     new_figure,
     require,
-    row_text,
     rows_of,
+    say_inside,
     spread_axis,
     spread_frames,
     styled,
@@ -84,17 +86,15 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     if not panels:
         require(dataset, "pressure", "gap")
     frames = _frames(dataset, times, 5)
-    chosen = at_rows(dataset, frames)
-    figure = new_figure(2.9 * len(panels) + 0.2, 2.9)
+    chosen, texts = at_rows(dataset, frames), RowAxis.of(rows_of(dataset))
+    figure = new_figure(3.4 * len(panels) + 0.2, 3.0)
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, (name, find) in zip(axes, panels, strict=True):
         count = bins or _bin_count(chosen[name])
-        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name)
+        _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name, texts)
     by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    ordered = [label for label in map(row_text, rows_of(chosen)) if label in by_label]
-    figure.legend(
-        [by_label[label] for label in ordered], ordered, loc="outside upper center", ncols=5, handlelength=1.2
-    )
+    ordered = [label for label in map(texts.text, rows_of(chosen)) if label in by_label]
+    legend_above(figure, {label: by_label[label] for label in ordered})
     letter_panels(axes)
     return figure
 
@@ -106,11 +106,11 @@ def _bin_count(field: xr.DataArray) -> int:
 
 
 def _no_contact(ax: Axes, text: str = "no contact") -> None:
-    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color="0.4")
+    say_inside(ax, text)
     ax.set_yticks([])
 
 
-def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str) -> None:
+def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: str, texts: RowAxis) -> None:
     centres = density[f"{name}_bin"].values
     width = 2 * centres[0]
     limits = width * np.arange(len(centres) + 1)
@@ -119,7 +119,7 @@ def _draw_density(ax: Axes, dataset: xr.Dataset, density: xr.DataArray, name: st
         values = at_rows(density, number).values * unit.factor
         if not np.isfinite(values).all():
             continue
-        text = row_text(rows_of(dataset)[number])
+        text = texts.text(rows_of(dataset)[number])
         ax.stairs(values, unit(limits), color=colour, lw=1.2, label=text, baseline=None)
     ax.set_xlim(0, float(unit(limits[-1])))
     ax.set_ylim(bottom=0)
@@ -158,7 +158,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     require(dataset, "x", "y")
     followed = at_rows(dataset, spread_frames(rows_of(dataset), 100))
     found = clusters(followed).compute()
-    figure = new_figure(7.2, 2.7)
+    figure = new_figure(7.2, 3.0)
     count, area, sizes = figure.subplots(1, 3)
     axis = RowAxis.of(rows_of(dataset))
     times_shown = axis.unit(rows_of(followed))
@@ -169,12 +169,12 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
     unit = unit_for(found["cluster_area_largest"], "m^2")
-    area.plot(times_shown, unit(found["cluster_area_largest"]), color=VERMILION, marker=marker, label="largest")
+    area.plot(times_shown, unit(found["cluster_area_largest"]), color=CONTACT, marker=marker, label="largest")
     area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
     if found["cluster_count"].any():
         spread_axis(area.yaxis, unit([found["cluster_area_largest"], found["cluster_area_mean"]]))
-        area.legend()
+        legend_over(area, 1.9)
     else:
         _no_contact(area)
     for ax in (count, area):
@@ -195,10 +195,11 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
         _no_contact(ax, ("no contact", "one cluster at most", "two clusters at most")[most])
         ax.set_xticks([])
     else:
+        texts = RowAxis.of(rows_of(dataset))
         for row, time, colour in zip(areas, rows_of(chosen), _colours(len(frames)), strict=True):
             row = unit(row[np.isfinite(row)])
             if len(row):
-                look = {"drawstyle": "steps-post", "label": row_text(time)}
+                look = {"drawstyle": "steps-post", "label": texts.text(time)}
                 ax.plot(row, np.arange(1, len(row) + 1), color=colour, **look)
                 ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
         ax.locator_params(axis="x", nbins=4)
@@ -209,7 +210,6 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
         else:
             ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-        lines = ax.get_legend_handles_labels()
-        ax.figure.legend(*lines, loc="outside upper right", ncols=4, handlelength=1.0)
+        legend_over(ax, 1.9)
     ax.set_xlabel(unit.label("Cluster area"))
     ax.set_ylabel("Clusters at least as large")

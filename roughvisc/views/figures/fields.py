@@ -3,55 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 import matplotlib
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar, make_axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, NullLocator
+from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import cell_edges
-from roughvisc.units import quantities
+from roughvisc.units import in_si
 from roughvisc.variables import FIELDS, VARIABLES
+from roughvisc.variables.attributes import attributes_of
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import (
     ABSENT,
-    VERMILION,
+    CONTACT,
+    NO_CONTACT,
+    RowAxis,
     Unit,
+    broken,
     frame_at,
+    legend_above,
+    letter_panels,
     new_figure,
+    note_below,
     require,
-    row_text,
     rows_of,
     styled,
     telling_frames,
     unit_for,
 )
-from roughvisc.views.figures.coarsened import note, present, stride, touching
+from roughvisc.views.figures.coarsened import note, present, touching
 
-#: Perceptually even maps, the same order of lightness in grey: pressure, flux darken as they rise, gap as it closes.
-COLOUR_MAPS = {"pressure": "magma_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
-COLOUR_MAPS["flux"] = "YlGnBu"
+#: Perceptually even maps without the colour of contact: pressure and flux darken as they rise, gap as it closes.
+COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
+COLOUR_MAPS["flux"] = "cividis_r"
 _MOST_MAPS = 24
-#: Colour of cells in contact on maps of the gap that have no outline; values from which some may lie beyond a scale.
-_TOUCHING, _MANY = VERMILION, 1_000
-#: Part of a map that the outline of the contact may cover: beyond it cells in contact have a colour instead.
+#: Values from which some may lie beyond a scale.
+_MANY = 1_000
+#: Part of a map that the outline of the contact may cover: beyond it there is none.
 _MOST_INK = 0.1
 #: Length of a map's longer side, about. [point]
 _LONG_SIDE = 126.0
-#: Share of the values within the colour scale; a few higher ones are drawn as its end.
-_SHOWN = 99.8
+#: Share of the values within the colour scale, and by how much the outermost must exceed it to lie beyond the scale.
+_SHOWN, _SPIKE = 99.8, 1.2
+#: Part of the largest pressure from which on a field of contact everywhere is shown from its least pressure.
+_EVEN = 0.5
 #: A map's short over its long side below which ticks along the short one would lie on each other.
 _THIN = 0.1
+#: Gap between a colour bar and its maps, and its width. [inch]
+_BAR_PAD, _BAR_WIDTH = 0.07, 0.1
+#: Length that every colour bar at the right has for its label. [inch]
+_LABELLED = 1.1
 
 
 def colour_map(name: str) -> Colormap:
-    """Colour map of a field: absent cells in light grey, cells without pressure in white, no gap as the least one."""
-    found = matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT)
-    return found if name == "gap" else found.with_extremes(bad=ABSENT, under="w")
+    """Colour map of a field: absent cells grey, contact on a map of the gap or flux, and no contact on one of pressure.
+
+    The last two lie below the scale.
+    """
+    under = {"pressure": NO_CONTACT, "gap": CONTACT}.get(name)
+    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT, under=under)
 
 
 def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
@@ -121,16 +145,20 @@ def label_plane(
     ax.tick_params(direction="out", labelbottom=x, labelleft=y)
 
 
-def draw_outline(ax: Axes, spots: xr.DataArray, plane: Unit, colour: str):
+def draw_outline(ax: Axes, spots: xr.DataArray, plane: Unit):
     """Outline of the cells in contact; None where there is nothing to outline."""
     mask = spots.transpose("y", "x").values
     if mask.all() or not mask.any() or not can_be_outlined(mask):
         return None
     # a rim out of contact closes the outline at the border of the map
     x, y = (plane(_with_rim(spots[name].values)) for name in ("x", "y"))
-    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=colour, linewidths=_line_width(mask))
+    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=CONTACT, linewidths=_OUTLINE)
     lines.set_gid("contact outline")
     return lines
+
+
+#: Width of the outline. [point]
+_OUTLINE = 0.7
 
 
 def can_be_outlined(mask: np.ndarray) -> bool:
@@ -138,12 +166,7 @@ def can_be_outlined(mask: np.ndarray) -> bool:
     if mask.all() or min(mask.shape) < 2:
         return False
     faces = sum(np.count_nonzero(np.diff(mask, axis=axis)) for axis in (0, 1))
-    return bool(faces * _line_width(mask) * max(mask.shape) / _LONG_SIDE <= _MOST_INK * mask.size)
-
-
-def _line_width(mask: np.ndarray) -> float:
-    """Of the outline. [point]"""
-    return 0.7 if mask.size < 2e4 else 0.3
+    return bool(faces * _OUTLINE * max(mask.shape) / _LONG_SIDE <= _MOST_INK * mask.size)
 
 
 def _with_rim(centres: np.ndarray) -> np.ndarray:
@@ -151,38 +174,62 @@ def _with_rim(centres: np.ndarray) -> np.ndarray:
     return np.concatenate([limits[:1], centres, limits[-1:]])
 
 
-def outline_colour(name: str) -> str:
-    """Colour of the outline that shows on a field's map."""
-    return "k" if name == "pressure" else "w"
+def as_shown(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
+    """One frame of a field; rounding leaves no gap in contact."""
+    field = present(dataset, name, frame)
+    return field.where(field.isnull() | ~touching(dataset, frame), 0.0) if name == "gap" else field
+
+
+def map_legend(images: Sequence[AxesImage]) -> dict[str, Artist]:
+    """What the maps of some panels show besides their scales: contact, no contact, missing cells."""
+    named: dict[str, Artist] = {}
+    outlined = any(one.get_gid() == "contact outline" for image in images for one in image.axes.collections)
+    shown = [(str(image.get_gid()), np.ma.asarray(image.get_array()), image.norm.vmin or 0.0) for image in images]
+    below = {name for name, values, low in shown if (values.filled(np.inf) < low).any()}
+    if outlined:
+        named["contact"] = Line2D([], [], color=CONTACT, lw=1.0)
+    if "gap" in below:
+        named["contact"] = Patch(color=CONTACT, lw=0)
+    if "pressure" in below:
+        named["no contact"] = Patch(facecolor=NO_CONTACT, edgecolor="0.5", lw=0.4)
+    if any(np.ma.getmaskarray(values).any() for _, values, _ in shown):
+        named["missing"] = Patch(color=ABSENT, lw=0)
+    return named
 
 
 def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
+    over = axis_of(dataset.variables)
+    rows, telling = rows_of(dataset).values, AXES[over].telling
+    if times is None and telling in dataset:
+        chosen = {int(rows.argmin()), int(np.nanargmax(dataset[telling].values)), int(rows.argmax())}
+        return sorted(chosen, key=lambda row: float(rows[row]))
     if times is None:
         return telling_frames(dataset, 4)
-    chosen = np.atleast_1d(np.asarray(times, dtype=float))
-    if not 0 < chosen.size <= _MOST_MAPS:
-        raise InputError(f"{chosen.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
-    return [frame_at(rows_of(dataset), float(time)) for time in chosen.ravel()]
+    asked = np.atleast_1d(np.asarray(in_si(times, AXES[over].variables[over].units, "times"), dtype=float))
+    if not 0 < asked.size <= _MOST_MAPS:
+        raise InputError(f"{asked.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
+    return [frame_at(rows, float(time)) for time in asked.ravel()]
 
 
 @styled
-@quantities(times="s")
-def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "gap")) -> Figure:
-    """Maps of fields at chosen times, with the outline of the contact; one colour scale a field for all times.
+def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
+    """Maps of fields at chosen times, or speeds, with the contact; one colour scale a field for all of them.
 
-    Of more than 1024 cells a side a cell drawn stands for a block of them: for their largest pressure, their smallest
-    gap, and contact if any of them touches; the figure says so. One frame is read at a time, some rows at a time.
-    Contact that is too ragged for an outline has a colour of its own on maps of the gap. The scale holds all but two of
-    a thousand values: an arrow says that there are higher ones. Of a surface that repeats by its mirror images the
-    part that was measured is drawn.
+    Contact is orange: an outline on maps of what is known everywhere, or the colour of its cells on maps of the gap. An
+    outline that would bury the map is left out. Of more than 1024 cells a side a cell drawn stands for a block of them:
+    for their largest pressure, their smallest gap, and contact if any of them touches; the figure says so. One frame is
+    read at a time, some rows at a time. The scale leaves out spikes, two of a thousand values at most: an arrow and the
+    largest value tell of them. Of a surface that repeats by its mirror images the part that was measured is drawn. Of a
+    curve of friction an arrow shows where the profile moves, in whose frame the maps are.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result; with fields on Dask only the frames drawn are loaded.
     times : float or str, or list of them, optional
-        The nearest kept times are drawn; negative whole numbers count frames from the end, -1 the last.
-        By default up to four over the time in contact, that of the largest contact area among them. [s]
+        The nearest kept times, or speeds [m/s], are drawn; negative whole numbers count frames from the end, -1 the
+        last. By default up to four over the time in contact, that of the largest contact area among them; of a curve of
+        friction the lowest speed, that of the largest friction, and the highest. [s]
     fields : sequence of str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out.
 
@@ -205,77 +252,208 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] = ("pressure", "
         require(dataset, *fields)
     whole, dataset = dataset, measured_part(dataset)
     frames = _chosen_frames(dataset, times)
-    figure, axes = map_panels(dataset, len(frames), len(stored))
-    for name, panels in zip(stored, axes, strict=True):
-        draw_field(figure, panels, dataset, name, frames)
-    label_maps(axes, dataset, [_frame_text(dataset, frame) for frame in frames])
-    notes = ["The part that was measured; its mirror images are not drawn"] if dataset is not whole else []
-    notes += [coarse] if (coarse := note(dataset, *stored)) else []
-    if notes:
-        figure.suptitle("\n".join(notes), fontsize=7)
+    figure, axes = _map_panels(dataset, len(frames), len(stored))
+    images = [_draw_field(figure, p, dataset, name, frames) for name, p in zip(stored, axes, strict=True)]
+    _label_maps(axes, dataset, _frame_texts(dataset, frames))
+    legend_above(figure, map_legend(list(chain.from_iterable(images))))
+    mirrored = "" if dataset is whole else "The part that was measured; its mirror images are not drawn."
+    note_below(figure, mirrored, _nominal(dataset, frames), note(dataset, *stored))
     return figure
 
 
-def map_panels(dataset: xr.Dataset, frames: int, fields: int):
+def _map_panels(dataset: xr.Dataset, frames: int, fields: int) -> tuple[Figure, np.ndarray]:
     """Figure and axes [field, row, column]; frames fill the rows of each field, a long strip of a map alone in its."""
     ratio = float(np.clip(plane_ratio(dataset), 0.05, 3.0))
-    rows = frames if ratio < 0.4 else -(-frames // (4 if ratio < 2 else 8))
+    rows = frames if ratio < 0.4 else -(-frames // (4 if ratio < 2 else 6))
     columns = -(-frames // rows)
-    width = 4.0 if ratio < 0.4 else 3.0 if columns == 1 and ratio < 1.5 else 1.75 if ratio < 2 else 1.1
-    height = width * ratio + (0.27 if rows > 1 else 0.12)
-    size = (width * columns + 0.17 * (columns - 1) + 1.25, max(height * rows, 1.2) * fields + 0.6)
+    width = 4.0 if ratio < 0.4 else 2.6 if columns == 1 and ratio < 1.5 else 1.55 if ratio < 2 else 1.3
+    height = width * min(ratio, 2.5) + (0.3 if rows > 1 else 0.15)
+    size = (width * columns + 0.17 * (columns - 1) + 1.3, max(height * rows, 1.3) * fields + 0.9)
     # side by side, maps that are narrower than their titles need the whole width
-    figure = new_figure(*size, layout="constrained" if plane_ratio(dataset) * _THIN > 1 else "compressed")
+    figure = new_figure(*size, layout="constrained" if ratio > 2 else "compressed")
     axes = figure.subplots(rows * fields, columns, sharex=True, sharey=True, squeeze=False)
     return figure, axes.reshape(fields, rows, columns)
 
 
-def draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> None:
-    """One field in its panels, on one colour scale, with the outline of the contact."""
-    shown = [present(dataset, name, frame) for frame in frames]
-    low, high, beyond = value_scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
-    unit, plane = unit_for([high], VARIABLES[name].units), plane_unit(dataset)
-    low, high = float(unit(low)), float(unit(high))
-    limits = {"vmin": low, "vmax": high if high > low else low + 1.0}
-    if name == "pressure":
-        limits["vmin"] = 1e-12 * limits["vmax"]  # so that zero lies under the scale
+def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> list[AxesImage]:
+    """One field in its panels, on one colour scale, with the contact."""
+    shown = [as_shown(dataset, name, frame) for frame in frames]
+    scale = value_scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
+    unit, plane = unit_for([scale.high], VARIABLES[name].units), plane_unit(dataset)
+    limits = scale.limits(unit)
     images = [draw_map(ax, one, unit, plane, **limits) for ax, one in zip(axes.ravel(), shown, strict=False)]
-    known = "pressure" in dataset or "gap" in dataset
-    spots = [touching(dataset, frame) for frame in frames] if known else []
-    outlined = all(can_be_outlined(one.values) for one in spots)
-    for image, one in zip(images, spots, strict=False):
-        if outlined:
-            draw_outline(image.axes, one, plane, outline_colour(name))
-        elif name == "gap":
-            image.set(cmap=colour_map(name).with_extremes(bad=ABSENT, under=_TOUCHING))
-            image.set_clim(1e-12 * limits["vmax"], limits["vmax"])  # so that no gap lies under the scale
-    extend = "max" if beyond else "neither"
-    across = {"pad": 0.02, "aspect": max(15, 15 * len(axes)), "fraction": 0.06}
-    bar = figure.colorbar(images[0], ax=list(axes.ravel()), extend=extend, **across)
-    above = "" if outlined or name != "gap" else "contact in orange\n"
-    if beyond and name == "pressure" and stride(dataset) > 1:
-        above = f"at most {unit.text(max(float(one.max()) for one in shown))}\n"
-    bar.set_label(above + unit.label(VARIABLES[name].label))
-    bar.locator = (
-        MaxNLocator(4 if len(axes) < 3 else 6, steps=[1, 2, 2.5, 5, 10]) if high > low else FixedLocator([low])
-    )
-    bar.outline.set_linewidth(0.6)
+    spots = [touching(dataset, frame) for frame in frames] if {"pressure", "gap"} & set(dataset) else []
+    if name != "gap" and all(can_be_outlined(one.values) for one in spots):
+        for image, one in zip(images, spots, strict=False):
+            draw_outline(image.axes, one, plane)
+    colour_bar(figure, images, scale, unit)
+    return images
 
 
-def value_scale(name: str, values: np.ndarray) -> tuple[float, float, bool]:
-    """Ends of the colour scale of some values of a field, and whether any lie beyond. [SI]"""
-    low = float(values.min()) if name == "displacement" and values.size else 0.0
-    telling = values if name == "displacement" else values[values > 0]
+@dataclass(frozen=True)
+class Scale:
+    """Colour scale of some values of a field. [SI]
+
+    Attributes
+    ----------
+    name : str
+        Of the field.
+    low, high : float
+        Its ends.
+    lowest, highest : float
+        Of all values: a spike lies beyond the end.
+    marked : bool
+        Whether some values lie below it that have a colour of their own: cells out of contact, or in contact.
+    """
+
+    name: str
+    low: float
+    high: float
+    lowest: float
+    highest: float
+    marked: bool
+
+    def limits(self, unit: Unit) -> dict[str, float]:
+        """Ends of the scale in a unit; zero lies below a scale that begins there."""
+        low, high = float(unit(self.low)), float(unit(self.high))
+        high = high if high > low else low + 1.0
+        return {"vmin": 1e-12 * high if self.marked and low == 0 else low, "vmax": high}
+
+    @property
+    def extend(self) -> str:
+        """Arrows of the colour bar: what lies beyond, and what has a colour of its own below."""
+        below, above = self.marked or self.lowest < self.low, self.highest > self.high
+        return ("both" if above else "min") if below else "max" if above else "neither"
+
+    def spikes(self, unit: Unit) -> str:
+        """What the scale leaves out, such as ``"max 120 MPa"``; empty if nothing."""
+        low = "" if self.marked or self.lowest >= self.low else f"min {unit.text(self.lowest)}"
+        high = f"max {unit.text(self.highest)}" if self.highest > self.high else ""
+        return ", ".join(filter(None, (low, high)))
+
+
+def value_scale(name: str, values: np.ndarray) -> Scale:
+    """Colour scale of the known values of a field: by quantiles, where a few values lie far beyond all others. [SI]
+
+    Those of pressure and gap begin at zero, but that of pressure in contact everywhere may begin higher.
+    """
+    if not values.size:
+        return Scale(name, 0.0, 0.0, 0.0, 0.0, False)
+    lowest, highest = float(values.min()), float(values.max())
+    positive = name not in ("displacement", "height")
+    marked = positive and lowest <= 0
+    telling = values[values > 0] if positive else values
     if not telling.size:
-        return low, float(values.max(initial=0.0)), False
-    highest = float(telling.max())
-    high = float(np.percentile(telling, _SHOWN)) if telling.size > _MANY else highest
-    return low, high, highest > high
+        return Scale(name, 0.0, 0.0, lowest, highest, marked)
+    low, high = (float(one) for one in np.percentile(telling, (100 - _SHOWN, _SHOWN)))
+    reach = (_SPIKE - 1) * (high - (0.0 if positive else low))
+    high = high if telling.size > _MANY and highest > high + reach else highest
+    even = name == "pressure" and not marked and lowest > _EVEN * highest
+    if positive and not even:
+        low = 0.0
+    elif telling.size <= _MANY or lowest >= low - reach:
+        low = lowest
+    return Scale(name, low, high, lowest, highest, marked)
 
 
-def label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> None:
-    """Titles above, coordinates on the outer panels only; panels without a frame removed."""
-    plane = plane_unit(dataset)
+def joint_scale(scales: Sequence[Scale]) -> Scale:
+    """The scale that holds all of some scales of one field."""
+    ends = {
+        "low": min(one.low for one in scales),
+        "high": max(one.high for one in scales),
+        "lowest": min(one.lowest for one in scales),
+        "highest": max(one.highest for one in scales),
+    }
+    return Scale(scales[0].name, **ends, marked=any(one.marked for one in scales))
+
+
+def colour_bar(
+    figure: Figure, images: Sequence[AxesImage], scale: Scale, unit: Unit, label: str = "", location: str = ""
+) -> Colorbar:
+    """Colour bar as tall as its maps, or as wide as those of a strip, with its unit and the spikes that it leaves out.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    images : list of matplotlib.image.AxesImage
+        Of the maps that it belongs to.
+    scale : Scale
+        What it leaves out.
+    unit : Unit
+        Of the values drawn.
+    label : str
+        What it shows; by default as the vocabulary has it.
+    location : {"", "right", "top", "bottom"}
+        Where it stands; by default at the right, and below what is flat.
+    """
+    panels = [image.axes for image in images]
+    image = images[0]
+    x0, x1, y0, y1 = image.get_extent()
+    flat = (y1 - y0) * len({ax.get_subplotspec().rowspan.start for ax in panels}) < 0.4 * (x1 - x0)
+    location = location or ("bottom" if flat else "right")
+    # room is made for it by the layout; where in it the bar stands follows from its maps
+    axes, look = make_axes(panels, location=location, pad=0.02, fraction=0.06)
+    axes.set_axes_locator(_AlongMaps(panels, location))
+    bar = figure.colorbar(image, cax=axes, extend=scale.extend, orientation=look["orientation"])
+    axes.set_axes_locator(_OfAnyAspect(axes.get_axes_locator()))
+    said = unit.label(label or VARIABLES[scale.name].label)
+    said = said if location != "right" else broken(said, _LABELLED)
+    bar.set_label((", " if location != "right" else "\n").join(filter(None, (said, scale.spikes(unit)))))
+    low, _ = image.get_clim()
+    constant = not scale.high > scale.low
+    if image.norm.__class__.__name__ == "Normalize":
+        bar.locator = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
+    if constant:
+        bar.set_ticks([low], labels=[f"{float(unit(scale.low)):.3g}"])
+    bar.outline.set_linewidth(0.6)
+    return bar
+
+
+class _AlongMaps:
+    """Place of a colour bar: along maps as they lie when they are drawn, which the layout does not know.
+
+    Parameters
+    ----------
+    panels : list of matplotlib.axes.Axes
+        The maps.
+    location : {"right", "top", "bottom"}
+        On which side of them.
+    """
+
+    def __init__(self, panels: Sequence[Axes], location: str) -> None:
+        self._panels, self._location = panels, location
+
+    def __call__(self, axes: Axes, renderer: Any) -> Bbox:
+        maps, room = Bbox.union([ax.get_position() for ax in self._panels]), axes.get_position(original=True)
+        width, height = axes.get_figure(root=True).get_size_inches()
+        if self._location == "right":
+            left = maps.x1 + _BAR_PAD / width
+            return Bbox.from_extents(left, maps.y0, left + _BAR_WIDTH / width, maps.y1)
+        middle, half = (room.y0 + room.y1) / 2, _BAR_WIDTH / height / 2
+        return Bbox.from_extents(maps.x0, middle - half, maps.x1, middle + half)
+
+
+class _OfAnyAspect:
+    """A place that matplotlib gives a colour bar, without the aspect that it gives with it.
+
+    Parameters
+    ----------
+    place : callable
+        Of the bar between its arrows.
+    """
+
+    def __init__(self, place: Any) -> None:
+        self._place = place
+
+    def __call__(self, axes: Axes, renderer: Any) -> Bbox:
+        found: Bbox = self._place(axes, renderer)
+        axes.set_box_aspect(None)
+        return found
+
+
+def _label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> None:
+    """Letters and titles above, coordinates on the outer panels only; panels without a frame removed."""
+    plane, kept, said = plane_unit(dataset), [], []
     fields, rows, columns = axes.shape
     for (field, row, column), ax in np.ndenumerate(axes):
         number = row * columns + column
@@ -284,14 +462,45 @@ def label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> 
             continue
         lowest = field == fields - 1 and number + columns >= len(titles)
         label_plane(ax, dataset, plane, 4, x=lowest, y=column == 0)
-        if field == 0 or rows > 1:
-            ax.set_title(titles[number], pad=3)
+        kept.append(ax)
+        said.append(titles[number] if field == 0 or rows > 1 else "")
+    letter_panels(kept, said)
 
 
-def _frame_text(dataset: xr.Dataset, frame: int) -> str:
-    """Time of a frame; below it the nominal pressure of a scan that stands for a larger surface."""
-    text = row_text(rows_of(dataset)[frame])
-    if "nominal_pressure" not in dataset or dataset.attrs.get("boundary") != "periodic":
-        return text
-    nominal = float(dataset["nominal_pressure"][frame])
-    return f"{text}\nnominal {unit_for([nominal], 'Pa').text(nominal)}"
+#: Direction of the motion -> where it points on a map.
+_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
+
+
+def _frame_texts(dataset: xr.Dataset, frames: list[int]) -> list[str]:
+    """Place of each frame, all in one unit; below it what else tells it from the others."""
+    rows = rows_of(dataset)
+    axis = RowAxis.of(rows)
+    texts = [axis.text(rows[frame]) for frame in frames]
+    if AXES[str(rows.name)].telling == "friction_coefficient" and "friction_coefficient" in dataset:
+        arrow = _ARROWS[str(attributes_of(dataset.attrs).get("direction", "x"))]
+        shown = [_power(float(dataset["friction_coefficient"][frame])) for frame in frames]
+        return [f"{arrow} {text}\nµ = {friction}" for text, friction in zip(texts, shown, strict=True)]
+    if _stands_for_more(dataset) and not _nominal(dataset, frames):
+        nominal = dataset["nominal_pressure"].values[frames]
+        unit = unit_for(nominal, "Pa")
+        return [f"{text}\nnominal {unit.text(one)}" for text, one in zip(texts, nominal, strict=True)]
+    return texts
+
+
+def _power(value: float) -> str:
+    """Two digits of a number, a power of ten as one writes it."""
+    number, _, power = f"{value:.2g}".partition("e")
+    return rf"{number}$\times 10^{{{int(power)}}}$" if power else number
+
+
+def _stands_for_more(dataset: xr.Dataset) -> bool:
+    """Whether a nominal pressure is known of a scan that stands for a larger surface."""
+    return "nominal_pressure" in dataset and dataset.attrs.get("boundary") == "periodic"
+
+
+def _nominal(dataset: xr.Dataset, frames: list[int]) -> str:
+    """The nominal pressure where it is the same in all frames, else nothing."""
+    if not _stands_for_more(dataset):
+        return ""
+    shown = {unit_for([one], "Pa").text(one) for one in dataset["nominal_pressure"].values[frames].tolist()}
+    return f"Nominal pressure {shown.pop()}." if len(shown) == 1 else ""

@@ -1,8 +1,6 @@
-"""Figures of friction: against speed, as maps at several speeds, and against the distance of a program that slides."""
+"""Figures of friction: against speed, and against the distance of a program that slides."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -14,82 +12,23 @@ from matplotlib.patches import Patch
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.observables import history
-from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures.axes import (
     BLUE,
-    CYCLE,
-    GREEN,
-    VERMILION,
+    CONTACT,
     Unit,
+    legend_above,
+    legend_over,
     letter_panels,
     new_figure,
     require,
     styled,
     unit_for,
 )
-from roughvisc.views.figures.fields import draw_field, label_maps, map_panels, measured_part
 from roughvisc.views.figures.histories import failed_frames, leave_room
 
-#: Direction of the motion -> where it points on a map.
-_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
-_MOST_MAPS = 12
-
-
-@styled
-@quantities(speeds="m/s")
-def friction_maps(dataset: xr.Dataset, speeds: Quantity | Sequence[Quantity] | None = None) -> Figure:
-    """Maps of the pressure in the frame of the profile, on one colour scale; an arrow shows where the profile moves.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of :func:`roughvisc.friction` with ``pressure`` among the fields, or of a study of friction.
-    speeds : float or str, or sequence of them, optional
-        The nearest ones are drawn. By default the lowest, the one of the largest friction, and the highest. [m/s]
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    InputError
-        If the result holds no pressure, or more than 12 speeds are asked for.
-    """
-    require(dataset, "speed", "x", "y", "pressure", "friction_coefficient")
-    dataset = measured_part(dataset)
-    rows = _chosen(dataset, speeds)
-    figure, axes = map_panels(dataset, len(rows), 1)
-    draw_field(figure, axes[0], dataset, "pressure", rows)
-    label_maps(axes, dataset, [_title(dataset, row) for row in rows])
-    return figure
-
-
-def _chosen(dataset: xr.Dataset, speeds: float | Sequence[float] | None) -> list[int]:
-    known = dataset["speed"].values
-    if speeds is None:
-        peak = int(np.argmax(dataset["friction_coefficient"].values))
-        chosen = {int(np.argmin(known)), peak, int(np.argmax(known))}
-    else:
-        asked = np.atleast_1d(np.asarray(speeds, dtype=float)).ravel()
-        if not 0 < asked.size <= _MOST_MAPS or not (asked > 0).all():
-            raise InputError(f"speeds is {speeds!r}: expected 1 to {_MOST_MAPS} positive numbers [m/s]")
-        chosen = {int(np.abs(np.log(known / speed)).argmin()) for speed in asked}
-    return sorted(chosen, key=lambda row: float(known[row]))
-
-
-def _title(dataset: xr.Dataset, row: int) -> str:
-    """Arrow of the motion, speed and friction."""
-    speed, arrow = float(dataset["speed"][row]), _ARROWS[str(attributes_of(dataset.attrs).get("direction", "x"))]
-    number, _, power = f"{float(dataset['friction_coefficient'][row]):.2g}".partition("e")
-    friction = rf"{number}$\times 10^{{{int(power)}}}$" if power else number
-    return f"{arrow} V = {unit_for([speed], 'm/s').text(speed, 3)}\nµ = {friction}"
-
-
-_PANELS = (("friction_coefficient", BLUE), ("contact_area", GREEN))
+_PANELS = (("friction_coefficient", BLUE), ("contact_area", CONTACT))
 
 
 @styled
@@ -125,7 +64,7 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
         unit = unit_for(steps[name].values, VARIABLES[name].units)
         values = unit(steps[name].values)
         _draw_against_distance(ax, distance, values, colour)
-        ax.plot(distance[failed], values[failed], "x", color=VERMILION, ms=5, mew=1.2)
+        ax.plot(distance[failed], values[failed], "x", color="k", ms=5, mew=1.2)
         leave_room(ax, values[_shown(distance)])
         ax.set_ylabel(unit.label(VARIABLES[name].label))
         ax.grid(color="0.9", lw=0.5)
@@ -133,7 +72,7 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
     if len(_stops(distance)):
         axes[0].plot([], [], color="0.3", label="sliding")
         axes[0].plot([], [], color="0.3", lw=0.9, ls=(0, (1, 1.5)), label="at a stop")
-        axes[0].legend(loc="lower left", bbox_to_anchor=(0.08, 1.0), ncols=2, borderaxespad=0.15)
+        legend_over(axes[0], 3.6)
     axes[-1].set_xlabel(across.label(VARIABLES["sliding_distance"].label))
     letter_panels(axes)
     figure.align_ylabels(axes)
@@ -209,12 +148,12 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     told = {"computed": Line2D([], [], color="0.3")}
     figure = new_figure(3.8, 3.0)
     ax = figure.add_subplot()
-    for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, CYCLE, strict=False):
+    for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, (BLUE, CONTACT), strict=True):
         told |= _draw(axes, ordered, names, across, colour, persson)
     if len(told) > 1:
         known = [name for name in _TOLD if name in told]
-        figure.set_figheight(3.0 + 0.16 * len(known))
-        figure.legend([told[name] for name in known], [_TOLD[name] for name in known], loc="outside upper center")
+        figure.set_figheight(3.0 + 0.18 * len(known))
+        legend_above(figure, {_TOLD[name]: told[name] for name in known})
     ax.set_xscale("log")
     ax.set_xlabel(across.label(SLIDING["speed"].label))
     ax.grid(color="0.9", lw=0.5)

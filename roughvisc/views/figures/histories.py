@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
@@ -23,16 +23,19 @@ from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.attributes import attributes_of
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
+    CONTACT,
     CYCLE,
     GREEN,
     ORANGE,
     PURPLE,
-    SKY,
-    VERMILION,
+    SMALL,
     RowAxis,
+    broken,
+    legend_above,
+    legend_over,
     letter_panels,
     new_figure,
     require,
@@ -46,8 +49,8 @@ from roughvisc.views.figures.axes import (
 
 _PANELS = (
     ("force", BLUE),
-    ("approach", VERMILION),
-    ("contact_area", GREEN),
+    ("approach", GREEN),
+    ("contact_area", CONTACT),
     ("mean_gap", PURPLE),
     ("work", ORANGE),
 )
@@ -58,22 +61,12 @@ _BESIDE = {
         ("persson_contact_area", "Persson", "0.5", (0, (1, 1.5))),
     ),
     "work": (
-        ("stored_energy", "stored", SKY, (0, (4, 2))),
-        ("dissipated_energy", "dissipated", VERMILION, (0, (1, 1.5))),
+        ("stored_energy", "stored", "k", (0, (4, 2))),
+        ("dissipated_energy", "dissipated", "0.5", (0, (1, 1.5))),
     ),
 }
 #: The line that they stand beside.
-_ITSELF = {"contact_area": "corrected for the grid", "work": "in all"}
-#: What is stated of accuracy first, then its parts, and what comes on top.
-_ERRORS = (
-    ("stated_error", "stated", "k", 1.6),
-    ("time_error", "time steps", ORANGE, 1.0),
-    ("residual", "contact solver (estimate)", PURPLE, 1.0),
-    ("grid_error", "grid", SKY, 1.0),
-)
-_COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
-#: Errors below this part of the largest are not shown.
-_FAINTEST = 1e-5
+_ITSELF = {"contact_area": "corrected", "work": "in all"}
 #: Panels up to which they stand in one column.
 _ONE_COLUMN = 3
 
@@ -96,7 +89,12 @@ def leave_room(ax: Axes, *values: np.ndarray) -> None:
     shown = shown[np.isfinite(shown)]
     lowest, highest = (min(shown.min(), 0.0), max(shown.max(), 0.0)) if shown.size else (0.0, 1.0)
     span = (highest - lowest) or 1.0
-    ax.set_ylim(lowest - 0.05 * span, highest + 0.15 * span)
+    ax.set_ylim(lowest - 0.04 * span, highest + 0.15 * span)
+
+
+def steps_of(dataset: xr.Dataset) -> xr.Dataset:
+    """Histories of every accepted step over the axis of a result; of one that has no steps, its rows."""
+    return over_steps(dataset) if axis_of(dataset.variables) == "time" else dataset
 
 
 def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Dataset, name: str, colour: str) -> None:
@@ -105,16 +103,31 @@ def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Datase
     unit = unit_for(values, VARIABLES[name].units)
     beside = [one for one in _BESIDE.get(name, ()) if one[0] in steps and steps[one[0]].notnull().any()]
     ax.plot(times, unit(values), color=colour, label=_ITSELF[name] if beside else "_")
-    if marker := marker_of(rows_of(dataset).size):
-        ax.plot(axis.unit(rows_of(dataset)), unit(dataset[name]), ls="", marker=marker, color=colour)
+    kept = axis.unit(rows_of(dataset))
+    if marker := marker_of(len(kept)):
+        ax.plot(kept, unit(dataset[name]), ls="", marker=marker, color=colour)
+    else:
+        ax.plot(kept, np.zeros(len(kept)), "|", color="0.4", ms=5, mew=0.4, transform=ax.get_xaxis_transform())
     failed = failed_frames(steps)
-    if failed.any():
-        note = "not converged" if name == "force" else "_"
-        ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5, label=note)
+    ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5)
     for other, said, shade, dashes in beside:
         ax.plot(times, unit(steps[other]), color=shade, ls=dashes, lw=0.9, label=said)
     leave_room(ax, *(unit(steps[one]) for one in (name, *(one[0] for one in beside))))
-    ax.set_ylabel(unit.label(VARIABLES[name].label))
+    ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+    ax.set_ylabel(broken(unit.label(VARIABLES[name].label), 1.0))
+
+
+def marks_of_rows(dataset: xr.Dataset, steps: xr.Dataset) -> dict[str, Line2D]:
+    """What lines and marks of histories mean: accepted steps, kept times or speeds, and what did not converge."""
+    rows, named = AXES[axis_of(dataset.variables)].rows, {}
+    count = rows_of(dataset).size
+    if rows_of(steps).size > count:
+        named["accepted steps"] = Line2D([], [], color="0.3")
+    look = {"marker": marker_of(count)} if marker_of(count) else {"marker": "|", "mew": 0.4, "ms": 5}
+    named[rows] = Line2D([], [], color="0.3", ls="", **look)
+    if failed_frames(steps).any():
+        named["not converged"] = Line2D([], [], color="k", ls="", marker="x", ms=5, mew=1.2)
+    return named
 
 
 def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
@@ -129,65 +142,17 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     ratio = float(np.nanmean(ratios))
     if ratio > 0 and float(np.nanmax(np.abs(ratios - ratio))) < 1e-6 * ratio:  # not so on a tapered surface
         right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
-        right.set_ylabel("of nominal [%]")
-
-
-def _draw_accuracy(ax: Axes, axis: RowAxis, dataset: xr.Dataset) -> None:
-    """What the kept times state of themselves."""
-    floor, ceiling = math.inf, 0.0
-    for name, label, colour, width in _ERRORS:
-        if name not in dataset:
-            continue
-        times, values = axis.unit(rows_of(dataset)), dataset[name].values.astype(float)
-        known = np.isfinite(values) & (values > 0)
-        if known.any():
-            style = {"marker": marker_of(len(times)), "ms": 2.5, "lw": width}
-            ax.plot(times[known], values[known], color=colour, label=label, **style)
-            floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
-    tolerance = dataset.attrs.get("tolerance")
-    if tolerance:
-        ax.axhline(tolerance, color="0.3", lw=0.8, ls=(0, (1, 1.5)), label="tolerance")
-        floor, ceiling = min(floor, tolerance), max(ceiling, tolerance)
-    if ceiling > 0:
-        floor = max(floor, _FAINTEST * ceiling)
-        ax.set_yscale("log")
-        ax.set_ylim(floor / 3, ceiling * 3)
-        decades = math.log10(ceiling / floor) + 1
-        ax.yaxis.set_major_locator(LogLocator(numticks=5))
-        ax.yaxis.set_minor_locator(LogLocator(subs=range(2, 10) if decades < 5 else (1.0,), numticks=99))
-        ax.yaxis.set_minor_formatter(NullFormatter())
-    else:
-        ax.set_yticks([])
-        ax.text(0.5, 0.5, "no accuracy recorded", transform=ax.transAxes, ha="center", va="center", color="0.4")
-    ax.set_ylabel("Rel. error")
-
-
-def _draw_cost(ax: Axes, axis: RowAxis, dataset: xr.Dataset) -> None:
-    """What every row has cost."""
-    times = axis.unit(rows_of(dataset))
-    found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
-    for values, label, colour in found:
-        ax.plot(times, values, color=colour, marker=marker_of(len(times)), ms=2.5, lw=1, label=label)
-    shown = np.concatenate([values for values, _, _ in found])
-    if shown.min() > 0 and shown.max() > 100 * shown.min():
-        ax.set_yscale("log")
-    else:
-        leave_room(ax, shown)
-        ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-    over = str(rows_of(dataset).name)
-    ax.set_ylabel("Per kept time" if over == "time" else f"Per {over}")
+        right.set_ylabel("of nominal\n[%]")
 
 
 @styled
 def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
-    """Force, approach, contact area, mean gap and work over the axis of a result, with its cost and accuracy.
+    """Force, approach, contact area, mean gap and work over the axis of a result.
 
-    Over time these are drawn at every accepted step, cost and accuracy at kept times.
-
-    Rows are dots, where these are few. What the result does not hold is left out. The time axis is linear or
-    logarithmic as the steps suit. Steps that did not converge are crossed out. Work is that of the force so far, in
-    all and by where it went: stored in the springs of the material, or dissipated. Accuracy is the stated error, its
-    parts, and the tolerance as a line.
+    Lines are of every accepted step, dots of the kept times: of so many that they would touch, a stroke at the axis
+    each. What the result does not hold is left out. The axis is linear or logarithmic as the steps suit. Steps that did
+    not converge are crossed out. Work is that of the force so far, in all and by where it went: stored in the springs
+    of the material, or dissipated. Cost and accuracy are in :func:`roughvisc.plot.diagnostics`.
 
     Parameters
     ----------
@@ -207,9 +172,10 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
     """
     require(dataset)
-    dataset, over = whole_of(dataset), axis_of(dataset.variables)
-    dataset = dataset if over == "time" else dataset.sortby(over)
-    steps = over_steps(dataset) if over == "time" else dataset
+    dataset = whole_of(dataset)
+    over = axis_of(dataset.variables)
+    dataset = dataset.sortby(over)
+    steps = steps_of(dataset)
     if persson:
         theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
         steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
@@ -217,46 +183,27 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)
         raise InputError(f"the result holds none of {names}: nothing to draw over {over}")
-    costs = any(name in dataset for name, _, _ in _COSTS)
-    figure, axes = _history_panels(len(panels) + costs)
-    axis = RowAxis.of(rows_of(steps))
-    for ax, (name, colour) in zip(axes, panels, strict=False):
+    columns = 1 if len(panels) <= _ONE_COLUMN else 2
+    rows = -(-len(panels) // columns)
+    figure = new_figure(4.6 if columns == 1 else 7.2, 1.5 * rows + 0.8)
+    axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    for empty in axes[len(panels) :]:
+        empty.remove()
+    axes, axis = axes[: len(panels)], RowAxis.of(rows_of(steps))
+    for number, (ax, (name, colour)) in enumerate(zip(axes, panels, strict=True)):
         _draw_history(ax, axis, dataset, steps, name, colour)
         if name == "contact_area":
             _fraction_axis(ax, steps)
-    if costs:
-        _draw_cost(axes[-2], axis, dataset)
-    _draw_accuracy(axes[-1], axis, dataset)
-    for ax in axes:
-        axis.apply(ax, rows_of(steps))
-        lowest = ax.get_subplotspec().is_last_row() or _nothing_below(ax, axes)
+        axis.apply(ax, rows_of(steps), most=7 if columns == 1 else 5)
+        lowest = number + columns >= len(panels)
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(ax.get_xlabel() if lowest else "")
         ax.grid(axis="both", color="0.9", lw=0.5)
-        if count := len(ax.get_legend_handles_labels()[1]):
-            across = 5 if len(axes) > _ONE_COLUMN + 1 or count < 4 else 3
-            told = {"ncols": across, "borderaxespad": 0.15, "handlelength": 1.6, "columnspacing": 1.4}
-            ax.legend(loc="lower left", bbox_to_anchor=(0.08, 1.0), **told)
+        legend_over(ax, 3.6 if columns == 1 else 2.7)
     letter_panels(axes)
+    legend_above(figure, marks_of_rows(dataset, steps))
     figure.align_ylabels(axes)
     return figure
-
-
-def _history_panels(count: int) -> tuple[Figure, list[Axes]]:
-    """So many panels in one or two columns, and one below them across the whole width."""
-    columns = 1 if count <= _ONE_COLUMN else 2
-    rows = -(-count // columns)
-    figure = new_figure(4.6 if columns == 1 else 7.4, 1.25 * rows + 1.3 + 0.25 * (columns - 1))
-    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[1.0] * rows + [0.75])
-    cells = [grid[number // columns, number % columns] for number in range(count)]
-    return figure, [figure.add_subplot(cell) for cell in (*cells, grid[rows, :])]
-
-
-def _nothing_below(ax: Axes, axes: Sequence[Axes]) -> bool:
-    """Whether no panel of the same column has its time axis right below."""
-    place = ax.get_subplotspec()
-    below = [other.get_subplotspec() for other in axes]
-    return not any(one.rowspan.start == place.rowspan.stop and one.colspan == place.colspan for one in below)
 
 
 #: Part of its range by which the approach must have come back for a loop.
@@ -265,7 +212,10 @@ _BACK = 0.01
 
 def has_loop(dataset: xr.Dataset) -> bool:
     """Whether the approach comes back at all: force against approach encloses nothing otherwise."""
-    approach = over_steps(dataset)["approach"].values
+    steps = over_steps(dataset)
+    if not (steps["force"] > 0).any():
+        return False
+    approach = steps["approach"].values
     fallen = np.max(np.maximum.accumulate(approach) - approach, initial=0.0)
     return bool(fallen > _BACK * np.ptp(approach))
 
@@ -291,7 +241,7 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     force, approach = steps["force"].values, steps["approach"].values
     across, up = unit_for(approach, "m"), unit_for(force, "N")
     x, y = across(approach), up(force)
-    figure = new_figure(3.6, 3.0)
+    figure = new_figure(3.6, 3.1)
     ax = figure.add_subplot()
     ax.plot(x, y, color=BLUE, marker=marker_of(len(x)), ms=2)
     _draw_arrows(ax, x, y)
@@ -305,14 +255,14 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
         ax.plot([], [], ls="", label=label)
     failed = failed_frames(steps)
     if failed.any():
-        ax.plot(x[failed], y[failed], "x", color=VERMILION, ms=6, mew=1.2, label="not converged")
+        ax.plot(x[failed], y[failed], "x", color="k", ms=6, mew=1.2, label="not converged")
     if not has_loop(dataset):
         ax.set_title("The approach does not come back: no loop", color="0.4")
     ax.set_xlabel(across.label(VARIABLES["approach"].label))
     ax.set_ylabel(up.label(VARIABLES["force"].label))
     leave_room(ax, y)
     ax.grid(color="0.9", lw=0.5)
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2, handlelength=1.2)
+    legend_above(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)})
     return figure
 
 
@@ -355,7 +305,7 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
     """Results by the label each has in the legend."""
     if isinstance(results, xr.Dataset):
         if "case" in results.dims:
-            return {str(one.values): results.sel(case=one) for one in results["case"]}
+            return {_case_name(results, number): results.isel(case=number) for number in range(results.sizes["case"])}
         results = [results]
     if isinstance(results, Mapping):
         return {str(label): dataset for label, dataset in results.items()}
@@ -368,6 +318,22 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
     if not cases:
         raise InputError("no result given: nothing to draw")
     return cases
+
+
+def _case_name(results: xr.Dataset, number: int) -> str:
+    """What was varied in a case, as its coordinates tell; else its number."""
+    varied = [one for name, one in results.coords.items() if one.dims == ("case",) and name not in _NOT_VARIED]
+    said = [f"{str(one.attrs.get('long_name', one.name)).rpartition('.')[2].replace('_', ' ')} " for one in varied]
+    values = [one.values[number] for one in varied]
+    texts = [
+        name + (unit_for([value], one.attrs["units"]).text(value) if "units" in one.attrs else str(value))
+        for name, value, one in zip(said, values, varied, strict=True)
+    ]
+    return ", ".join(texts) or str(results["case"].values[number])
+
+
+#: Coordinates of several cases that tell nothing of what was varied.
+_NOT_VARIED = ("case", "case_key", "roughvisc_version")
 
 
 @styled
@@ -407,7 +373,7 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
     across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m^2")
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
-    figure = new_figure(3.8, 3.0 + 0.13 * min(len(cases), 12) + (0.0 if moduli == {} else 0.6))
+    figure = new_figure(4.0, 3.0 + 0.15 * min(len(cases), 12) + (0.0 if moduli == {} else 1.2))
     ax = figure.add_subplot()
     for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
         colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
@@ -425,10 +391,11 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     ax.set_xlabel(across.label(VARIABLES["force"].label))
     ax.set_ylabel(up.label(VARIABLES[_AREA].label))
     ax.grid(color="0.9", lw=0.5)
+    named = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if drawn:
-        figure.supxlabel(_THEORIES, fontsize=6.5, color="0.35")
-    if len(ax.get_legend_handles_labels()[1]) > 1:
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=1 if len(ax.lines) < 4 else 2)
+        figure.supxlabel(_THEORIES, fontsize=SMALL, color="0.35")
+    if len(named) > 1:
+        legend_above(figure, named)
     return figure
 
 

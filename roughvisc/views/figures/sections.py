@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
 from roughvisc.observables import contact
@@ -18,15 +19,19 @@ from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
-    VERMILION,
+    CONTACT,
+    GREEN,
+    SMALL,
+    RowAxis,
     Unit,
     at_rows,
     frame_at,
+    legend_above,
     letter_panels,
     new_figure,
     require,
-    row_text,
     rows_of,
+    say_inside,
     styled,
     unit_for,
 )
@@ -124,15 +129,15 @@ def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quant
     across = "y" if axis == "x" else "x"
     frame = frame_at(rows_of(dataset), time)
     index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
-    figure = new_figure(4.8, 3.6)
+    figure = new_figure(5.0, 3.9)
     top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
     unit = draw_section(top, bottom, dataset, frame, axis, index)
     place = float(dataset[across][index])
     where = f"{across} = {plane_unit(dataset).text(place)}"
-    top.set_title(f"{row_text(rows_of(dataset)[frame])},  {where}", loc="right")
+    top.set_title(f"{RowAxis.of(rows_of(dataset)[[frame]]).text(rows_of(dataset)[frame])},  {where}", loc="right")
     letter_panels((top, bottom))
     figure.align_ylabels((top, bottom))
-    figure.legend(*bottom.get_legend_handles_labels(), loc="outside upper center", ncols=4, handlelength=1.4)
+    legend_above(figure, {label: one for one, label in zip(*bottom.get_legend_handles_labels(), strict=True)})
     _note_exaggeration(figure, bottom, unit.factor / plane_unit(dataset).factor)
     return figure
 
@@ -152,12 +157,12 @@ def draw_section(top: Axes, bottom: Axes, dataset: xr.Dataset, frame: int, axis:
 def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, x: np.ndarray) -> None:
     if "pressure" not in dataset:
         ax.set_yticks([])
-        ax.text(0.5, 0.5, "pressure was not kept", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        say_inside(ax, "pressure was not kept")
         return
     pressure = dataset["pressure"].isel({axis_of(dataset.variables): frame, across: index}).values
     unit = unit_for(pressure, "Pa")
-    ax.stairs(unit(pressure), x, fill=True, color=VERMILION, alpha=0.3)
-    ax.stairs(unit(pressure), x, color=VERMILION, lw=1)
+    ax.stairs(unit(pressure), x, fill=True, color=GREEN, alpha=0.3)
+    ax.stairs(unit(pressure), x, color=GREEN, lw=1)
     top = float(unit(np.nanmax(pressure, initial=0.0))) or 1.0
     ax.set_ylim(0, 1.12 * top)
     ax.set_ylabel(unit.label(VARIABLES["pressure"].label))
@@ -186,11 +191,17 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     ax.plot(x, s, color=BLUE, lw=1)
     touching = contact(dataset.isel({axis_of(dataset.variables): frame, across: index})).values
     marked = np.where(touching, h, np.nan)
-    ax.plot(x, marked, color=VERMILION, lw=2.4, solid_capstyle="round", marker="o", ms=2.4, mew=0, label="contact")
+    draw_contact(ax, x, marked)
     if low - margin < unit(level) < high + 2 * margin:
         ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
     ax.set_ylabel(unit.label(VARIABLES["height"].label))
     return unit
+
+
+def draw_contact(ax: Axes, x: np.ndarray, height: np.ndarray) -> Line2D:
+    """Line of the contact on a section, which shows a single cell too."""
+    (line,) = ax.plot(x, height, color=CONTACT, lw=2.4, marker="o", ms=2.4, mew=0, label="contact")
+    return line
 
 
 def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
@@ -199,5 +210,5 @@ def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
     box, limits = ax.get_window_extent(), ax.viewLim
     ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
     text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
-    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=7, gid="exaggeration")
+    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=SMALL, gid="exaggeration")
     note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})

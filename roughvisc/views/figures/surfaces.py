@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -28,19 +27,22 @@ from roughvisc.views.figures.axes import (
     BLUE,
     VERMILION,
     Unit,
+    legend_over,
     letter_panels,
     new_figure,
+    note_below,
+    say_inside,
     spread_axis,
     styled,
     unit_for,
 )
 from roughvisc.views.figures.coarsened import drawn, stride
-from roughvisc.views.figures.fields import COLOUR_MAPS, draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import Scale, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
 
-#: Missing points: a colour that the map of heights has not, in grey print neither.
-MISSING = "#e60000"
 #: Robust standard deviations from the median to which the scale of heights reaches.
 _REACH = 5.0
+#: Part of its largest below which a power spectral density is rounding alone.
+_NOTHING = 1e-14
 
 
 def _checked(height: xr.DataArray | xr.Dataset) -> xr.DataArray:
@@ -91,8 +93,8 @@ def surface(height: xr.DataArray) -> Figure:
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset that holds one as ``height``
-        Heights, peaks up; missing points are drawn in red, which the colours of heights have not, and counted. The
-        colours reach over five robust deviations at most: a spike does not flatten the rest. [m]
+        Heights, peaks up; missing points are drawn in grey, and counted. The colours reach over five robust deviations
+        at most: a spike does not flatten the rest. [m]
 
     Returns
     -------
@@ -111,26 +113,21 @@ def surface(height: xr.DataArray) -> Figure:
     figure, panels = _panels(plane_ratio(height))
     on_map = panels["map"]
     image = draw_map(on_map, drawn(height), unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
-    image.set_cmap(matplotlib.colormaps[COLOUR_MAPS["height"]].with_extremes(bad=MISSING))
-    flat = plane_ratio(height) < 0.4
     beyond = _beyond(height.values, low, high)
-    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    where = "top" if flat else "right"
-    arrows = extend[beyond[0] > 0, beyond[1] > 0]
-    bar = figure.colorbar(image, ax=on_map, location=where, pad=0.02, aspect=50 if flat else 20, extend=arrows)
-    bar.set_label(unit.label(_label(height)))
+    scale = Scale("height", low, high, *extremes_of(height.values), marked=False)
+    colour_bar(figure, [image], scale, unit, _label(height), location="top" if plane_ratio(height) < 0.4 else "right")
     label_plane(on_map, height, plane)
     missing = (height.size - count_of(height.values)) / height.size
-    notes = [f"{100 * missing:.2g} % of the points are missing (red)"] if missing else []
+    notes = [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
     notes += [f"{100 * sum(beyond):.2g} % lie beyond the scale of heights"] if sum(beyond) else []
     if (every := stride(height)) > 1:
         ends = " to ".join(unit.text(one) for one in extremes_of(height.values))
-        notes += [f"\nThe map is of means of {every} × {every} points; heights are {ends}"]
-    if notes:
-        figure.suptitle(", ".join(notes).removeprefix("\n").replace(", \n", "\n"), fontsize=8.5)
+        notes += [f"the map is of means of {every} × {every} points; heights are {ends}"]
+    said = "; ".join(notes)
+    note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
     _draw_profile(panels["profile"], on_map, height, unit, plane)
     levelled = height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
-    _draw_heights(panels["heights"], levelled, unit_for(extremes_of(levelled.values), "m"))
+    _draw_heights(panels["heights"], levelled, unit)
     _draw_spectrum(panels["spectrum"], levelled)
     letter_panels(list(panels.values()))
     return figure
@@ -154,7 +151,7 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
     middle = height.sizes["y"] // 2
     ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=BLUE, lw=0.9)
     if not height.isel(y=middle).notnull().any():
-        ax.text(0.5, 0.5, "all missing", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        say_inside(ax, "all missing")
     place = float(height["y"][middle])
     on_map.axhline(plane(place), color="w", lw=0.8, ls=(0, (4, 2)))
     limits = plane(cell_edges(height["x"]))
@@ -171,7 +168,7 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
     mean, deviation = float(unit(mean_of(levelled.values))), float(unit(deviation_of(levelled.values)))
     bins = int(np.clip(math.sqrt(count) / 1.5, 8, 100))
     if deviation == 0:
-        ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
+        say_inside(ax, "flat: one height")
         ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
@@ -189,15 +186,16 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
     shown = np.linspace(low, high, 200)
     bell = np.exp(-(((shown - mean) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
     ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
-    ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
-    ax.legend(loc="upper right", handlelength=1.2)
+    ax.set_ylim(bottom=0)
+    ax.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
+    legend_over(ax, 2.4)
     ax.set_xlabel(unit.label("Height, levelled"))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
 
 def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     ax.set_xlabel("Wavevector [rad/m]")
-    ax.set_ylabel("Power spectral density [m⁴]")
+    ax.set_ylabel("Power spectral density\n[m⁴]")
     drawn, reason = False, "too small or too flat"
     gaps = np.count_nonzero(unmeasured(levelled))
     if gaps > MOST_MISSING * levelled.size:
@@ -215,12 +213,13 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
             ax.plot(x, y, color=BLUE, lw=1)
             spread_axis(ax.xaxis, x, always=True)
             spread_axis(ax.yaxis, y, always=True)
+            ax.set_ylim(bottom=max(ax.get_ylim()[0], _NOTHING * float(y.max())))
             ax.set_xlabel(f"Wavevector [rad/{symbol}]")
-            ax.set_ylabel(f"Power spectral density [{symbol}⁴]")
+            ax.set_ylabel(f"Power spectral density\n[{symbol}⁴]")
             ax.set_title("gaps bridged" if gaps else "", loc="right")
             ax.grid(color="0.9", lw=0.5)
             drawn = True
     if not drawn:
-        ax.text(0.5, 0.5, reason, transform=ax.transAxes, ha="center", va="center", color="0.4")
+        say_inside(ax, reason)
         ax.set_xticks([])
         ax.set_yticks([])

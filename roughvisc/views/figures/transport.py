@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked
@@ -17,28 +20,27 @@ from roughvisc.observables import leakage as derived
 from roughvisc.observables.leakage import closing_times
 from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import (
     BLUE,
-    VERMILION,
+    CONTACT,
+    NO_CONTACT,
     RowAxis,
     Unit,
     at_rows,
     frame_at,
+    legend_above,
     letter_panels,
     new_figure,
     require,
-    row_text,
     rows_of,
     spread_axis,
     styled,
 )
-from roughvisc.views.figures.fields import draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import Scale, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
 from roughvisc.views.figures.histories import leave_room, marker_of
 
-#: Cells in contact on a map of the flow; fluid that stands still is white.
-_TOUCHING = "0.6"
 #: Decades of the flux below its largest that a map shows.
 _DECADES = 3
 #: Largest over smallest leak rate from which its axis is logarithmic.
@@ -50,7 +52,7 @@ _SPANS = 30.0
 def leakage(dataset: xr.Dataset, time: Quantity | None = None) -> Figure:
     """Leak rate over time, with the time at which the contact closes, and a map of the flow at one time.
 
-    The flux is drawn on a logarithmic scale of three decades: cells in contact grey, fluid that stands still white.
+    The flux is drawn on a logarithmic scale of three decades; fluid that stands still lies below it.
 
     Parameters
     ----------
@@ -76,11 +78,17 @@ def leakage(dataset: xr.Dataset, time: Quantity | None = None) -> Figure:
     frame = frame_at(rows_of(dataset), time) if time is not None else int(flowing[-1]) if flowing.size else -1
     frame %= rows_of(dataset).size
     ratio = float(np.clip(plane_ratio(dataset), 0.4, 1.4))
-    figure = new_figure(7.4, 0.9 + 2.4 * max(ratio, 0.8))
+    figure = new_figure(7.2, 1.1 + 2.4 * max(ratio, 0.8))
     on_time, on_map = figure.subplots(1, 2, width_ratios=[1.25, 1])
     _draw_rate(on_time, dataset, frame)
-    _draw_flow(figure, on_map, dataset, frame)
-    letter_panels((on_time,))
+    image = _draw_flow(figure, on_map, dataset, frame)
+    mapped = Line2D([], [], color="k", ls="", marker="o", ms=6, mfc="none", mew=1.2)
+    kept = Line2D([], [], color=BLUE, ls="", marker=marker_of(rows_of(dataset).size) or "None")
+    named = {AXES[str(rows_of(dataset).name)].rows: kept} if marker_of(rows_of(dataset).size) else {}
+    legend_above(figure, {**named, "mapped": mapped, **flow_legend(image)})
+    rows = rows_of(dataset)
+    closed = "" if flowing.size else ", closed"
+    letter_panels((on_time, on_map), ("", RowAxis.of(rows).text(rows[frame]) + closed))
     return figure
 
 
@@ -117,8 +125,22 @@ def draw_flux(ax: Axes, flux: xr.DataArray, unit: Unit, plane: Unit, highest: fl
     """Map of the flux of one frame, up to the highest [m2/s] of all that are drawn."""
     lowest = highest * 10.0**-_DECADES
     image = draw_map(ax, visible(flux, highest * unit.factor), unit, plane, norm=LogNorm(lowest, highest))
-    image.set_cmap(image.get_cmap().with_extremes(bad=_TOUCHING, under="w"))
+    image.set_cmap(image.get_cmap().with_extremes(bad=CONTACT, under=NO_CONTACT))
     return image
+
+
+def flow_legend(image: AxesImage) -> dict[str, Artist]:
+    """What a map of the flow shows besides its scale: contact, and fluid that stands still."""
+    values = np.ma.asarray(image.get_array())
+    named: dict[str, Artist] = {"contact": Patch(color=CONTACT, lw=0)} if np.ma.getmaskarray(values).any() else {}
+    if (values.filled(np.inf) < (image.norm.vmin or 0.0)).any():
+        named["no flow"] = Patch(facecolor=NO_CONTACT, edgecolor="0.5", lw=0.4)
+    return named
+
+
+def flux_scale(highest: float) -> Scale:
+    """Colour scale of the flux up to the highest: what is below stands still."""
+    return Scale("flux", highest * 10.0**-_DECADES, highest, 0.0, highest, marked=True)
 
 
 def visible(flux: xr.DataArray, highest: float) -> xr.DataArray:
@@ -133,7 +155,7 @@ def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
     times = axis.unit(rows_of(dataset))
     shown = np.where(rate > 0, unit(rate), np.nan) if spans else unit(rate)
     ax.plot(times, shown, color=BLUE, marker=marker_of(len(times)))
-    ax.plot(times[[frame]], shown[[frame]], "o", color=VERMILION, ms=6, mfc="none", mew=1.2)
+    ax.plot(times[[frame]], shown[[frame]], "o", color="k", ms=6, mfc="none", mew=1.2)
     if spans:
         spread_axis(ax.yaxis, shown)
     else:
@@ -150,21 +172,18 @@ def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
     ax.grid(color="0.9", lw=0.5)
 
 
-def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> None:
+def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> AxesImage:
     """Map of the flux at one time."""
     flux = at_rows(flux_of(at_rows(dataset, [frame])), 0).load()
     highest = float(np.nan_to_num(flux.values).max())
     unit, plane = unit_for([highest], VARIABLES["flux"].units), plane_unit(dataset)
     if highest > 0:
         image = draw_flux(ax, flux, unit, plane, float(unit(highest)))
-        bar = figure.colorbar(image, ax=ax, pad=0.02, aspect=18, extend="min")
-        bar.set_label("contact grey\n" + unit.label(VARIABLES["flux"].label))
+        colour_bar(figure, [image], flux_scale(highest), unit, location="right")
     else:
-        draw_flux(ax, flux, unit, plane, 1.0)
+        image = draw_flux(ax, flux, unit, plane, 1.0)
     label_plane(ax, dataset, plane)
-    note = "" if highest > 0 else ", closed: contact grey"
-    # in one text with its letter, which a narrow map has no room for beside it
-    ax.set_title(rf"$\mathbf{{(b)}}$  {row_text(rows_of(dataset)[frame])}{note}", loc="left")
+    return image
 
 
 #: Estimates with their labels and dashes.
@@ -195,7 +214,7 @@ def conductance(dataset: xr.Dataset) -> Figure:
     found = [kind for kind in CONDUCTANCES if kind in held]
     if not found:
         raise InputError("the result holds no conductance: merge it with rv.observables.conductance(ds, resistivity)")
-    figure = new_figure(4.2, 0.4 + 2.5 * len(found))
+    figure = new_figure(4.2, 0.6 + 2.5 * len(found))
     axis = RowAxis.of(rows_of(dataset))
     axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
     for ax, kind in zip(axes, found, strict=True):
@@ -203,7 +222,8 @@ def conductance(dataset: xr.Dataset) -> Figure:
         axis.apply(ax, rows_of(dataset))
     for ax in axes[:-1]:
         ax.set_xlabel("")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    letter_panels(axes)
+    legend_above(figure, {label: one for one, label in zip(*axes[0].get_legend_handles_labels(), strict=True)})
     return figure
 
 

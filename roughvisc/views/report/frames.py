@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 from PIL import Image
@@ -19,9 +20,20 @@ from roughvisc.topography.grid import spacing
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import RowAxis, Unit, at_rows, fullest_frame, rows_of, spread_frames, unit_for
+from roughvisc.views.figures.axes import (
+    ABSENT,
+    CONTACT,
+    NO_CONTACT,
+    RowAxis,
+    Unit,
+    at_rows,
+    fullest_frame,
+    rows_of,
+    spread_frames,
+    unit_for,
+)
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
-from roughvisc.views.figures.fields import colour_map, measured_part, plane_ratio, plane_unit, value_scale
+from roughvisc.views.figures.fields import colour_map, joint_scale, measured_part, plane_ratio, plane_unit, value_scale
 from roughvisc.views.figures.sections import cut_position, deformed_line
 
 #: Frames a case and cells along the longer side of a map, the richest first.
@@ -132,15 +144,11 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
 
 
 def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
-    ends, highest = [], -np.inf
-    for frame in chosen:
-        values = present(dataset, name, frame).values
-        values = values[np.isfinite(values)]
-        ends.append(value_scale(name, values))
-        highest = max(highest, values.max(initial=ends[0][0]))
-    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    beyond = highest > high
-    return _Scale(name, unit_for([low, high], VARIABLES[name].units), low, high if high > low else low + 1.0, beyond)
+    fields = (present(dataset, name, frame).values for frame in chosen)
+    scale = joint_scale([value_scale(name, values[np.isfinite(values)]) for values in fields])
+    unit = unit_for([scale.low, scale.high], VARIABLES[name].units)
+    high = scale.high if scale.high > scale.low else scale.low + 1.0
+    return _Scale(name, unit, scale.low, high, scale.highest > scale.high)
 
 
 def _scale_text(scale: _Scale) -> dict[str, str]:
@@ -159,7 +167,7 @@ def _extent(dataset: xr.Dataset) -> str:
 
 
 def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
-    """One map, x to the right and y upwards: absent cells grey; the contact white of pressure, orange of others."""
+    """One map, x to the right and y upwards: contact has its colour, and on a map of pressure no contact."""
     field = present(dataset, scale.name, frame)
     spots = touching(dataset, frame) if {"pressure", "gap"} & set(dataset) else field < -np.inf
     extremes = stride(dataset) > 1  # what was coarsened for its extremes keeps them
@@ -176,8 +184,8 @@ def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
 
 def _palette(name: str) -> bytes:
     colours = colour_map(name)(np.linspace(0, 1, _LEVELS))[:, :3]
-    marked = (1.0, 1.0, 1.0) if name == "pressure" else (0.835, 0.369, 0.0)
-    return bytes(np.rint(255 * np.array([(0.82,) * 3, marked, *colours])).astype(np.uint8).ravel())
+    marked = to_rgb(NO_CONTACT if name == "pressure" else CONTACT)
+    return bytes(np.rint(255 * np.array([to_rgb(ABSENT), marked, *colours])).astype(np.uint8).ravel())
 
 
 # ---------------------------------------------------------------------------------------------------- sections

@@ -9,9 +9,19 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from roughvisc.observables import history
-from roughvisc.views.figures.axes import RowAxis, Unit, new_figure, styled
+from roughvisc.variables.axes import AXES
+from roughvisc.views.figures.axes import (
+    RowAxis,
+    Unit,
+    legend_above,
+    letter_panels,
+    new_figure,
+    rows_of,
+    styled,
+)
+from roughvisc.views.figures.histories import steps_of
 from roughvisc.views.sweep_figures.cases import (
     Parameter,
     cases_of,
@@ -28,14 +38,14 @@ _MOST_PANELS = 9
 
 @styled
 def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
-    """A history of every case over time, coloured by what was varied; a dot for each kept time, where these are few.
+    """A history of every case over its axis, coloured by what was varied; kept times are dots, where these are few.
 
     Up to eight values have a legend, more a colour bar. Other parameters make panels, up to nine.
 
     Parameters
     ----------
     results : xarray.Dataset or xarray.DataTree
-        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree the times may differ.
+        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree these may differ.
     quantity : str, optional
         A history of every case, such as ``"approach"``; by default the contact area, or
         the contact fraction where the surfaces differ in size.
@@ -58,30 +68,38 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     facets = _facets([one for one in ordered if one is not first], len(cases.members))
     colouring = Colouring(first)
     lines = [_line(member, quantity) for member in cases.members]
-    times = np.unique(np.concatenate([line["time"].values for line in lines]))
-    axis = RowAxis.of(times)
+    times = np.unique(np.concatenate([rows_of(line).values for line in lines]))
+    axis = RowAxis.of(times, cases.axis)
     unit = quantity_unit(cases, quantity, np.concatenate([line.values for line in lines]))
     count = len(facets.levels)
     columns = min(count, 2 if count in (2, 4) else 3)
     rows = -(-count // columns)
-    handles = colouring.handles()
-    figure = new_figure(4.6 if count == 1 else 1.0 + 2.4 * columns, (3.1 if rows == 1 else 0.6 + 1.9 * rows) + 0.2)
+    figure = new_figure(
+        4.6 if count == 1 else min(1.0 + 2.4 * columns, 7.4), (3.1 if rows == 1 else 1.0 + 1.9 * rows) + 0.2
+    )
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    dotted = False
     for level, ax in enumerate(panels[:count]):
         chosen = np.flatnonzero(facets.places == level)
-        _draw_panel(ax, axis, unit, colouring, [(lines[i], cases.members[i], int(first.places[i])) for i in chosen])
-        if count > 1:
-            ax.set_title(textwrap.fill(named_texts(facets)[level], 36))
+        drawn = [(lines[i], cases.members[i], int(first.places[i])) for i in chosen]
+        dotted |= _draw_panel(ax, axis, unit, colouring, drawn)
+    if count > 1:
+        letter_panels(panels[:count], [textwrap.fill(text, 22) for text in named_texts(facets)])
     _limits(list(panels[:count]))
     for ax in panels[:count]:
         axis.apply(ax, times, most=7 if count == 1 else 4)
-        ax.set_ylabel(label_of(cases, quantity, unit))
         ax.grid(color="0.9", lw=0.5)
-    _outer_labels(panels, count, columns)
-    if handles:
-        entries = 4 if max(len(handle.get_label()) for handle in handles) < 14 else 1 if count == 1 else 2
-        legend = figure.legend(handles=handles, loc="outside upper center", ncols=entries, handlelength=1.8)
-        legend.set_title(first.name, prop={"size": 7.5})
+        ax.set_xlabel("")
+    for number, ax in enumerate(panels):  # places without a panel stay empty
+        ax.set_visible(number < count)
+        ax.tick_params(labelbottom=number + columns >= count)
+    figure.supxlabel(axis.unit.label(axis.label))
+    figure.supylabel(label_of(cases, quantity, unit))
+    named: dict[str, Line2D] = {str(handle.get_label()): handle for handle in colouring.handles()}
+    title = first.name if named else ""
+    if dotted:
+        named[AXES[cases.axis].rows] = Line2D([], [], color="0.3", ls="", marker="o", ms=3)
+    legend_above(figure, named, title)
     colouring.draw_bar(figure, list(panels[:count]))
     return figure
 
@@ -94,32 +112,23 @@ def _facets(others: list[Parameter], cases: int) -> Parameter:
     return Parameter("", np.zeros(cases), "", "")
 
 
-def _draw_panel(ax: Axes, axis: RowAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> None:
-    """Lines of some cases, the later ones thinner, so that none hides another that it lies on."""
-    few = len({level for _, _, level in drawn}) <= 8
+def _draw_panel(ax: Axes, axis: RowAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> bool:
+    """Lines of some cases, the later ones thinner, so that none hides another that it lies on; whether with dots."""
+    dotted, few = False, len({level for _, _, level in drawn}) <= 8
     for number, (line, member, level) in enumerate(sorted(drawn, key=lambda one: one[2])):
         width = 2.3 - 1.3 * number / max(1, len(drawn) - 1) if few and len(drawn) > 1 else 1.0
         colour = colouring.colour(level)
-        ax.plot(axis.unit(line["time"]), unit(line), color=colour, lw=width)
-        if few and len(drawn) <= 8 and member.sizes["time"] <= 40 and line.name in member:
-            ax.plot(axis.unit(member["time"]), unit(member[line.name]), "o", ms=1.5 + width, color=colour)
-
-
-def _outer_labels(panels: np.ndarray, count: int, columns: int) -> None:
-    """Labels at the left and below the lowest panel of each column alone; places without a panel stay empty."""
-    for number, ax in enumerate(panels):
-        ax.set_visible(number < count)
-        if number % columns:
-            ax.set_ylabel("")
-        lowest = number + columns >= count
-        ax.tick_params(labelbottom=lowest)
-        if not lowest:
-            ax.set_xlabel("")
+        ax.plot(axis.unit(rows_of(line)), unit(line), color=colour, lw=width)
+        if few and len(drawn) <= 8 and rows_of(member).size <= 40 and line.name in member:
+            ax.plot(axis.unit(rows_of(member)), unit(member[line.name]), "o", ms=1.5 + width, color=colour)
+            dotted = True
+    return dotted
 
 
 def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
     """A quantity over every accepted step, or over the kept times if it is known at these alone."""
-    steps = history(member)
+    member = member.sortby(str(rows_of(member).name))
+    steps = steps_of(member)
     line = steps[quantity] if quantity in steps else member[quantity]
     return line.copy(data=without_zeros(quantity, line.values))
 

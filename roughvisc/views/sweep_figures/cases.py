@@ -18,6 +18,7 @@ from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES, current_name
+from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
@@ -128,7 +129,7 @@ class Cases:
     Parameters
     ----------
     members : list of xarray.Dataset
-        Histories of each case over its own times and over its steps, or over its speeds.
+        Histories of each case over its own times and over its steps, or over the places on another axis.
     parameters : list of Parameter
         What was varied, but what says the same as one before it.
     """
@@ -148,6 +149,15 @@ class Cases:
             if key in (one.key, identifier(one.key)):
                 return one
         raise InputError(f"{key!r} was not varied: expected one of {', '.join(one.key for one in self.parameters)}")
+
+    @property
+    def axis(self) -> str:
+        """Name of the axis that the results lie over."""
+        return axis_of(self.members[0].variables)
+
+    def lies_over_axis(self, name: str) -> bool:
+        """Whether every case has a history of a name."""
+        return all(name in member and member[name].dims == (self.axis,) for member in self.members)
 
     @property
     def alike_in_size(self) -> bool:
@@ -172,10 +182,9 @@ class Cases:
             If a case has none of that name.
         """
         quantity = self.area if quantity is None else current_name(quantity)
-        for member in self.members:
-            if quantity not in member or member[quantity].dims != ("time",):
-                known = [str(name) for name in member.data_vars if member[name].dims == ("time",)]
-                raise InputError(f"quantity is {quantity!r}: expected a history of every case: {', '.join(known)}")
+        if not self.lies_over_axis(quantity):
+            known = [str(name) for name in self.members[0].data_vars if self.lies_over_axis(str(name))]
+            raise InputError(f"quantity is {quantity!r}: expected a history of every case: {', '.join(known)}")
         return quantity
 
 
@@ -201,7 +210,7 @@ def cases_of(results: Any) -> Cases:
         parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
         results = whole_of(results)
-        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "time", "speed", "step"}]
+        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "step", *AXES}]
         table = results[held].load()
         members = [table.isel(case=i) for i in range(results.sizes["case"])]
         on_case = [one for one in results.coords.values() if one.dims == ("case",) and one.name not in _NO_PARAMETERS]
@@ -227,8 +236,8 @@ def _key(coordinate: xr.DataArray) -> str:
 
 
 def _histories(dataset: xr.Dataset) -> xr.Dataset:
-    """What a case has over time or speed, and over its steps, in memory."""
-    held = [name for name in dataset.data_vars if dataset[name].dims in (("time",), ("speed",), ("step",))]
+    """What a case has over its axis, and over its steps, in memory."""
+    held = [name for name in dataset.data_vars if dataset[name].dims in (("step",), *((axis,) for axis in AXES))]
     return dataset[held].load()
 
 

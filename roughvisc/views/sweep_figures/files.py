@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -12,14 +11,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import atomic_write, whole_result
-from roughvisc.variables.axes import axis_of
+from roughvisc.study.storage.store import whole_result
+from roughvisc.variables.axes import AXES
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import verbatim
+from roughvisc.views.figures.files import write_figure
 from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
@@ -60,28 +58,25 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
     What the program prescribes alike in all cases, or a parameter says already, is left out.
     """
     cases = cases_of(results)
+    if AXES[cases.axis].telling == "friction_coefficient":
+        yield "friction", "Friction and contact area against the speed, a line a case", friction_of_cases(results)
+        if _is_shifted(cases):
+            title = "The same against the speed times the shift factor: a master curve"
+            yield "master", title, friction_of_cases(results, reduced=True)
+        return
     loading = "force" if cases.alike_in_size else "nominal_pressure"
     observed = ("leak_rate", *CONDUCTANCES)
-    held = [name for name in (cases.area, "approach", loading, *observed) if _holds(cases, name)]
+    held = [name for name in (cases.area, "approach", loading, *observed) if cases.lies_over_axis(name)]
     for name in held:
         if cases.parameters and not _known_before(cases, name):
             yield _FILES.get(name, name), f"{_word(name)} against what was varied", sweep(results, name)
     for name in (*held[:1], *(one for one in held if one in observed)):
         kind = "histories" if name == held[0] else f"{name}-histories"
-        yield kind, f"{_word(name)} over time, a line a case", histories_of_cases(results, name)
-    if all(axis_of(member) == "speed" for member in cases.members):
-        yield "friction", "Friction and contact area against the speed, a line a case", friction_of_cases(results)
-        if _is_shifted(cases):
-            title = "The same against the speed times the shift factor: a master curve"
-            yield "master", title, friction_of_cases(results, reduced=True)
+        yield kind, f"{_word(name)} over {cases.axis}, a line a case", histories_of_cases(results, name)
 
 
 def _word(name: str) -> str:
     return name.replace("_", " ").capitalize()
-
-
-def _holds(cases: Cases, name: str) -> bool:
-    return all(name in member and member[name].dims == ("time",) for member in cases.members)
 
 
 def _is_shifted(cases: Cases) -> bool:
@@ -133,44 +128,3 @@ def save_sweep_figures(
     """
     drawn = sweep_figures(results)
     return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]
-
-
-def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
-    """Write a figure to a file of the kind that its suffix names, whole or not at all.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        What to write.
-    path : Path
-        Where to.
-    dpi : float
-        Resolution of pictures made of pixels.
-    title : str
-        What stands above it, such as which case it shows; the picture is so much higher.
-
-    Raises
-    ------
-    InputError
-        If the suffix names no kind of picture, or the folder cannot be written to.
-    """
-    kind = path.suffix.lstrip(".") or "png"
-    if kind not in figure.canvas.get_supported_filetypes():
-        raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
-    box = _with_title(figure, title) if title else None
-    with atomic_write(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=dpi, bbox_inches=box)
-    return path
-
-
-def _with_title(figure: Figure, title: str) -> Bbox:
-    """Write a title above a figure, whose own contents stay where they are; the area of both. [inch]"""
-    figure.draw_without_rendering()  # lays it out
-    figure.set_layout_engine("none")
-    for legend in figure.legends:  # else it would stand at the top of what is saved
-        legend.set_bbox_to_anchor((0, 0, 1, 1), transform=figure.transFigure)
-    width, height = figure.get_size_inches()
-    whole = title.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")  # lines end at commas
-    lines = textwrap.wrap(whole, int(13 * width))
-    figure.text(0.5, 1 + 0.03 / height, "\n".join(map(verbatim, lines)), ha="center", va="bottom", fontsize=9)
-    return Bbox.from_extents(0, 0, width, height + 0.08 + 0.16 * len(lines))

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from roughvisc.errors import InputError
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.sliding import SLIDING
-from roughvisc.views.figures.axes import letter_panels, new_figure, styled, unit_for
+from roughvisc.views.figures.axes import legend_above, letter_panels, new_figure, styled, unit_for
 from roughvisc.views.sweep_figures.cases import Parameter, cases_of, combined, middle_of_decades
 from roughvisc.views.sweep_figures.colouring import Colouring
 
@@ -64,12 +64,9 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
         ax.set_ylabel(SLIDING[name].label)
         ax.grid(color="0.9", lw=0.5)
     letter_panels(list(panels))
-    if handles:
-        handles += [] if all(settled) else [_OPEN]
-        legend = figure.legend(
-            handles=handles, loc="outside upper center", ncols=min(4, len(handles)), handlelength=1.4
-        )
-        legend.set_title(colouring.parameter.name or None, prop={"size": 7.5})
+    title = colouring.parameter.name if handles else ""
+    handles += [] if all(settled) else [_OPEN]
+    legend_above(figure, {str(one.get_label()): one for one in handles}, title)
     colouring.draw_bar(figure, list(panels))
     return figure
 

@@ -36,7 +36,7 @@ def draw_maps(
     figure = new_figure(1.4 + 2.6 * len(values), 2.9)
     panels = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
     colours = matplotlib.colormaps["viridis"].with_extremes(bad=ABSENT)
-    for ax, row, title in zip(panels, shown, titles, strict=True):
+    for ax, row in zip(panels, shown, strict=True):
         cells = np.full((len(up.levels), len(across.levels)), np.nan)
         cells[up.places, across.places] = row
         mesh = ax.pcolormesh(
@@ -45,7 +45,6 @@ def draw_maps(
         set_parameter_axis(ax.xaxis, across)
         set_parameter_axis(ax.yaxis, up)
         ax.tick_params(direction="out", which="both")
-        ax.set_title(title, loc="right")
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
     bar = figure.colorbar(mesh, ax=list(panels), pad=0.02, aspect=22)
@@ -53,8 +52,7 @@ def draw_maps(
     bar.outline.set_linewidth(0.6)
     bar.minorticks_off()
     readable_ticks(bar.ax.yaxis, *mesh.get_clim(), logarithmic)
-    if len(values) > 1:
-        letter_panels(panels)
+    letter_panels(panels, titles)
     return figure
 
 

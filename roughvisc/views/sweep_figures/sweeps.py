@@ -15,10 +15,12 @@ from roughvisc.errors import InputError
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures.axes import (
+    RowAxis,
     frame_at,
+    legend_above,
     letter_panels,
     new_figure,
-    row_text,
+    rows_of,
     spread_frames,
     styled,
 )
@@ -94,7 +96,7 @@ def sweep(
     frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
     values = np.array([[float(m[quantity][f]) for m, f in zip(cases.members, row, strict=True)] for row in frames])
     values = without_zeros(quantity, values)
-    titles = [_title(cases, row) for row in frames]
+    titles = _titles(cases, frames)
     if times is None and len(frames) == 1 and not _all_last(cases, frames[0]):
         titles = [f"{titles[0]}, where the cases differ most"]
     if as_map:
@@ -128,7 +130,7 @@ def _suits_map(cases: Cases, along: str | Sequence[str] | None) -> bool:
 
 def _frames(cases: Cases, quantity: str, times: float | Sequence[float] | None, one: bool) -> list[list[int]]:
     """Frame of every case, for each time that is drawn."""
-    clocks = [member["time"].values for member in cases.members]
+    clocks = [rows_of(member).values for member in cases.members]
     if times is not None:
         asked = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
         if not 0 < asked.size <= _MOST_PANELS:
@@ -142,21 +144,24 @@ def _frames(cases: Cases, quantity: str, times: float | Sequence[float] | None, 
     return [[telling[i]] * len(clocks) for i in spread_frames(clocks[0][telling], 4)]
 
 
-def _title(cases: Cases, frames: list[int]) -> str:
-    """The time, or about which time it is if it is not the same in all cases."""
-    found = {float(member["time"][frame]) for member, frame in zip(cases.members, frames, strict=True)}
-    if len(found) == 1:
-        return row_text(found.pop())
-    return "at the end" if _all_last(cases, frames) else f"t ≈ {row_text(float(np.median(list(found))))[4:]}"
+def _titles(cases: Cases, frames: list[list[int]]) -> list[str]:
+    """The time of each row of frames, or about which time it is if it is not the same in all cases."""
+    pairs = [zip(cases.members, row, strict=True) for row in frames]
+    found = [{float(rows_of(member)[frame]) for member, frame in row} for row in pairs]
+    axis = RowAxis.of(np.unique([place for places in found for place in places]), cases.axis)
+    texts = [axis.text(float(np.median(list(places)))) for places in found]
+    texts = [text if len(p) == 1 else text.replace("=", "≈") for text, p in zip(texts, found, strict=True)]
+    ends = [len(p) > 1 and _all_last(cases, row) for p, row in zip(found, frames, strict=True)]
+    return ["at the end" if end else text for end, text in zip(ends, texts, strict=True)]
 
 
 def _all_last(cases: Cases, frames: list[int]) -> bool:
-    return all(frame == member.sizes["time"] - 1 for member, frame in zip(cases.members, frames, strict=True))
+    return all(frame == rows_of(member).size - 1 for member, frame in zip(cases.members, frames, strict=True))
 
 
 def telling_frames_of(cases: Cases, quantity: str) -> list[int]:
     """Frame of each case at the end; where the cases differ less than half as much there, where they differ most."""
-    clocks = [member["time"].values for member in cases.members]
+    clocks = [rows_of(member).values for member in cases.members]
     last = [len(clock) - 1 for clock in clocks]
     common = np.unique(np.concatenate(clocks))
     common = common[(common >= max(c[0] for c in clocks)) & (common <= min(c[-1] for c in clocks))]
@@ -182,15 +187,14 @@ def _lines_by_time(
     cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
 ) -> Figure:
     """One parameter: a line for each time."""
-    figure = new_figure(4.2, 3.0)
+    figure = new_figure(4.2, 3.2)
     ax = figure.add_subplot()
     unit = quantity_unit(cases, quantity, values)
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(values)))
     for row, colour, title, frame in zip(values, shades, titles, frames, strict=True):
         _draw_line(ax, across, np.arange(len(row)), unit(row), _failed(cases, frame), color=colour, label=title)
     _finish(ax, cases, across, quantity, values)
-    named = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(list(named.values()), list(named), loc="outside upper center", ncols=4, handlelength=1.4)
+    legend_above(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)})
     return figure
 
 
@@ -204,7 +208,7 @@ def _families(
     axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
     unit = quantity_unit(cases, quantity, values)
     crossed = False
-    for ax, row, title, frame in zip(axes, values, titles, frames, strict=True):
+    for ax, row, frame in zip(axes, values, frames, strict=True):
         failed = _failed(cases, frame)
         crossed |= bool(failed.any())
         for level in range(len(family.levels)):
@@ -213,18 +217,12 @@ def _families(
             style = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
             _draw_line(ax, across, members, unit(row[members]), failed[members], **style)
         _finish(ax, cases, across, quantity, values)
-        ax.set_title(title, loc="right")
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
     handles = colouring.handles() + ([_CROSS] if crossed else [])
-    if handles:
-        longest = max(len(handle.get_label()) for handle in handles)
-        wide, columns = longest > 22, max(1, int(figure.get_figwidth() / (0.5 + 0.065 * longest)))
-        legend = figure.legend(handles=handles, loc="outside upper center", ncols=columns, handlelength=1.4)
-        legend.set_title(family.name if family.key and not wide else None, prop={"size": 7.5})
+    legend_above(figure, {str(one.get_label()): one for one in handles}, family.name if colouring.handles() else "")
     colouring.draw_bar(figure, list(axes))
-    if len(values) > 1:
-        letter_panels(axes)
+    letter_panels(axes, titles)
     return figure
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from support import labels
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -60,9 +61,8 @@ def test_figure__is_one_of_a_result_that_slides(slid):
 def test_frames__tell_the_distance(slid):
     film = rv.plot.animation(slid, frames=4)
     film._func(4)
-    assert "30 µm slid" in film._fig.get_suptitle()
-    labels = [ax.get_ylabel() for ax in film._fig.axes]
-    assert "Friction coefficient" in labels
+    assert "30 µm slid" in film._fig.axes[0].get_title(loc="left")
+    assert "Friction coefficient" in labels(film._fig)
     film._draw_was_started = True
 
 

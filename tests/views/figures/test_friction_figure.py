@@ -8,6 +8,7 @@ from support import labels, lines, text_boxes
 import roughvisc as rv
 from roughvisc.labels import annotate
 from roughvisc.variables import NOT_CONVERGED
+from roughvisc.views.figures import animate
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
 
@@ -129,12 +130,12 @@ def sliding(direction="x"):
 
 
 @pytest.mark.parametrize(("direction", "arrow"), [("x", "→"), ("-x", "←"), ("y", "↑"), ("-y", "↓")])
-def test_friction_maps__are_of_low_peak_and_high_speed_with_the_motion(direction, arrow):
-    figure = rv.plot.friction_maps(sliding(direction))
-    panels = [ax for ax in figure.axes if ax.get_title()]
-    assert [ax.get_title() for ax in panels] == [
-        f"{arrow} V = 20 µm/s\nµ = 0.01",
-        f"{arrow} V = 200 µm/s\nµ = 0.2",
+def test_maps_of_friction__are_of_low_peak_and_high_speed_with_the_motion(direction, arrow):
+    figure = rv.plot.maps(sliding(direction))
+    panels = [ax for ax in figure.axes if ax.images]
+    assert [ax.get_title(loc="left").partition("  ")[2] for ax in panels] == [
+        f"{arrow} V = 0.02 mm/s\nµ = 0.01",
+        f"{arrow} V = 0.2 mm/s\nµ = 0.2",
         f"{arrow} V = 2 mm/s\nµ = 0.1",
     ]
     drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in panels]
@@ -142,17 +143,20 @@ def test_friction_maps__are_of_low_peak_and_high_speed_with_the_motion(direction
     assert panels[0].images[0].get_array().shape == (4, 8), "x to the right"
 
 
-def test_friction_maps__of_speeds_that_are_asked_for():
-    figure = rv.plot.friction_maps(sliding(), [1e-3, 3e-5])
-    assert [ax.get_title().split("\n")[0] for ax in figure.axes if ax.get_title()] == ["→ V = 20 µm/s", "→ V = 2 mm/s"]
+def test_maps_of_friction__at_speeds_that_are_asked_for():
+    figure = rv.plot.maps(sliding(), ["1.5 mm/s", 3e-5])
+    titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure.axes if ax.images]
+    assert [title.partition("  ")[2] for title in titles] == ["→ V = 2 mm/s", "→ V = 0.02 mm/s"]
     small = sliding()
     small["friction_coefficient"][:] = [0.3, 3.2e-5, 0.2]
-    assert r"µ = 3.2$\times 10^{-5}$" in rv.plot.friction_maps(small, 2e-5).axes[0].get_title()
-    for speeds in ([], [-1.0], [1.0] * 13):
-        with pytest.raises(rv.InputError, match="expected 1 to 12 positive numbers"):
-            rv.plot.friction_maps(sliding(), speeds)
+    assert r"µ = 3.2$\times 10^{-5}$" in rv.plot.maps(small, 2e-5).axes[0].get_title(loc="left")
+    for speeds in ([], [1.0] * 25):
+        with pytest.raises(rv.InputError, match="choose 1 to 24"):
+            rv.plot.maps(sliding(), speeds)
     with pytest.raises(rv.InputError, match="holds no 'pressure'"):
-        rv.plot.friction_maps(sliding().drop_vars("pressure"))
+        rv.plot.maps(sliding().drop_vars("pressure"))
+    with pytest.raises(AttributeError, match=r"write rv\.plot\.maps\(ds\)"):
+        _ = rv.plot.friction_maps
 
 
 def several(shift=(1.0, 100.0)):
@@ -198,10 +202,21 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
 
 
 def test_figures_over_time__refuse_a_curve_in_plain_words():
-    for draw in (rv.plot.hysteresis, rv.plot.friction_against_distance, rv.plot.animate):
-        arguments = ["film.gif"] if draw is rv.plot.animate else []
+    for draw in (rv.plot.hysteresis, rv.plot.friction_against_distance):
         with pytest.raises(rv.InputError, match="lies over speed: expected a history over time"):
-            draw(sliding(), *arguments)
+            draw(sliding())
+
+
+def test_film__of_a_curve_of_friction_goes_from_low_to_high_speed():
+    figure, draw, frames = animate._moving(sliding(), None, 3)
+    shown, cells = [], []
+    for frame in frames:
+        draw(frame)
+        shown.append(figure.axes[0].get_title(loc="left").rpartition("  ")[2])
+        cells.append(int((np.ma.getdata(figure.axes[0].images[0].get_array()) > 0).sum()))
+    assert shown == ["V = 0.02 mm/s", "V = 0.2 mm/s", "V = 2 mm/s"]
+    assert cells == [12, 8, 4], "though the rows are not in this order"
+    assert "Friction coefficient" in labels(figure)
 
 
 def test_figures_of_rows__name_the_speeds():
@@ -216,4 +231,4 @@ def test_figures_of_rows__name_the_speeds():
     assert line.get_xdata().tolist() == [1.0, 100.0]
     assert (np.diff(line.get_ydata()) < 0).all() == (np.diff(ds.sortby("speed").contact_area) < 0).all()
     assert rv.plot.section(ds, time=0.1).axes[0].get_title(loc="right").startswith("V = 100 mm/s")
-    assert rv.plot.maps(ds, times=[1e-3]).axes[0].get_title().startswith("V = 1 mm/s")
+    assert rv.plot.maps(ds, times=[1e-3]).axes[0].get_title(loc="left").partition("  ")[2].startswith("→ V = 1 mm/s")

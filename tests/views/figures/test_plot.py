@@ -14,7 +14,7 @@ from matplotlib.animation import FuncAnimation
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
-from support import labels, lines, text_boxes
+from support import labels, lines, text_boxes, told
 
 import roughvisc as rv
 from roughvisc import observables, plot
@@ -22,6 +22,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.views.figures import animate as animation
 from roughvisc.views.figures import axes, sections
+from roughvisc.views.figures import axes as axes_module
 
 SAMPLES = {
     "creep": made.hertz_creep,
@@ -51,7 +52,7 @@ def without_absent(dataset):
 #: those of a history; of curves of friction: test_friction_figure.py, and of slides: test_friction_distance.py
 APART = {"speed", "sliding_distance"}
 OVER_TIME = [name for name, (_, needed, _) in plot.FIGURES.items() if not APART & {*needed}]
-FIGURES = {name: plot.FIGURES[name][0] for name in OVER_TIME}
+FIGURES = {name: getattr(plot, plot.FIGURES[name][0]) for name in OVER_TIME}
 FIGURES["leakage"] = lambda dataset: plot.leakage(without_absent(dataset))
 FIGURES["conductance"] = lambda dataset: plot.conductance(dataset.merge(observables.conductance(dataset, (5.0, 0))))
 FIGURES["film of the flow"] = lambda dataset: animation._moving(without_absent(dataset), "flux", 2)[0]
@@ -87,9 +88,9 @@ def test_every_figure__has_labels_with_units_that_do_not_overlap(name, sample):
         inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
         assert inside, f"{text!r} runs off the figure"
     for label in labels(figure):
-        bare = label in ("Rel. error", "Per kept time", "Contact clusters", "Clusters at least as large")
-        bare |= label == "Flux over its largest at that time"
-        assert bare or label.endswith("]"), label
+        bare = label in ("Relative error", "Per kept time", "Contact clusters", "Clusters at least as large")
+        bare |= label == "Flux over its largest"
+        assert bare or "]" in label, label
 
 
 def test_figures__leave_no_global_state():
@@ -160,30 +161,49 @@ def test_frame_at__nearest_time_or_counted_from_the_end():
 
 def test_history__data_and_units():
     ds = made.hertz_creep()
-    force, approach, area, gap, work, cost, accuracy = plot.history(ds).axes
-    assert [ax.get_ylabel() for ax in (force, approach, area, gap, work, cost)] == [
+    force, approach, area, gap, work = plot.history(ds).axes
+    assert [ax.get_ylabel().replace("\n", " ") for ax in (force, approach, area, gap, work)] == [
         "Force [mN]",
         "Approach [µm]",
         "Contact area [mm²]",
         "Mean gap [µm]",
         "Work [µJ]",
-        "Per kept time",
     ]
     np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
     np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
     for name in ("stored", "dissipated"):
         np.testing.assert_allclose(lines(work)[name].get_ydata(), 1e6 * ds[f"{name}_energy"])
+    assert work.get_xlabel() == "Time [s]"
+    assert work.get_xscale() == "symlog"
+    np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
+    np.testing.assert_allclose(lines(area)["corrected"].get_ydata(), 1e6 * ds["contact_area"])
+
+
+def test_diagnostics__data_and_units():
+    ds = made.hertz_creep()
+    cost, accuracy = plot.diagnostics(ds).axes
     for name in ("convolutions", "iterations"):
         np.testing.assert_allclose(lines(cost)[name].get_ydata(), ds[name])
     assert accuracy.get_xlabel() == "Time [s]"
     assert accuracy.get_xscale() == "symlog"
-    np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
-    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area"])
     assert list(lines(accuracy)) == ["stated", "time steps", "contact solver (estimate)", "tolerance"]
     np.testing.assert_allclose(lines(accuracy)["stated"].get_ydata(), ds["stated_error"])
     np.testing.assert_allclose(lines(accuracy)["contact solver (estimate)"].get_ydata(), ds["residual"])
     np.testing.assert_allclose(lines(accuracy)["time steps"].get_ydata(), ds["time_error"])
     np.testing.assert_allclose(lines(accuracy)["tolerance"].get_ydata(), 1e-3)
+    with pytest.raises(InputError, match="neither iterations nor errors"):
+        plot.diagnostics(ds[["force", "approach"]])
+
+
+def test_diagnostics__length_of_every_accepted_step():
+    ds = rv.simulate(
+        rv.sphere(1e-2, 1e-3, 12), rv.zener(3e6, 1e6, 1e5), rv.Program().load(5e-3, over=0.1), progress=False, times=3
+    )
+    _, steps, _ = plot.diagnostics(ds).axes
+    taken = ds.roughvisc.steps["time"].values
+    assert steps.get_ylabel() == "Step length [ms]"
+    np.testing.assert_allclose(steps.lines[0].get_ydata(), 1e3 * np.diff(taken))
+    np.testing.assert_allclose(steps.lines[0].get_xdata(), 1e3 * taken[1:])
 
 
 def test_history__fraction_on_the_right_agrees():
@@ -198,19 +218,29 @@ def test_history__fraction_on_the_right_agrees():
 
 def test_history__steps_that_did_not_converge_are_crossed_out():
     ds = made.rough_creep()
-    force = plot.history(ds).axes[0]
-    np.testing.assert_allclose(lines(force)["not converged"].get_xdata(), ds["time"][3])
-    assert "not converged" not in lines(plot.history(made.hertz_creep()).axes[0])
+    figure = plot.history(ds)
+    (crossed,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
+    np.testing.assert_allclose(crossed.get_xdata(), ds["time"][3])
+    assert "not converged" in told(figure)
+    assert "not converged" not in told(plot.history(made.hertz_creep()))
+
+
+@pytest.mark.parametrize(("count", "marker"), [(30, "o"), (60, "|")])
+def test_history__kept_times_are_marked_and_explained(count, marker):
+    figure = plot.history(made.hertz_creep((9, 8), count))
+    assert "kept times" in told(figure)
+    for ax in figure.axes:
+        (marks,) = [line for line in ax.lines if line.get_marker() == marker]
+        assert len(marks.get_xdata()) == count
 
 
 def test_history__of_what_is_there():
     ds = made.hertz_creep()[["force", "approach", "height"]].assign(time_error=("time", np.full(30, np.nan)))
     ds.attrs = {}
     figure = plot.history(ds)
-    assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]", "Rel. error"]
-    assert [text.get_text() for text in figure.axes[-1].texts] == ["no accuracy recorded"]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["Force [mN]", "Approach [µm]"]
     lowest = [ax.get_ylabel() for ax in plot.history(made.hertz_creep().drop_vars("force")).axes if ax.get_xlabel()]
-    assert lowest == ["Work [µJ]", "Per kept time", "Rel. error"], "the lowest panel of each column, and the one below"
+    assert lowest == ["Mean gap [µm]", "Work [µJ]"], "the lowest panel of each column"
     with pytest.raises(InputError, match="nothing to draw"):
         plot.history(ds[["height", "time_error"]])
 
@@ -292,10 +322,10 @@ def test_maps__data_scale_and_absent_cells():
         np.testing.assert_allclose(image.get_array().filled(np.nan), expected)
     for image, frame in zip(shown[3:], frames, strict=True):
         np.testing.assert_allclose(image.get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
-        assert image.get_clim()[0] == 0
+        assert 0 < image.get_clim()[0] < 1e-9, "so that contact lies below the scale"
         gaps = 1e6 * ds["gap"].isel(time=frames).values
         beyond = np.mean(gaps[gaps > 0] > image.get_clim()[1])
-        assert 0 < beyond <= 2.1e-3, "but for two of a thousand values, the scale holds all"
+        assert beyond <= 2.1e-3, "but for two of a thousand values, the scale holds all"
     absent = ds["height"].isnull().values.T
     for image in shown:
         assert np.array_equal(np.ma.getmaskarray(image.get_array()), absent)
@@ -303,7 +333,8 @@ def test_maps__data_scale_and_absent_cells():
         assert image.axes.get_aspect() == 1.0
         np.testing.assert_allclose(image.get_extent(), [0, 1.2, 0, 0.9])
     assert len({image.get_clim() for image in shown[:3]}) == 1
-    assert [ax.get_title() for ax in figure.axes[:3]] == ["t = 10 ms", "t = 1.52 s", "t = 2.78 h"]
+    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes[:3]]
+    assert titles == ["t = 0.01 s", "t = 1.52 s", "t = 10000 s"], "all in one unit"
     assert "Pressure [MPa]" in labels(figure)
     assert "Gap [µm]" in labels(figure)
 
@@ -414,7 +445,7 @@ def test_section__of_a_flat_face_in_full_contact_has_the_scale_of_the_approach()
     assert bottom.get_ylabel() == "Height [µm]"
     assert lines(bottom)["undeformed"].get_ydata()[0] == pytest.approx(-1e6 * float(ds["approach"][0]))
     bar = plot.maps(ds, fields="gap").axes[-1]
-    assert bar.get_yticks().tolist() == [0.0]
+    assert bar.get_yticks() == pytest.approx([0.0], abs=1e-9)
 
 
 def test_section__without_pressure_says_so():
@@ -451,11 +482,11 @@ def test_surface__panels_and_missing_points():
     figure = plot.surface(h)
     on_map, profile, heights, spectrum = figure.axes[:4]
     np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * h.T)
-    assert figure.get_suptitle() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (red)"
+    assert figure.get_supxlabel() == f"{100 * float(h.isnull().mean()):.2g} % of the points are missing (grey)."
     np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * h.isel(y=37))
     assert f"normal, Sq = {1e6 * float(rv.parameters(rv.level(h))['Sq']):.3g} µm" in lines(heights)
     assert spectrum.get_xscale() == spectrum.get_yscale() == "log"
-    assert spectrum.get_ylabel() == "Power spectral density [µm⁴]"
+    assert spectrum.get_ylabel() == "Power spectral density\n[µm⁴]"
 
 
 def test_surface__takes_a_result_and_refuses_what_is_no_surface():
@@ -556,11 +587,16 @@ def test_figures_of__clusters_and_loops_where_there_are_some():
 def test_maps__contact_too_ragged_for_an_outline_has_a_colour_in_every_frame():
     smooth, ragged = made.rough_creep(), made.rough_creep()
     ragged["pressure"][-1] = ragged["pressure"][-1].where(ragged["x"] % 2.5e-5 < 1.25e-5, 0.0)
-    for ds, words in ((smooth, "Gap [µm]"), (ragged, "contact in orange\nGap [µm]")):
+    for ds, outlined in ((smooth, True), (ragged, False)):
         figure = plot.maps(ds, times=[0.0, -1])
-        assert words in labels(figure)
-        gaps = [image for image in images(figure) if image.get_gid() == "gap"]
-        assert [bool(image.axes.collections) for image in gaps] == [words == "Gap [µm]"] * 2
+        assert "contact" in told(figure)
+        pressures, gaps = images(figure)[:2], images(figure)[2:]
+        assert [bool(image.axes.collections) for image in pressures] == [outlined] * 2
+        for image, frame in zip(gaps, (0, -1), strict=True):
+            touching = (ds["gap"].isel(time=frame) <= 0).values.T
+            colours = image.to_rgba(image.get_array())
+            assert np.all(colours[touching] == to_rgba(axes.CONTACT))
+            assert not np.any(np.all(colours[~touching] == to_rgba(axes.CONTACT), axis=-1))
 
 
 def test_animate__of_a_mirrored_surface_shows_what_was_measured():
@@ -588,12 +624,15 @@ def test_animate__map_section_and_history_move_together():
     ds = made.rough_creep()
     figure, draw, frames = animation._moving(ds, "gap", 4)
     on_map, section, force, approach, area = (ax for ax in figure.axes if ax.get_label() != "<colorbar>")
-    assert [ax.get_ylabel() for ax in (force, approach, area)] == ["Force [N]", "Approach [µm]", "Contact area [mm²]"]
+    told = [ax.get_ylabel().replace("\n", " ") for ax in (force, approach, area)]
+    assert told == ["Force [N]", "Approach [µm]", "Contact area [mm²]"]
     assert frames == [0, 4, 7, 11]
     for frame in frames:
         draw(frame)
         np.testing.assert_allclose(on_map.images[0].get_array().filled(np.nan), 1e6 * ds["gap"].isel(time=frame).T)
-        assert figure.get_suptitle() == axes.row_text(float(ds["time"][frame]))
+        assert on_map.get_title(loc="left").endswith(
+            f"  t = {float(ds['time'][frame]):.3g} s".replace("1e+04", "10000")
+        )
         assert approach.lines[2].get_xdata() == pytest.approx(ds["time"].values[frame])
         assert len(approach.lines[1].get_xdata()) == frame + 1
         index = int(ds["pressure"][-1].sum("x").argmax("y"))
@@ -658,7 +697,7 @@ def test_plot__shows_figures_only():
         assert getattr(rv.plot, name).__module__.startswith("roughvisc.views")
 
 
-def test_surface__scale_is_not_moved_by_spikes_and_missing_points_have_a_colour_of_their_own():
+def test_surface__scale_is_not_moved_by_spikes_and_missing_points_are_grey():
     rng = np.random.default_rng(4)
     values = rng.normal(0, 1e-7, (41, 30))
     values[3, 4], values[5:7, 8] = 1e-4, np.nan
@@ -666,13 +705,15 @@ def test_surface__scale_is_not_moved_by_spikes_and_missing_points_have_a_colour_
     (image,) = figure.axes[0].get_images()
     low, high = image.get_clim()
     assert -1500 < low < high < 1500  # nm: five deviations of a plane that the spike tilts; it is 100,000 away
-    text = figure._suptitle.get_text()
-    assert "0.16 % of the points are missing (red)" in text
+    text = figure.get_supxlabel()
+    assert "0.16 % of the points are missing (grey)" in text
     assert "0.081 % lie beyond the scale" in text
-    bad = np.array(image.get_cmap().get_bad())
+    assert to_rgba(axes.ABSENT) == tuple(image.get_cmap().get_bad())
     shades = image.get_cmap()(np.linspace(0, 1, 256))
-    assert np.abs(shades - bad)[:, :3].max(axis=1).min() > 0.3
-    assert any(label.endswith("levelled [nm]") for label in (ax.get_ylabel() for ax in figure.axes))
+    assert np.abs(shades - image.get_cmap().get_bad())[:, :3].max(axis=1).min() > 0.15, "no height has that colour"
+    (label,) = [ax.get_ylabel() for ax in figure.axes if "max" in ax.get_ylabel()]
+    assert label.replace("\n", " ").startswith("Height, levelled [nm] max")
+    assert re.search(r"\nmax (100000|1e\+05|\d{5,6}) nm$", label), "the spike is said"
     spread = [patch.get_xy()[:, 0] for patch in figure.axes[2].patches]
     assert all(abs(x).max() < 1500 for x in spread)
 
@@ -687,7 +728,7 @@ def test_maps_and_section__of_a_mirrored_surface_show_what_was_measured():
     assert [len(x) for x in profiles] == [11, 22]
 
 
-def test_leakage__lakes_are_white_and_contact_is_grey():
+def test_leakage__lakes_contact_and_channels_are_told_apart():
     gap = np.full((2, 6, 5), 1e-6)
     gap[:, :, 1] = 0.0
     gap[:, [0, 5], 0] = 0.0  # a lake is left between them
@@ -697,11 +738,12 @@ def test_leakage__lakes_are_white_and_contact_is_grey():
     assert figure.axes[0].get_title(loc="right") == "closes between 1 and 2 s"
     (image,) = figure.axes[1].images
     colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
-    assert np.allclose(colours[2, 1], 0.6), "contact"
-    assert np.allclose(colours[2, 0], 1.0), "a lake"
+    assert np.allclose(colours[2, 1], to_rgba(axes_module.CONTACT)[:3]), "contact"
+    assert np.allclose(colours[2, 0], to_rgba(axes_module.NO_CONTACT)[:3]), "a lake"
+    assert {"contact", "no flow", "mapped", "kept times"} <= {*told(figure)}
     assert colours[2, 3].min() < 0.5, "the channel"
     closed = plot.leakage(xr.Dataset({"gap": (("time", "x", "y"), gap)}, axes), time=-1)
     (image,) = closed.axes[1].images
     colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
-    assert np.allclose(colours[gap[1] > 0], 1.0)
-    assert np.allclose(colours[gap[1] == 0], 0.6)
+    assert np.allclose(colours[gap[1] > 0], to_rgba(axes_module.NO_CONTACT)[:3])
+    assert np.allclose(colours[gap[1] == 0], to_rgba(axes_module.CONTACT)[:3])

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
+from roughvisc.views.figures.files import write_figure
 from roughvisc.views.sweep_figures.case_text import case_words, file_stems
-from roughvisc.views.sweep_figures.files import write_figure
 
 
 def case(written=None, **varied):

@@ -172,7 +172,8 @@ def test_sweep__of_two_parameters_is_a_map():
 def test_sweep__of_two_parameters_as_a_family_of_lines():
     ds = stacked(SWEEPS["two"], lambda v: by_load(v) * np.log10(v["material.kelvin_viscosity"]))
     figure = plot.sweep(ds, along="program.0.load", times=[0.1, -1])
-    assert [ax.get_title(loc="right") for ax in figure.axes] == ["t = 100 ms", "t = 10 s"]
+    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes]
+    assert titles == ["t = 0.1 s", "t = 10 s"], "in one unit"
     (legend,) = figure.legends
     named = [text.get_text() for text in legend.get_texts()]
     assert named == ["1 kPa s", "10 kPa s", "100 kPa s", "1000 kPa s"]
@@ -261,7 +262,7 @@ def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
     ds = stacked(product(program__0__load=[0.01, 0.02]), by_load)
     figure = plot.histories_of_cases(ds)
     (ax,) = figure.axes
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "kept times"]
     drawn = [line for line in ax.lines if line.get_linestyle() != "None"]  # the others are dots at the kept times
     for line, load in zip(drawn, (0.01, 0.02), strict=True):
         np.testing.assert_allclose(line.get_ydata(), np.array([0.25, 0.5, 0.75, 1.0]) * load**0.9)
@@ -274,13 +275,15 @@ def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
 
 def test_histories_of_cases__a_second_parameter_makes_panels():
     figure = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "40 mN"]
-    assert [ax.get_title()[:7] for ax in figure.axes] == ["elastic", "zener, "]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "40 mN", "kept times"]
+    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes]
+    assert [title[:7] for title in titles] == ["elastic", "zener, "]
     for ax in figure.axes:
         widths = [line.get_linewidth() for line in ax.lines if line.get_linestyle() != "None"]
         assert widths == sorted(set(widths), reverse=True), "a line shows on both sides of another that lies on it"
     by_material = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load), by="material")
-    assert [ax.get_title() for ax in by_material.axes] == ["Load 10 mN", "Load 20 mN", "Load 40 mN"]
+    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in by_material.axes]
+    assert titles == ["Load 10 mN", "Load 20 mN", "Load 40 mN"]
     crowd = product(program__0__load=LOADS, surface__seed=list(range(4)), solve__tolerance=[1e-2, 1e-3, 1e-4])
     assert len(plot.histories_of_cases(stacked(crowd)).axes) == 3, "of twelve combinations the tolerances alone"
 
@@ -289,10 +292,10 @@ def test_sweep__is_drawn_where_the_cases_differ():
     ds = stacked(SWEEPS["two"], by_load)
     apart = xr.DataArray([0.1, 1.0, 0.6, 0.2], dims="time") * ds["material.kelvin_viscosity"] ** 0.1
     figure = plot.sweep(ds.assign(approach=apart.transpose("case", "time") * 1e-6), "approach")
-    assert figure.axes[0].get_title(loc="right") == "t = 100 ms, where the cases differ most"
+    assert figure.axes[0].get_title(loc="left") == "t = 100 ms, where the cases differ most"
     shown = np.concatenate([line.get_ydata() for line in figure.axes[0].lines])
     np.testing.assert_allclose(sorted(set(shown.round(6))), np.round(np.array(VISCOSITIES) ** 0.1, 6))
-    assert plot.sweep(ds, "contact_area").axes[0].get_title(loc="right") == "t = 10 s", "where they differ at the end"
+    assert plot.sweep(ds, "contact_area").axes[0].get_title(loc="left") == "t = 10 s", "where they differ at the end"
     assert [name for name, _, _ in sweep_figures(ds.assign(contact_area=ds.contact_area * [0, 1, 1, 0]))] == [
         "area",
         "histories",
@@ -306,15 +309,15 @@ def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
     ds = ds.assign(contact_fraction=part, nominal_pressure=pressure)
     figures = {name: figure for name, _, figure in sweep_figures(ds)}
     assert list(figures) == ["area", "nominal_pressure", "histories"]
-    for name in ("area", "histories"):
-        assert figures[name].axes[0].get_ylabel() == "Contact fraction [%]"
+    assert figures["area"].axes[0].get_ylabel() == "Contact fraction [%]"
+    assert figures["histories"].get_supylabel() == "Contact fraction [%]"
     alike = ds.assign(contact_fraction=ds.contact_area / 1e-5, nominal_pressure=ds.force / 1e-5)
     assert plot.sweep(alike).axes[0].get_ylabel().startswith("Contact area [")
 
 
 def test_histories_of_cases__that_nothing_tells_apart_are_numbered():
     figure = plot.histories_of_cases(stacked(SWEEPS["loads"]).drop_vars("program.0.load"))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["1", "2", "3"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["1", "2", "3", "kept times"]
 
 
 # ------------------------------------------------------------------------------------------------- from a folder
@@ -365,7 +368,7 @@ def test_tree__of_cases_with_times_of_their_own(folder):
     assert isinstance(tree, xr.DataTree)
     (ax, *_) = plot.sweep(tree, "approach", along="program.0.load").axes
     assert ax.get_xlabel() == "Load [mN]"
-    assert ax.get_title(loc="right") == "at the end"
+    assert ax.get_title(loc="left") == "at the end"
     held = [node for node in tree.children.values() if float(node["program_1_hold"]) == 0.1]
     held.sort(key=lambda node: float(node["program_0_load"]))
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
