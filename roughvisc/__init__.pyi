@@ -29,6 +29,7 @@ from roughvisc.mechanics.materials.temperature import wlf_shift as wlf_shift
 from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
+from roughvisc.study.budget.budget import budget as budget
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep

@@ -120,6 +120,7 @@ CALLS = {
         rv.sphere(1e-3, 2e-4, 9), rv.elastic(1e6), PRESS, times=[times], progress=False
     ),
     "roughvisc.audit": lambda **one: rv.audit(pressed(), **one),
+    "plot.maps": lambda **one: rv.plot.maps(pressed(), **one),
     "observables.leakage": lambda **one: rv.observables.leakage(pressed(), **one),
     "observables.conductance": lambda resistivity: rv.observables.conductance(pressed(), [resistivity, 0.0]),
     "observables.incremental_stiffness": lambda **one: rv.observables.incremental_stiffness(pressed(), **one),

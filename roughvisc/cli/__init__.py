@@ -1,4 +1,6 @@
-"""The command line: ``roughvisc scan | new | plan | run | trade | plot | report | audit | verify | clean | validate``.
+"""The command line of roughvisc.
+
+Commands: ``scan | new | plan | run | trade | budget | plot | report | audit | verify | clean | validate``.
 
 Exit status: 0 all done, 1 a case failed, did not converge or is held by another run, 2 the input is wrong, 130
 interrupted, 143 terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
@@ -7,6 +9,7 @@ interrupted, 143 terminated. Heavy imports are made inside the commands, so that
 from roughvisc.cli.interrupts import ending_at_once
 
 with ending_at_once():
+    from roughvisc.cli.budgets import budget
     from roughvisc.cli.group import main
     from roughvisc.cli.new import new
     from roughvisc.cli.results import audit, plot, report, validate
@@ -16,5 +19,5 @@ with ending_at_once():
 
 __all__ = ["main"]
 
-for _command in (run, plan, trade, scan, new, plot, report, audit, verify, clean, validate):
+for _command in (run, plan, trade, budget, scan, new, plot, report, audit, verify, clean, validate):
     main.add_command(_command)

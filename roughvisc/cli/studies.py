@@ -255,6 +255,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     from roughvisc.progress import reporting
     from roughvisc.study.statement.case import read_study
+    from roughvisc.study.storage.store import write_dataset
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
@@ -273,7 +274,7 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
         dataset = measured(case, budget=time, progress=report)
     console.print(trade_table(dataset))
-    say(console, "Trade", trade_file.write_trade(dataset, folder / "trade.nc"))
+    say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
     say(console, "Figure", write_figure(figure(dataset), folder / "trade.png"))
     if part is not None:
         index = recommend.cheapest(dataset, quantity, part)

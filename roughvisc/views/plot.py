@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # for editors; at run time each is imported when it is first 
     from matplotlib.figure import Figure
 
     from roughvisc.views.figures.animate import animate, animation
+    from roughvisc.views.figures.budget import budget
     from roughvisc.views.figures.diagnostics import diagnostics
     from roughvisc.views.figures.distributions import contact_clusters, distributions
     from roughvisc.views.figures.fields import maps
@@ -42,6 +43,7 @@ __all__ = [
     "animate",
     "animation",
     "area_against_load",
+    "budget",
     "conductance",
     "contact_clusters",
     "diagnostics",
@@ -66,6 +68,7 @@ __all__ = [
 #: Modules that the figures are imported from -> their figures, and what tells whether one of them says anything.
 _MODULES = {
     "figures.animate": ("animate", "animation"),
+    "figures.budget": ("budget",),
     "figures.diagnostics": ("diagnostics",),
     "figures.distributions": ("contact_clusters", "distributions", "has_clusters"),
     "figures.fields": ("maps",),

@@ -163,6 +163,16 @@ def no_results(folder: Path) -> InputError:
     return InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
 
 
+def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write a Dataset that is no result to one NetCDF file, whole or not at all."""
+    kept = dataset.copy()
+    kept.attrs = plain_attributes(dataset.attrs)
+    numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
+    with atomic_write(path) as temporary:
+        kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
+    return Path(path)
+
+
 @contextmanager
 def atomic_write(path: str | Path) -> Iterator[Path]:
     """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.

@@ -12,7 +12,6 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.formats import to_current
-from roughvisc.study.storage.store import atomic_write, plain_attributes
 from roughvisc.units import quantity
 
 
@@ -30,18 +29,8 @@ def trade_folder(case: Case, out: str | Path | None) -> Path:
     return result_folder(case, folder.with_name(f"{folder.name}-trade"))
 
 
-def write_trade(dataset: xr.Dataset, path: str | Path) -> Path:
-    """Write a trade to one NetCDF file, whole or not at all."""
-    kept = dataset.copy()
-    kept.attrs = plain_attributes(dataset.attrs)
-    numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
-    with atomic_write(path) as temporary:
-        kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
-    return Path(path)
-
-
 def open_trade(path: str | Path) -> xr.Dataset:
-    """Open what :func:`write_trade` wrote.
+    """Open what ``roughvisc trade`` wrote.
 
     Raises
     ------
@@ -59,7 +48,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
 
 
 def is_trade(path: str | Path) -> bool:
-    """Whether a file is one that :func:`write_trade` wrote, as far as its variables tell."""
+    """Whether a file is one that ``roughvisc trade`` wrote, as far as its variables tell."""
     try:
         with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
             return "run_time" in file and "quantity" in file.dims

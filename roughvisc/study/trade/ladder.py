@@ -153,6 +153,9 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool =
     }
     if setting.precision is not None:
         changes["keep.precision"] = setting.precision
+    if setting.coarsening < 1 and is_data(case):
+        found = f"setting: coarsening is {setting.coarsening!r}"
+        raise InputError(f"{found}: expected at least 1, the scan has no finer grid")
     if setting.coarsening != 1:
         key, value = grid_change(case, shape, setting.coarsening, absent)
         changes[key] = value
@@ -163,13 +166,11 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float, absent: b
     """Key of a study and its value that make the surface's cells so many times longer.
 
     An analytic profile is made anew; anything else keeps the waves that the cells can hold, or means over them where
-    the material ends within the grid: ``absent``, the surface itself says so.
+    the material ends within the grid: ``absent``, the surface itself says so. Finer cells hold no more waves.
     """
     cells = shape_of(case, shape, coarsening)
     if not is_data(case):
         return "surface.shape", list(cells)
-    if coarsening < 1:
-        raise InputError(f"setting: coarsening is {coarsening!r}: expected at least 1, the scan has no finer grid")
     mirrored = 2 if case.settings.surface.mirror else 1
     ends = absent or case.settings.surface.missing == "absent"
     return f"surface.{'resample' if ends else 'band_limit'}", [max(2, n // mirrored) for n in cells]

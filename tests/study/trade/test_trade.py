@@ -23,8 +23,9 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment import grid_error as grid_convergence
 from roughvisc.study.statement.case import vary
+from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade.bench import TimedRuns
-from roughvisc.study.trade.files import open_trade, write_trade
+from roughvisc.study.trade.files import open_trade
 from roughvisc.study.trade.ladder import FLOAT32, Setting, changed, ladder, shape_of
 from roughvisc.study.trade.reference import QUANTITIES, closed_form
 from roughvisc.variables import VARIABLES
@@ -377,13 +378,13 @@ def test_trade__is_labelled_and_survives_its_file(tmp_path):
     for name in ds.variables:
         assert ds[name].attrs.get("units", "") == VARIABLES[name].units
         assert ds[name].dims == VARIABLES[name].dims
-    again = open_trade(write_trade(ds, tmp_path / "trade.nc"))
+    again = open_trade(write_dataset(ds, tmp_path / "trade.nc"))
     xr.testing.assert_equal(again, ds)
     assert again.attrs["recommendation"] == ds.attrs["recommendation"]
     with xr.open_dataset(tmp_path / "trade.nc") as plain:
         assert len(rv.plot.trade(plain).axes) == 2
     with pytest.raises(rv.InputError, match="is not a trade"):
-        open_trade(write_trade(ds[["error"]], tmp_path / "other.nc"))
+        open_trade(write_dataset(ds[["error"]], tmp_path / "other.nc"))
     with pytest.raises(rv.InputError, match="cannot be opened"):
         open_trade(tmp_path / "nowhere.nc")
 

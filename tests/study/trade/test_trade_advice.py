@@ -14,9 +14,9 @@ from support import ROUGH, STUDY, case_of, measured, numbers_told
 
 import roughvisc as rv
 from roughvisc.study.statement.case import read_study
+from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade import recommend
 from roughvisc.study.trade.apply import apply
-from roughvisc.study.trade.files import write_trade
 from roughvisc.study.trade.ladder import Setting
 from roughvisc.study.trade.reference import QUANTITIES
 from roughvisc.views.console.trade_table import trade_table
@@ -388,7 +388,7 @@ def test_figure__refuses_what_is_no_trade():
 
 
 def test_plot__draws_the_file_of_a_trade_and_a_folder_of_it(invoke, tmp_path):
-    write_trade(made_up(), tmp_path / "ball-trade" / "trade.nc")
+    write_dataset(made_up(), tmp_path / "ball-trade" / "trade.nc")
     for target, out, said in (
         ("ball-trade/trade.nc", (), "ball-trade/trade.png"),
         ("ball-trade", ("--out", "figures"), "figures/trade.png"),

@@ -1,0 +1,1 @@
+"""The whole error of one number, source by source."""

@@ -1,0 +1,262 @@
+"""``budget``: the whole error of one number, source by source, from a few more solves of the same case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError, RoughviscError
+from roughvisc.study.budget.quantities import Observable, known_quantity
+from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
+from roughvisc.study.budget.variants import Variants, check_share, with_rows
+from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.statement.case import Case, read_study
+from roughvisc.study.storage.store import result_path, whole_result
+from roughvisc.units import Quantity, in_si, quantities, stated_quantity
+from roughvisc.variables.axes import AXES
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Array = NDArray[np.float64]
+#: Folder of the further solves, in that of the results.
+FOLDER = "budget"
+
+
+@quantities(modulus_error="1", time_scale_error="1", cutoff="m")
+def budget(
+    case: Case | str | Path | xr.Dataset,
+    quantity: str | Sequence[str] = "contact_area",
+    *,
+    at: Sequence[Quantity] | Quantity | None = None,
+    sharp: bool = False,
+    modulus_error: Quantity | None = None,
+    time_scale_error: Quantity | None = None,
+    cutoff: Quantity | None = None,
+    population: Population = "patch",
+    out: str | Path | None = None,
+    client: Client | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    r"""The whole error of a number of a case: by source, and together.
+
+    Parameters
+    ----------
+    case : Case, path or xarray.Dataset
+        A case, the study file that states one, or a result, whose attribute ``case`` states it.
+    quantity : str or sequence of str
+        ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate``,
+        ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or
+        what is conducted.
+    at : float, str, or a sequence of these, optional
+        Times or speeds, as the study has them; text states the unit. Default: all that the study keeps.
+    sharp : bool
+        Compute the case on cells half as long too, which costs four times as much as the case, takes the value from
+        there, and makes the error of the grid some times smaller.
+    modulus_error, time_scale_error : float or str, optional
+        Relative errors of the moduli of the material and of its times, at 95 %: of a measured curve, or from batch
+        to batch. Without them these sources stay open. [-]
+    cutoff : float or str, optional
+        Shortest wavelength that the real surface has, where it ends or where it no longer counts. Without it the
+        waves that the scan does not hold stay open. [m]
+    population : {"patch", "ensemble"}
+        Whether the number is of this patch, or of the roughness that it is a sample of.
+    out : path, optional
+        Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
+    client, workers
+        Where to compute; as :func:`roughvisc.sweep` has them.
+    progress : bool
+        Show how far it is.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``source`` and ``time`` or ``speed``: ``half_width``, of the logarithm at 95 %, missing where a source is
+        open [-]; ``direction``, 1 or -1 of an error that only raises or lowers the number. Over ``source``:
+        ``method``, in words; ``cost``, wall time of the solves that it took [s]; ``state``, one of ``counted``,
+        ``none`` and ``open``. Over the places: ``value``, ``lower`` and ``upper``, in the unit of the quantity, and
+        ``case_cost`` [s]. Of several quantities, over ``quantity`` too.
+
+    Raises
+    ------
+    InputError
+        If the input is wrong, the result states no case, or its case has no such quantity.
+    RoughviscError
+        If a solve fails.
+
+    Notes
+    -----
+    Sources are taken as independent, in logarithms: :math:`Q e^{\pm U}`, :math:`U^2 = \sum U_i^2`; one with a
+    direction counts on that side alone. An open source counts nowhere: the interval is that of the others. A number
+    that is zero, as the leak rate of a closed gap, has no logarithm, and its interval is missing.
+
+    See Also
+    --------
+    roughvisc.audit : what the model leaves out.
+    """
+    found = budgets(
+        case,
+        [quantity] if isinstance(quantity, str) else list(quantity),
+        at=at,
+        sharp=sharp,
+        modulus_error=modulus_error,
+        time_scale_error=time_scale_error,
+        cutoff=cutoff,
+        population=population,
+        out=out,
+        client=client,
+        workers=workers,
+        progress=progress,
+    )
+    if isinstance(quantity, str):
+        return found[quantity]
+    names = xr.DataArray(list(found), dims="quantity", name="quantity")
+    together = xr.concat(list(found.values()), names, combine_attrs="drop_conflicts")
+    return together.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
+
+
+def budgets(
+    case: Case | str | Path | xr.Dataset,
+    names: Sequence[str],
+    *,
+    at: Sequence[Quantity] | Quantity | None = None,
+    sharp: bool = False,
+    modulus_error: Quantity | None = None,
+    time_scale_error: Quantity | None = None,
+    cutoff: Quantity | None = None,
+    population: Population = "patch",
+    out: str | Path | None = None,
+    client: Client | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+) -> dict[str, xr.Dataset]:
+    """Name of each of some quantities -> its :func:`budget`, all from the same solves."""
+    case, folder = case_of(case, out)
+    if not names:
+        raise InputError("quantity is empty: expected at least one")
+    experiment = case.experiment()
+    quantities = [known_quantity(name, experiment.axis, experiment.largest_speed > 0) for name in names]
+    if population not in get_args(Population):
+        raise InputError(f"population is {population!r}: expected {' or '.join(map(repr, get_args(Population)))}")
+    shortest = None if cutoff is None else stated_quantity(cutoff, "m", "cutoff", above=0)
+    fields = tuple(dict.fromkeys(field for one in quantities for field in one.fields))
+    axis = AXES[experiment.axis]
+    given = in_si(at, axis.variables[axis.name].units, "at")
+    places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
+    base = with_rows(case, places, fields)
+    asked = Asked(
+        Variants(base, base.height()),
+        sharp,
+        check_share("modulus_error", modulus_error),
+        check_share("time_scale_error", time_scale_error),
+        shortest,
+        population,
+    )
+    solves = asked.solves()
+    outcomes = run_cases(list(solves.values()), folder, watch=watcher(progress), client=client, workers=workers)
+    for name, one in solves.items():
+        if outcomes[one.key].entry is None:
+            raise RoughviscError(f"budget: the solve {name!r} failed: {outcomes[one.key].message}")
+    results = {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
+    try:
+        rows = _rows_at(results["own"], experiment.axis, places)
+        aligned = {name: _rows_at(one, experiment.axis, rows) for name, one in results.items()}
+        return {one.name: _of_quantity(asked, one, aligned) for one in quantities}
+    finally:
+        for one in results.values():
+            one.close()
+
+
+def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path]:
+    """The case, and the folder of its further solves."""
+    if isinstance(case, xr.Dataset):
+        if "case" not in case.attrs:
+            raise InputError("the result states no case: expected one of a study (rv.run, roughvisc run), or the study")
+        stated, source = Case.from_json(case.attrs["case"]), case.encoding.get("source")
+        beside = Path(source).parent if source else result_folder(stated)
+    else:
+        stated = case if isinstance(case, Case) else read_study(case)
+        beside = result_folder(stated)
+    return stated, Path(out).expanduser() if out is not None else beside / FOLDER
+
+
+def _rows_at(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
+    """The rows of a result nearest to some places of its axis; all rows where None. Slides have theirs by the cell."""
+    if places is None:
+        return result
+    wanted = np.asarray(places[axis].values if isinstance(places, xr.Dataset) else places, dtype=float)
+    nearest = np.abs(result[axis].values[:, None] - wanted).argmin(axis=0)
+    return result.isel({axis: nearest})
+
+
+def _of_quantity(asked: Asked, quantity: Observable, results: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """The budget of one quantity."""
+    observe = {} if (stated := asked.variants.case.settings.observe) is None else stated.stated()
+    values = {name: quantity.of(one, observe) for name, one in results.items()}
+    own, axis = results["own"], asked.variants.case.experiment().axis
+    stated_error = quantity.stated_error(own, values["own"])
+    judged = {source.name: source.judge(asked, quantity, values, stated_error) for source in SOURCES}
+    value = values["fine" if asked.sharp else "own"]
+    with np.errstate(invalid="ignore"):
+        known = np.where(np.abs(value) > 0, value, math.nan)
+    down, up = (_together(judged.values(), value.shape, side) for side in (-1, 1))
+    seconds = {name: float(one["wall_time"].values[-1]) for name, one in results.items()}
+    half_width = [
+        np.full(value.shape, math.nan) if one.half_width is None else one.half_width for one in judged.values()
+    ]
+    direction = [np.broadcast_to(one.direction, value.shape).astype("int8") for one in judged.values()]
+    cost = [sum(seconds[name] for name in one.solves) for one in judged.values()]
+    over, units = ("source", axis), {"units": quantity.units}
+    return xr.Dataset(
+        {
+            "half_width": (over, half_width, {"units": "1", "long_name": "half-width of the logarithm at 95 %"}),
+            "direction": (over, direction, _DIRECTION),
+            "state": ("source", [_state(one) for one in judged.values()], {"long_name": "whether a source counts"}),
+            "method": ("source", [one.method for one in judged.values()], {"long_name": "how it was found"}),
+            "cost": ("source", cost, {"units": "s", "long_name": "wall time of the solves that it took"}),
+            "value": (axis, value, units | {"long_name": quantity.name.replace("_", " ")}),
+            "lower": (axis, known * np.exp(-down), units | {"long_name": "lower bound at 95 %"}),
+            "upper": (axis, known * np.exp(up), units | {"long_name": "upper bound at 95 %"}),
+            "case_cost": ((), seconds["own"], {"units": "s", "long_name": "wall time of the case itself"}),
+        },
+        coords={"source": list(judged), axis: (axis, own[axis].values, {"units": AXES[axis].variables[axis].units})},
+        attrs={
+            "quantity": quantity.name,
+            "population": asked.population,
+            "case": asked.variants.case.to_json(),
+            "title": asked.variants.case.title,
+            "open": "; ".join(name for name, one in judged.items() if one.half_width is None),
+        },
+    )
+
+
+_DIRECTION = {
+    "long_name": "direction of the error",
+    "flag_values": np.array([-1, 0, 1], dtype="int8"),
+    "flag_meanings": "lowers both raises",
+}
+
+
+def _state(found: Found) -> Literal["counted", "none", "open"]:
+    if found.half_width is None:
+        return "open"
+    return "counted" if found.counts else "none"
+
+
+def _together(found: Any, shape: tuple[int, ...], side: int) -> Array:
+    """Half-width of all sources on one side."""
+    squares = np.zeros(shape)
+    for one in found:
+        if one.half_width is not None:
+            towards = np.broadcast_to(one.direction, shape)
+            squares += np.where((towards == 0) | (towards == side), one.half_width, 0.0) ** 2
+    return np.sqrt(squares)

@@ -1,0 +1,148 @@
+"""Quantities that a budget knows: what each takes from a result, and how the grid's error of it behaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.observables.conductance import conductance
+from roughvisc.observables.frozen import incremental_stiffness
+from roughvisc.observables.leakage import leakage
+from roughvisc.variables.axes import AXES
+
+Array = NDArray[np.float64]
+#: Keyword arguments of the observables, as ``[observe]`` of a study states them.
+Observe = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A number that a result has at each of its rows.
+
+    Attributes
+    ----------
+    name, units : str
+        As in a result.
+    derive : callable
+        Gives it over the axis, from a result and the arguments of its observable.
+    fields : tuple of str
+        Fields that it is derived from.
+    grid_factor : float
+        Safety factor of the error of the grid, by three grids. Measured on 72 rough surfaces.
+    octave_factor : float
+        What the next octave of waves changes, over what the last one did; measured likewise.
+    of_longest_waves : bool
+        Whether the longest waves of the height rule it.
+    stated : callable, optional
+        Error that the rows of a result state of it, in its unit. Default: the stated error of the row over the largest
+        value, which holds for any quantity that follows pressure or approach in proportion.
+    """
+
+    name: str
+    units: str
+    derive: Callable[[xr.Dataset, Observe], xr.DataArray]
+    fields: tuple[str, ...] = ()
+    grid_factor: float = 1.5
+    octave_factor: float = 1.1
+    of_longest_waves: bool = False
+    stated: Callable[[xr.Dataset, Array], Any] | None = None
+
+    def stated_error(self, result: xr.Dataset, values: Array) -> Array:
+        """What steps and solver leave of its logarithm, as the rows of a result state it. [-]"""
+        error = None if self.stated is None else self.stated(result, values)
+        if error is None:
+            error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.log1p(np.asarray(error, dtype=float) / np.abs(values))
+
+    def of(self, result: xr.Dataset, observe: Observe) -> Array:
+        """Its values in a whole result, over the axis."""
+        return np.asarray(self.derive(result, observe).values, dtype=float)
+
+
+def _stored(name: str) -> Callable[[xr.Dataset, Observe], xr.DataArray]:
+    return lambda result, observe: result[name]
+
+
+def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
+    return leakage(result, **observe.get("leakage", {}))["leak_rate"]
+
+
+def _thermal(result: xr.Dataset, observe: Observe) -> xr.DataArray:
+    stated = dict(observe.get("conductance", {}))
+    found = conductance(result, **stated) if stated else conductance(result, (1.0, 1.0), kind="thermal")
+    if "thermal_conductance" not in found:
+        raise InputError(
+            "quantity is 'thermal_conductance': the study observes an electrical one: expected a thermal one"
+        )
+    return found["thermal_conductance"]
+
+
+def _stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
+    return incremental_stiffness(result)["incremental_stiffness"]
+
+
+def _of_approach(result: xr.Dataset, values: Array) -> Any:
+    """The mean gap of a periodic surface is off by as much as the approach."""
+    return result["approach_error"].values if "approach_error" in result else None
+
+
+def _of_force(result: xr.Dataset, values: Array) -> Any:
+    return result["force_error"].values if "force_error" in result else None
+
+
+def _of_area(result: xr.Dataset, values: Array) -> Any:
+    """In proportion to the contact area, whose bounds are stated."""
+    if "contact_area_solver_lower" not in result:
+        return None
+    lower, upper = (result[f"contact_area_solver_{end}"].values for end in ("lower", "upper"))
+    return np.abs(values) * np.divide(upper - lower, 2 * upper, out=np.zeros_like(upper), where=upper > 0)
+
+
+def _of_gap(result: xr.Dataset, values: Array) -> Any:
+    """A leak rate changes by up to six times as much as the mean gap, near the load that closes the gap."""
+    if "approach_error" not in result:
+        return None
+    gap = np.abs(result["mean_gap"].values)
+    return np.abs(values) * np.divide(6 * result["approach_error"].values, gap, out=np.zeros_like(gap), where=gap > 0)
+
+
+#: name -> quantity
+QUANTITIES = {
+    one.name: one
+    for one in (
+        Observable("contact_area", "m^2", _stored("contact_area"), stated=_of_area),
+        Observable("mean_gap", "m", _stored("mean_gap"), grid_factor=1.0, of_longest_waves=True, stated=_of_approach),
+        Observable("approach", "m", _stored("approach"), of_longest_waves=True, stated=_of_approach),
+        Observable("force", "N", _stored("force"), stated=_of_force),
+        Observable("friction_coefficient", "1", _stored("friction_coefficient"), grid_factor=1.0),
+        Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), of_longest_waves=True, stated=_of_gap),
+        Observable("thermal_conductance", "W/K", _thermal, ("pressure",), stated=_of_area),
+        Observable("incremental_stiffness", "N/m", _stiffness, ("pressure",), stated=_of_area),
+    )
+}
+
+
+def known_quantity(name: Any, axis: str, slides: bool) -> Observable:
+    """A quantity by its name, where results over an axis have it.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or the results do not hold it.
+    """
+    if name not in QUANTITIES:
+        raise InputError(f"quantity is {name!r}: expected one of {', '.join(QUANTITIES)}")
+    if name == "friction_coefficient" and not slides:
+        raise InputError("quantity is 'friction_coefficient': expected a study in which the surface slides")
+    derived = QUANTITIES[name].fields
+    if not derived and name not in AXES[axis].variables:
+        has = ", ".join(one for one in QUANTITIES if QUANTITIES[one].fields or one in AXES[axis].variables)
+        raise InputError(f"quantity is {name!r}: results over {axis} have none: expected one of {has}")
+    return QUANTITIES[name]

@@ -1,0 +1,249 @@
+r"""Sources of error of a number, each by a formula of the logarithms of a few more solves.
+
+Of a number :math:`Q` its error is stated as :math:`\ln Q \pm U`. The factors were measured on rough surfaces whose true
+numbers were known: see docs/howto/whole-error.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.study.budget.quantities import Observable
+from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
+from roughvisc.study.statement.case import Case
+from roughvisc.units import unit_for
+
+Array = NDArray[np.float64]
+Population = Literal["patch", "ensemble"]
+#: Of two grids: the power with which the error of the grid is taken to vanish, and Roache's factor.
+_ORDER, _TWO_GRIDS = 1.5, 3.0
+#: Of six patches: of the standard deviation of the logarithm, what holds the mean of all in 95 of 100 (Student).
+_SAMPLE = 2.57
+#: A spectrum that ends at a wavelength has 99 % of its slope above a wavelength longer by up to this factor.
+_SAME = 1.15
+#: Fewer waves than these: the number hangs on the few that the patch happens to hold.
+_FEW_WAVES = 30.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is known of a budget beside its case.
+
+    Attributes
+    ----------
+    variants : Variants
+        The case and its relatives.
+    sharp : bool
+        Whether a grid twice as fine is computed, and gives the value.
+    modulus_error, time_scale_error : float or None
+        Relative errors of the material, at 95 %.
+    cutoff : float or None
+        Wavelength of the shortest waves that the real surface has. [m]
+    population : {"patch", "ensemble"}
+        Whether the number is of this patch, or of the roughness that it is a sample of.
+    """
+
+    variants: Variants
+    sharp: bool = False
+    modulus_error: float | None = None
+    time_scale_error: float | None = None
+    cutoff: float | None = None
+    population: Population = "patch"
+
+    def solves(self) -> dict[str, Case]:
+        """Name -> case of every solve that the sources need; ``own`` is the case itself."""
+        variants, found = self.variants, {"own": self.variants.case, "coarse": self.variants.on_cells(2.0)}
+        if self.sharp:
+            found["fine"] = variants.on_cells(0.5)
+        elif not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
+            found["coarsest"] = variants.on_cells(4.0)
+        if self.modulus_error:
+            found["stiffer"] = stiffer(found[self.compared])
+        if self.time_scale_error:
+            found["slower"] = slower(found[self.compared])
+        if self.octaves > 0:
+            found["smooth"] = variants.without_last_octave()
+        if self.population == "ensemble" and variants.is_rough:
+            found |= {f"patch {number}": variants.other_patch(number) for number in range(1, PATCHES + 1)}
+        if variants.case.settings.surface.taper:
+            found["mirrored"] = variants.mirrored()
+        return found
+
+    @property
+    def compared(self) -> str:
+        """The solve that one with another material is compared with: where few cells touch, on the case's own grid."""
+        return "coarse" if self.variants.is_rough else "own"
+
+    @property
+    def octaves(self) -> float:
+        """Octaves of waves that the real surface has beyond the shortest of this one; zero where that is not known."""
+        if self.cutoff is None or not self.variants.is_rough or self.variants.shortest_wave < _SAME * self.cutoff:
+            return 0.0
+        return math.log2(self.variants.shortest_wave / self.cutoff)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a source makes of a number.
+
+    Attributes
+    ----------
+    half_width : ndarray or None
+        Of the logarithm, at each place [-]; None where it is not known.
+    method : str
+        How it was found, or what would be needed to know it.
+    direction : int
+        1 or -1 of an error that only raises or lowers the number, 0 of any other; an array where places differ.
+    solves : tuple of str
+        The solves that it took, beside the first.
+    counts : bool
+        Whether the source has a meaning here.
+    """
+
+    half_width: Array | None
+    method: str
+    direction: Any = 0
+    solves: tuple[str, ...] = ()
+    counts: bool = True
+
+
+Values = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of error: its name, and what it makes of a quantity from the values of the solves and stated errors."""
+
+    name: str
+    judge: Callable[[Asked, Observable, Values, Array], Found] = field(repr=False)
+
+
+def _apart(values: Values, one: str, other: str) -> Array:
+    """Difference of the logarithms of two solves."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log(values[one]) - np.log(values[other])
+
+
+def _length(metres: float) -> str:
+    return unit_for(metres, "m").text(metres, 3)
+
+
+def _nothing(values: Values) -> Array:
+    return np.zeros_like(values["own"])
+
+
+def _time_and_solver(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    return Found(stated, "errors that the result states")
+
+
+def _grid(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    coarse = np.abs(_apart(values, "own", "coarse"))
+    if not asked.sharp:
+        solves, words = ("coarse",), "cells twice as long"
+        if "coarsest" in values:
+            coarse = np.maximum(coarse, np.abs(_apart(values, "coarse", "coarsest")) / 2**_ORDER)
+            solves, words = ("coarse", "coarsest"), "cells twice and four times as long"
+        return Found(_TWO_GRIDS * coarse / (2**_ORDER - 1), words, solves=solves)
+    fine = np.abs(_apart(values, "fine", "own"))
+    half = quantity.grid_factor * np.maximum(fine, coarse / 4)
+    return Found(half, "cells half and twice as long; the value is of the former", solves=("coarse", "fine"))
+
+
+def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if not asked.variants.is_rough:
+        return Found(_nothing(values), "the surface is the whole body, and no sample", counts=False)
+    if asked.population == "patch":
+        return Found(_nothing(values), "the number is of this patch", counts=False)
+    names = tuple(f"patch {number}" for number in range(1, PATCHES + 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = np.std(np.log([values[name] for name in names]), axis=0, ddof=1)
+    words = f"{PATCHES} Gaussian surrogates on cells twice as long"
+    closed = sum(not (values[name] > 0).all() for name in names)
+    if closed:  # zero has no logarithm
+        words += f"; zero in {closed} of them: not how large it is but how often it is zero is to be asked"
+    return Found(_SAMPLE * scatter, words, solves=names)
+
+
+def _next_octave(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if not asked.variants.is_rough:
+        return Found(_nothing(values), "the surface is no sample of a roughness", counts=False)
+    if asked.cutoff is None:
+        return Found(None, "state cutoff, the shortest wavelength that the real surface has")
+    if not asked.octaves:
+        return Found(_nothing(values), f"the grid holds all waves down to {_length(asked.cutoff)}")
+    change = _apart(values, "own", "smooth")
+    factor = quantity.octave_factor
+    if asked.variants.case.experiment().largest_speed > 0 and quantity.name == "contact_area":
+        factor = _SLIDING_OCTAVE
+    words = f"without the shortest octave; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
+    return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), ("smooth",))
+
+
+#: Of the contact area where it slides, what the next octave changes over what the last one did.
+_SLIDING_OCTAVE = 1.3
+
+
+def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if not asked.variants.is_rough:
+        return Found(_nothing(values), "the surface is no sample of a roughness", counts=False)
+    count = asked.variants.number_of_waves
+    if not quantity.of_longest_waves or count >= _FEW_WAVES:
+        return Found(_nothing(values), f"{count:.0f} waves carry the height", counts=False)
+    words = f"{count:.2g} waves carry the height (below {_FEW_WAVES:.0f})"
+    if asked.population == "patch":
+        return Found(_nothing(values), f"{words}: the number is of this patch alone", counts=False)
+    return Found(None, f"{words}, so that it depends on the size of the scan: scan a larger patch")
+
+
+def _modulus(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if asked.modulus_error is None:
+        return Found(None, "state modulus_error, the relative error of the moduli")
+    return _of_material(asked, asked.modulus_error, "stiffer", "moduli", values)
+
+
+def _time_scale(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if not _creeps(asked.variants.case):
+        return Found(_nothing(values), "the material does not creep", counts=False)
+    if asked.time_scale_error is None:
+        return Found(None, "state time_scale_error, the relative error of the times of the material")
+    return _of_material(asked, asked.time_scale_error, "slower", "times of the material", values)
+
+
+def _of_material(asked: Asked, error: float, solve: str, what: str, values: Values) -> Found:
+    """By the change that a tenth more makes."""
+    if not error:
+        return Found(_nothing(values), f"{what} are exact")
+    slope = np.abs(_apart(values, solve, asked.compared)) / math.log(STEP)
+    return Found(math.log1p(error) * slope, f"{what} {100 * (STEP - 1):.0f} % larger", solves=(solve,))
+
+
+def _creeps(case: Case) -> bool:
+    material = case.material()
+    at_once, later = (float(material.contact_compliance(time)) for time in (0.0, 1e-9))
+    end = case.experiment().creep_time(1.0)
+    return float(material.contact_compliance(end)) > at_once or later > at_once
+
+
+def _window(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if "mirrored" not in values:
+        return Found(_nothing(values), "the surface is not tapered", counts=False)
+    return Found(np.abs(_apart(values, "own", "mirrored")), "mirror images in place of the taper", solves=("mirrored",))
+
+
+#: In the order of a table.
+SOURCES = (
+    Source("time steps and solver", _time_and_solver),
+    Source("grid", _grid),
+    Source("sample", _sample),
+    Source("next octave of waves", _next_octave),
+    Source("longest waves", _longest_waves),
+    Source("modulus", _modulus),
+    Source("time scale", _time_scale),
+    Source("window", _window),
+)

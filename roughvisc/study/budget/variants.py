@@ -1,0 +1,143 @@
+"""The case of a budget with one thing changed: other cells, fewer waves, another patch, another material."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.settings import ENTRIES
+from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.trade.ladder import grid_change, is_data
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.spectrum import last_octave, modes
+
+#: By how much a modulus or a time scale is changed to see what a number makes of it.
+STEP = 1.1
+#: Gaussian surrogates that show the scatter of a patch.
+PATCHES = 6
+
+
+@dataclass(frozen=True)
+class Variants:
+    """One case and its relatives.
+
+    Parameters
+    ----------
+    case : Case
+        What the budget is of, with the rows and fields that it needs.
+    height : xarray.DataArray
+        Its surface. [m]
+    """
+
+    case: Case
+    height: xr.DataArray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells of the surface."""
+        return self.height.sizes["x"], self.height.sizes["y"]
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether the surface stands for a larger one: then another patch and shorter waves have a meaning."""
+        return self.case.solving().boundary == "periodic" and is_data(self.case)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no point is missing."""
+        return bool(np.isfinite(self.height.values).all())
+
+    @cached_property
+    def _waves(self) -> tuple[Any, Any, Any]:
+        """Length of each stored wavevector [rad/m], its power [m2], and how many modes it stands for."""
+        level = self.height.values - float(self.height.mean())
+        q_x, q_y, power, count = modes(level, spacing(self.height), "forward")
+        return np.hypot(q_x, q_y), power, count
+
+    @cached_property
+    def shortest_wave(self) -> float:
+        """Wavelength above which 99 % of the mean square slope lie; zero of a surface without slopes. [m]"""
+        q, power, count = self._waves
+        begins = last_octave(q, count * power * q**2)
+        return math.pi / begins if begins else 0.0
+
+    @cached_property
+    def number_of_waves(self) -> float:
+        """How many waves carry the height, if their amplitudes are Gaussian; of mirror images one of four counts."""
+        q, power, count = self._waves
+        power = np.where(q > 0, power, 0.0)
+        squares = float(np.sum(count * power**2))
+        images = 4 if self.case.settings.surface.mirror else 1
+        return float(np.sum(count * power)) ** 2 / squares / images if squares > 0 else 0.0
+
+    def on_cells(self, coarsening: float) -> Case:
+        """The same waves on cells so many times longer; a half: on cells half as long."""
+        surface = self.case.settings.surface
+        key, cells = grid_change(self.case, self.shape, coarsening, self.height.attrs.get("missing") == "absent")
+        if not is_data(self.case) or not (surface.resample or surface.band_limit):
+            return vary(self.case, {key: cells})
+        if coarsening > 1:  # the way in which the study itself made the grid
+            return vary(self.case, {"surface.resample" if surface.resample else key: cells})
+        held = max(surface.shortest_wave or 0.0, 2 * max(spacing(self.height)))  # a finer grid would hold more waves
+        return vary(self.case, {"surface.shortest_wave": held, "surface.resample": None, "surface.band_limit": cells})
+
+    def without_last_octave(self) -> Case:
+        """Without the shortest octave of its waves."""
+        return vary(self.case, {"surface.shortest_wave": 2 * self.shortest_wave})
+
+    def other_patch(self, number: int) -> Case:
+        """Another patch of the same roughness, as large as what was measured, on cells twice as long."""
+        mirrored = 2 if self.case.settings.surface.mirror else 1
+        cells = [max(2, round(n / mirrored / 2)) for n in self.shape]
+        changes = {"surface.mirror": False, "surface.taper": None, "surface.resample": None}
+        return vary(self.case, changes | {"surface.realisation": number, "surface.band_limit": cells})
+
+    def mirrored(self) -> Case:
+        """With its mirror images in place of a taper."""
+        return vary(self.case, {"surface.taper": None, "surface.mirror": True})
+
+
+def stiffer(case: Case) -> Case:
+    """With all moduli larger by :data:`STEP`."""
+    return vary(case, {"material.modulus_factor": STEP * case.settings.material.modulus_factor})
+
+
+def slower(case: Case) -> Case:
+    """With all times of the material longer by :data:`STEP`."""
+    material = case.settings.material
+    changes: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if getattr(material, key) is not None}
+    return vary(case, changes | {"material.shift_factor": STEP * material.shift})
+
+
+def with_rows(case: Case, places: Any, fields: tuple[str, ...]) -> Case:
+    """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
+    settings, experiment = case.solving(), case.experiment()
+    changes: dict[str, Any] = {"keep.fields": list(fields), "solve.grid_error": False}
+    if places is not None:
+        wanted = experiment.with_rows_at(settings, [float(one) for one in places])
+        changes |= _changed_settings(settings, wanted)
+    return vary(case, changes)
+
+
+def _changed_settings(before: Any, after: Any) -> Mapping[str, Any]:
+    """Keys of a study that turn settings into others."""
+    return {
+        f"{one.table}.{name}": list(value) if isinstance(value, tuple) else value
+        for name, one in ENTRIES.items()
+        if (value := getattr(after, name)) != getattr(before, name)
+    }
+
+
+def check_share(name: str, value: float | None) -> float | None:
+    """A relative error that is given, checked."""
+    if value is not None and not (isinstance(value, int | float) and 0 <= value < 1):
+        raise InputError(f"{name} is {value!r}: expected a relative error, at least 0 and below 1")
+    return value

@@ -1,0 +1,275 @@
+"""The whole error of one number: sources against closed forms, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.budget.budget import budgets
+
+BALL = """
+title = "Ball"
+[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.2 mm"
+shape = [45, 45]
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+load = "0.2 mN"
+over = 0
+[[program]]
+hold = "1 s"
+[keep]
+times = [0.0, 1.0]
+"""
+ROUGH = """
+title = "Rough"
+[surface]
+generate = "self_affine"
+size = ["1 mm", "0.9 mm"]
+shape = [54, 50]
+hurst = 0.8
+rms_slope = 0.2
+rolloff = "0.3 mm"
+amplitudes = "gaussian"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+pressure = "50 kPa"
+over = 0
+[[program]]
+hold = "1 s"
+[solve]
+boundary = "periodic"
+tolerance = 1e-2
+[keep]
+times = [0.01, 1.0]
+"""
+
+
+def case(text, tmp_path, **changes):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    return rv.vary(rv.read_study(path), changes)
+
+
+def stated(study, tmp_path, quantity, **options):
+    return rv.budget(study, quantity, out=tmp_path / "budget", workers=0, progress=False, **options)
+
+
+def width(found, source, row=-1):
+    return float(found["half_width"].sel(source=source)[row])
+
+
+def test_budget__holds_hertz(tmp_path):
+    """Radius of contact and approach of a paraboloid: a^3 = 3 F R / (4 E*), d = a^2 / R, with E* = 4 G."""
+    study = case(BALL, tmp_path)
+    radius = (3 * 2e-4 * 1e-3 / (4 * 4e6)) ** (1 / 3)
+    exact = {"contact_area": np.pi * radius**2, "approach": radius**2 / 1e-3, "force": 2e-4}
+    found = budgets(study, list(exact), out=tmp_path / "budget", workers=0, progress=False)
+    for name, true in exact.items():
+        one = found[name]
+        assert (one["lower"] <= true * (1 + 1e-12)).all(), name
+        assert (true <= one["upper"] * (1 + 1e-12)).all(), name
+        assert (np.log(one["upper"] / one["lower"]) < 0.4).all(), name
+
+
+def test_budget__of_an_indenter_says_that_samples_and_waves_have_no_meaning(tmp_path):
+    found = stated(case(BALL, tmp_path), tmp_path, "contact_area", population="ensemble", cutoff=1e-6)
+    states = dict(zip(found["source"].values.tolist(), found["state"].values.tolist(), strict=True))
+    assert [states[name] for name in ("sample", "next octave of waves", "longest waves", "window")] == ["none"] * 4
+    assert "no sample" in str(found["method"].sel(source="sample").values)
+    assert states["time scale"] == "none"
+    assert found.attrs["open"] == "modulus"
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("contact_area", 2 / 3), ("approach", 2 / 3), ("force", 0.0)])
+def test_budget__modulus_of_a_hertz_contact(tmp_path, quantity, power):
+    """Area and approach under a load go with the modulus to the power -2/3; an area is counted in cells."""
+    fine = case(BALL, tmp_path, **{"surface.shape": [131, 131]})
+    found = stated(fine, tmp_path, quantity, modulus_error=0.05)
+    assert width(found, "modulus") == pytest.approx(power * np.log(1.05), rel=0.1, abs=1e-9)
+
+
+def test_budget__time_scale_of_a_fluid_under_a_ball(tmp_path):
+    """a^3 goes with J = 1/G + t/eta: its logarithm changes with that of the times by -(t/eta) / J."""
+    changes = {"material": {"model": "maxwell", "shear_modulus": "1 MPa", "viscosity": "1 MPa s"}}
+    study = case(BALL, tmp_path, **changes, **{"program.0.load": "0.05 mN"})
+    found = stated(study, tmp_path, "approach", time_scale_error=0.05)
+    assert width(found, "time scale", 0) == pytest.approx(0.0, abs=1e-6)
+    slope = np.log((1 + 1 / 1.1) / 2) / np.log(1.1)  # between the times and those a tenth longer
+    assert width(found, "time scale") == pytest.approx(-2 / 3 * slope * np.log(1.05), rel=0.03)
+
+
+def test_budget__grid_of_two_and_three(tmp_path):
+    study = case(ROUGH, tmp_path)
+    cheap, sharp = (stated(study, tmp_path, "contact_area", sharp=sharp) for sharp in (False, True))
+    near = np.log(sharp["value"] / cheap["value"])
+    assert (np.abs(near) < cheap["half_width"].sel(source="grid")).all()
+    assert (sharp["half_width"].sel(source="grid") >= 1.5 * np.abs(near) - 1e-12).all()
+    assert (sharp["half_width"].sel(source="grid") < cheap["half_width"].sel(source="grid")).all()
+
+
+def test_budget__missing_waves_count_on_one_side(tmp_path):
+    """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
+    study = case(ROUGH, tmp_path)
+    one = budgets(study, ["contact_area", "mean_gap"], out=tmp_path / "b", cutoff="18 um", workers=0, progress=False)
+    two = budgets(study, ["contact_area", "mean_gap"], out=tmp_path / "b", cutoff="9 um", workers=0, progress=False)
+    octave = "next octave of waves"
+    assert (one["contact_area"]["direction"].sel(source=octave) == -1).all()
+    assert (one["mean_gap"]["direction"].sel(source=octave) == 1).all()
+    for found in one.values():
+        down, up = (np.abs(np.log(found[end] / found["value"])) for end in ("lower", "upper"))
+        missed = found["half_width"].sel(source=octave)
+        both = (found["half_width"] * (found["direction"] == 0)).sum("source")
+        assert (missed > 0.05 * both).all()
+        first, other = (down, up) if found is one["contact_area"] else (up, down)
+        assert (first > missed - 1e-12).all()
+        assert (other < both + 1e-12).all()
+    ratio = [width(found["contact_area"], octave) for found in (one, two)]
+    shortest = 2 ** (ratio[0] / (ratio[1] - ratio[0])) * 18e-6  # both follow from one wavelength and one change
+    assert 2 * 1e-3 / 54 < shortest < 2.4 * 1e-3 / 54
+
+
+def test_budget__holds_the_waves_that_a_finer_grid_shows(tmp_path):
+    """The same surface with its waves down to the cut-off, on a grid that holds them."""
+    fine = case(ROUGH, tmp_path, **{"surface.shape": [216, 200], "surface.shortcut": "18.6 um"})
+    scan = rv.vary(fine, {"surface.band_limit": [54, 50]})
+    true = rv.run(fine, out=tmp_path / "true", progress=False)
+    for name in ("contact_area", "mean_gap"):
+        found = stated(scan, tmp_path, name, cutoff="18.6 um", modulus_error=0.0, time_scale_error=0.0)
+        assert found.attrs["open"] == ""
+        assert (found["lower"] < true[name]).all()
+        assert (true[name] < found["upper"]).all()
+
+
+def test_budget__sample_is_the_scatter_of_other_patches(tmp_path):
+    study = case(ROUGH, tmp_path)
+    patch, ensemble = (stated(study, tmp_path, "mean_gap", population=one) for one in ("patch", "ensemble"))
+    assert width(patch, "sample") == 0
+    gaps = []
+    for seed in range(20, 32):
+        other = rv.vary(study, {"surface.seed": seed, "surface.band_limit": [27, 25]})
+        gaps.append(rv.run(other, out=tmp_path / "others", progress=False)["mean_gap"].values[-1])
+    scatter = np.std(np.log(gaps), ddof=1)
+    assert 0.3 < width(ensemble, "sample") / (2.57 * scatter) < 3  # 6 and 12 draws
+    assert ensemble["upper"][-1] > patch["upper"][-1]
+
+
+def test_budget__of_friction_knows_its_slope_over_speed(tmp_path):
+    """Times a tenth longer are speeds a tenth higher."""
+    text = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\nspeeds = [1e-3]\npressure = "50 kPa"\n'
+    text += '[solve]\nboundary = "periodic"\n'
+    study = case(text, tmp_path)
+    found = stated(study, tmp_path, "friction_coefficient", time_scale_error=0.05)
+    faster = []
+    for speed in (1e-3, 1.1e-3):
+        coarse = rv.vary(study, {"surface.band_limit": [27, 25], "friction.speeds": [speed]})
+        faster.append(float(rv.run(coarse, out=tmp_path / "curve", progress=False)["friction_coefficient"][0]))
+    slope = abs(np.log(faster[1] / faster[0])) / np.log(1.1)
+    assert width(found, "time scale") == pytest.approx(slope * np.log(1.05), rel=1e-3)
+    assert found["value"].dims == ("speed",)
+
+
+def test_budget__of_a_tapered_surface_compares_with_its_mirror_images(tmp_path):
+    study = case(ROUGH, tmp_path, **{"surface.taper": ["0.1 mm", "0.1 mm"]})
+    found = stated(study, tmp_path, "contact_area")
+    assert width(found, "window") > 0.01
+    assert str(found["state"].sel(source="window").values) == "counted"
+
+
+def test_budget__of_a_mirrored_scan_takes_patches_of_its_own_size(tmp_path):
+    scan = rv.self_affine((1e-3, 0.9e-3), (40, 36), hurst=0.8, rms_slope=0.2, rolloff=3e-4, seed=3)
+    rv.save_scan(scan, tmp_path / "scan.x3p")
+    text = ROUGH.replace(
+        ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")], 'file = "scan.x3p"\nmirror = true\n'
+    )
+    found = stated(case(text, tmp_path), tmp_path, "contact_area", population="ensemble", sharp=True)
+    assert 0 < width(found, "sample") < 1
+    shapes = set()
+    for path in (tmp_path / "budget").glob("*.nc"):
+        with xr.open_dataset(path) as one:
+            shapes.add((json.loads(one.attrs["case"])["surface"].get("realisation"), *one["height"].shape))
+    assert {shape for shape in shapes if shape[0]} == {(number, 20, 18) for number in range(1, 7)}
+    assert {shape[1:] for shape in shapes if not shape[0]} == {(80, 72), (40, 36), (160, 144)}
+
+
+def test_budget__of_a_resampled_scan_keeps_its_waves(tmp_path):
+    """A finer grid for the error of the grid shows no waves that the study has left out."""
+    whole = case(ROUGH, tmp_path, **{"surface.shape": [216, 200]})
+    study = rv.vary(whole, {"surface.resample": [54, 50]})
+    found = stated(study, tmp_path, "mean_gap", sharp=True)
+    plain = case(ROUGH, tmp_path, **{"surface.shape": [216, 200], "surface.band_limit": [54, 50]})
+    np.testing.assert_allclose(found["value"], stated(plain, tmp_path, "mean_gap", sharp=True)["value"], rtol=1e-6)
+    gaps = [rv.run(one, out=tmp_path / "own", progress=False)["mean_gap"] for one in (study, whole)]
+    apart = [np.abs(np.log(one / found["value"])) for one in gaps]
+    assert (apart[0] < 0.3 * apart[1]).all()
+
+
+def test_budget__keeps_its_solves(tmp_path, monkeypatch):
+    study = case(BALL, tmp_path)
+    first = stated(study, tmp_path, "contact_area", modulus_error=0.05)
+    monkeypatch.setattr("roughvisc.study.execution.run.compute", None)
+    xr.testing.assert_identical(stated(study, tmp_path, "contact_area", modulus_error=0.05), first)
+
+
+def test_budget__of_a_result_and_at_a_time(tmp_path):
+    study = case(BALL, tmp_path)
+    result = rv.run(study, out=tmp_path / "results", progress=False)
+    found = rv.budget(result, at=1.0, workers=0, progress=False)
+    assert found["time"].values.tolist() == [1.0]
+    assert (tmp_path / "results" / "budget").is_dir()
+    assert float(found["value"][0]) == pytest.approx(float(result["contact_area"][-1]), rel=1e-6)
+
+
+def test_budget__of_several_quantities_states_their_units(tmp_path):
+    found = stated(case(BALL, tmp_path), tmp_path, ["contact_area", "approach"])
+    assert found["units"].values.tolist() == ["m^2", "m"]
+    assert found["value"].dims == ("quantity", "time")
+
+
+def test_budget__of_a_closed_gap_has_no_interval(tmp_path):
+    """The leak rate of a map in which contact percolates is zero: a probability, and no logarithm."""
+    study = case(ROUGH, tmp_path, **{"program.0.pressure": "3 MPa"})
+    found = stated(study, tmp_path, "leak_rate", population="ensemble")
+    assert (found["value"] == 0).all()
+    assert "zero in 6 of them" in str(found["method"].sel(source="sample").values)
+    assert np.isnan(found["lower"]).all()
+    assert np.isnan(found["upper"]).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"quantity": "area"}, "quantity is 'area': expected one of contact_area"),
+        ({"quantity": []}, "quantity is empty"),
+        ({"quantity": "friction_coefficient"}, "expected a study in which the surface slides"),
+        ({"population": "all"}, "population is 'all': expected 'patch' or 'ensemble'"),
+        ({"modulus_error": 1.5}, "modulus_error is 1.5: expected a relative error"),
+        ({"time_scale_error": -0.1}, "time_scale_error is -0.1"),
+        ({"cutoff": "2 kg"}, "cutoff"),
+        ({"cutoff": 0.0}, "cutoff"),
+        ({"at": 7.0}, "7 s"),
+    ],
+)
+def test_budget__refuses(tmp_path, options, message):
+    with pytest.raises(InputError, match=message):
+        stated(case(BALL, tmp_path), tmp_path, **{"quantity": "contact_area", **options})
+    assert not (tmp_path / "budget").exists()
+
+
+def test_budget__refuses_a_result_that_states_no_case():
+    ball = rv.sphere(1e-3, 2e-4, 15)
+    result = rv.simulate(ball, rv.elastic(1e6), rv.Program().load(1e-4, over=0), progress=False)
+    with pytest.raises(InputError, match="the result states no case"):
+        rv.budget(result)
