@@ -137,6 +137,8 @@ def test_command_line__plans_runs_draws_reports_and_audits(study, tmp_path, invo
     said = invoke("run", study, "--out", out)
     assert "Loads" in said
     assert "3, from F = 5 mN to F = 20 mN" in said
+    assert {path.name.rpartition("-")[2] for path in out.glob("*.png")} == {"history.png", "maps.png"}
+    invoke("plot", "--all", out)
     pictures = {path.name.rpartition("-")[2] for path in out.glob("*.png")}
     assert {"history.png", "maps.png", "section.png", "distributions.png", "surface.png"} <= pictures
     result = next(out.glob("*.nc"))
@@ -180,7 +182,7 @@ def test_study__refuses_what_has_no_meaning(study):
         with pytest.raises(rv.InputError, match=message):
             read_study(study)
     study.write_text(STUDY + '[[program]]\nload = "1 N"\nover = 0\n')
-    with pytest.raises(rv.InputError, match=r"program: found beside \[stack\]: expected one of them"):
+    with pytest.raises(rv.InputError, match=r"program: found together with \[stack\]: expected one of them"):
         read_study(study)
     study.write_text(STUDY.replace('loads = ["5 mN", "10 mN", "20 mN"]', 'loads = ["5 m"]'))
     with pytest.raises(rv.InputError, match=r"stack\.loads\.0: found '5 m'"):

@@ -136,5 +136,5 @@ def test_friction__slides_under_the_nominal_pressure_of_the_rest():
 def test_history__has_an_axis_of_the_fraction_only_where_area_and_fraction_are_proportional():
     for h, shown in ((rough(1), True), (rv.taper(rough(1), 1e-4), False)):
         ds = simulate_whole(h, RUBBER, rv.Program().pressure(4e4, over=1), **OPTIONS | {"times": [0.1, 0.5, 1]})
-        labels = [child.get_ylabel() for ax in rv.plot.history(ds).axes for child in ax.child_axes]
+        labels = [child.get_ylabel().replace("\n", " ") for ax in rv.plot.history(ds).axes for child in ax.child_axes]
         assert ("of nominal [%]" in labels) == shown

@@ -37,6 +37,7 @@ over = 0
 [[program]]
 hold = "0.2 s"
 [solve]
+boundary = "free"
 tolerance = 1e-2
 [keep]
 fields = ["pressure", "displacement"]
@@ -206,7 +207,7 @@ DEFAULTS = {
     "anisotropy": 1.0,
     "amplitudes": "fixed",
     "seed": 0,
-    "boundary": "free",
+    "boundary": "auto",
     "tolerance": 1e-3,
     "time_step": "auto",
     "method": "fast",

@@ -155,12 +155,8 @@ _AGAIN = 1.5
 _WRITE, _ROUNDED = 3e-9, 0.5
 #: An approach leaves a window that reaches this much deeper.
 _BEYOND = 1.05
-#: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are taken to be
-#: compressed: the writer asks for the time that it takes, too.
-_CHUNK, _COMPRESSED = 8, 0.5
-#: Part of the time of a run that its fields may be compressed in, the time that takes [s a byte], and to which part
-#: a gap comes down, as :mod:`roughvisc.study.storage.store` has measured them.
-_SHARE, _PACK, _PACKED = 0.05, 16e-9, 0.7
+#: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed.
+_CHUNK, _COMPRESSED = 8, 0.3
 
 
 class Passed(NamedTuple):
@@ -544,7 +540,7 @@ def bytes_needed(
     return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
-def disk(case: Case, cells: int, found: CostEstimate, seconds: float = 0.0) -> float:
+def disk(case: Case, cells: int, found: CostEstimate) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
     rows = found.rows
@@ -553,9 +549,6 @@ def disk(case: Case, cells: int, found: CostEstimate, seconds: float = 0.0) -> f
     kept = np.array(found.kept or (found.contact,))
     few = kept[len(kept) // 2] < _COMPRESSED  # the frame that the writer asks
     names = case.settings.keep.fields
-    # the writer compresses what takes a twentieth of the time of the run at most
-    spare = _SHARE * seconds / max(8.0 * cells * found.rows * len(names), 1.0)
-    dense = min(dense, _PACKED) if spare >= _PACK else dense
     pressure = found.rows * (float(np.mean(kept)) + 0.01) if few else rows * dense
     fields = sum(pressure if name == "pressure" else rows * dense for name in names)
     return 40e3 + 8.0 * cells * (fields + 1.0) + found.rows * 120 + found.steps * 8 * len(STEPPED)

@@ -388,7 +388,7 @@ def _row(
         "half_memory": needed(cells // 4),
         "rms_slope": surface.slope,
         "half_rms_slope": surface.half_slope,
-        "disk": disk(case, cells, found, seconds),
+        "disk": disk(case, cells, found),
     }
 
 
@@ -453,7 +453,7 @@ def _general_row(
         "convolutions": found.convolutions,
         "wall_time": found.convolutions * convolution,
         "memory": needed(cells),
-        "disk": disk(case, cells, found, found.convolutions * convolution),
+        "disk": disk(case, cells, found),
     }
 
 

@@ -12,7 +12,6 @@ import math
 import os
 import secrets
 import shutil
-import time
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -39,14 +38,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-#: A field is compressed if it then takes less than the first part, exact, or rounded to a precision, which takes
-#: a tenth of a step at most; or less than the other part, if that costs a run little of its own time. At 512 squared
-#: a step takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the
-#: cells comes down to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes
-#: longer); a gap rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms.
-_WORTHWHILE, _WORTHWHILE_ROUNDED, _SMALLER = 0.25, 0.5, 0.9
-#: Part of the time of a run that compressing all its fields may take, by a sample: half of what it then really takes.
-_SHARE = 0.05
+#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
+#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
+#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
+#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms, which would slow a run by more than a tenth.
+_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.25, 0.5
 _SMALL = 1 << 16  # compressed in any case [bytes]
 _TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
 
@@ -72,8 +68,8 @@ def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
     return min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
 
 
-def encoding_of(name: str, variable: xr.Variable, precision: float | None, seconds: float = 0.0) -> dict[str, Any]:
-    """What netCDF4 is told of a variable, which may take so long to compress. [s]"""
+def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
+    """What netCDF4 is told of a variable."""
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and may_be_missing(name):
         encoding["fill_value"] = variable.dtype.type(np.nan)
@@ -82,35 +78,23 @@ def encoding_of(name: str, variable: xr.Variable, precision: float | None, secon
         encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
     if variable.nbytes > _TINY:
         encoding["chunksizes"] = chunks(variable.shape)
-        encoding |= _filters(variable, bits, seconds)
+        encoding |= _filters(variable, bits)
     return encoding
 
 
-def _filters(variable: xr.Variable, bits: int | None, seconds: float) -> dict[str, Any]:
+def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
     """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
     middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
     sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
     if bits is not None:
         sample = (sample.view(np.int64) & -(1 << (52 - bits))).view(float)  # cut off compresses as rounded
     shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
-    tried = []
-    for shuffle, text in enumerate((sample, shuffled)):
-        began = time.perf_counter()
-        size = len(zlib.compress(text.tobytes(), 1)) / sample.nbytes
-        tried.append((size, bool(shuffle), (time.perf_counter() - began) * variable.nbytes / sample.nbytes))
-    size, shuffle, takes = min(tried)
-    at_once = _WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED
-    if variable.nbytes <= _SMALL or size <= at_once or (size <= _SMALLER and takes <= seconds):
-        return {"zlib": True, "complevel": 1, "shuffle": shuffle}
-    return {}
-
-
-def _seconds_a_field(whole: xr.Dataset) -> float:
-    """How long each field of a result may take to compress, by the time that its run took. [s]"""
-    fields = sum(is_field(one) and one.nbytes > _SMALL for one in whole.variables.values())
-    if not fields or "wall_time" not in whole or not whole["wall_time"].size:
-        return 0.0
-    return _SHARE * float(whole["wall_time"].max()) / fields
+    size, shuffle = min(
+        (len(zlib.compress(text.tobytes(), 1)), shuffle) for shuffle, text in enumerate((sample, shuffled))
+    )
+    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
+        return {}
+    return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
 
 
 log = logging.getLogger("roughvisc")
@@ -253,20 +237,19 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 
     Notes
     -----
-    zlib level 1, the one filter that every reader has, where it saves space and takes a twentieth of the time of the
-    run at most, by a sample.
+    zlib level 1, the one filter that every reader has, where it saves much, by a sample.
     ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
     whole = annotate(to_current(whole_of(dataset))).assign_attrs(_NEEDED_ATTRIBUTES)
-    parts, seconds = split(whole), _seconds_a_field(whole)
+    parts = split(whole)
     parts[""] = _with_bounds(parts[""])
     parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
     with atomic_write(path) as temporary:
         try:
             with _new_file(temporary) as file:
                 # all are declared before any is written: each change of mode would write the file's metadata anew
-                declared = [_declare_part(file, group, part, precision, seconds) for group, part in parts.items()]
+                declared = [_declare_part(file, group, part, precision) for group, part in parts.items()]
                 for written, variable in [pair for pairs in declared for pair in pairs]:
                     _write(written, variable)
             append_checksum(temporary)
@@ -283,7 +266,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 
 
 def _declare_part(
-    file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None, seconds: float
+    file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None
 ) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """The variables of the root or of a group as they are declared in the file, and what is to be written to them."""
     with NETCDF:
@@ -292,10 +275,7 @@ def _declare_part(
         for dimension, size in part.sizes.items():
             if dimension not in file.dimensions:  # the root's are the groups' too
                 place.createDimension(str(dimension), size)
-    return [
-        (_declare(place, str(name), variable, precision, seconds), variable)
-        for name, variable in part.variables.items()
-    ]
+    return [(_declare(place, str(name), variable, precision), variable) for name, variable in part.variables.items()]
 
 
 def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
@@ -352,11 +332,9 @@ def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
             file.close()
 
 
-def _declare(
-    file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None, seconds: float
-) -> netCDF4.Variable:
+def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None) -> netCDF4.Variable:
     """Make room for a variable, with its attributes."""
-    encoding = encoding_of(name, variable, precision, seconds)  # outside the lock, which reading a sample may need
+    encoding = encoding_of(name, variable, precision)  # outside the lock, which reading a sample may need
     with NETCDF:
         declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
         declared.set_auto_maskandscale(False)

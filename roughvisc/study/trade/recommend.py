@@ -20,7 +20,7 @@ TARGETS = (1e-2, 1e-3)
 _ALIKE = 1.1
 #: What quantities are called in words.
 WORDS = {
-    name: VARIABLES[name].short
+    name: VARIABLES[name].label.lower()
     for name in ("friction_coefficient", "contact_area", "pressure", "approach", "contact_area_counted", "mean_gap")
 }
 

@@ -104,7 +104,7 @@ def test_direct_history__is_offered_where_steps_of_a_thousandth_do_not_ring(dura
     choice = choose_memory(fluid(0.505 * shortest), duration, 1e-3, kind="direct")
     assert isinstance(choice.memory, History)
     assert (choice.series_error, choice.note) == (0.0, "direct history of every pressure, as asked for")
-    with pytest.raises(rv.InputError, match="rings on this material"):
+    with pytest.raises(rv.InputError, match="oscillates for this material"):
         choose_memory(fluid(0.495 * shortest), duration, 1e-3, kind="direct")
 
 

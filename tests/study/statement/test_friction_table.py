@@ -73,7 +73,11 @@ def test_case__states_a_curve_and_survives_its_text(read):
         ("load = 1\nspeeds = 1", PERIODIC + 'edge = "accept"', r"solve\.edge: found 'accept'"),
         ("load = 1\nspeeds = 1", PERIODIC + "[keep]\ntimes = 3", r"keep\.times: found 3: steady sliding has none"),
         ("load = 1\nspeeds = 1", PERIODIC + '[keep]\nfields = ["displacement"]', r"keep\.fields: found 'displacement'"),
-        ("load = 1\nspeeds = 1", PERIODIC + "[[program]]\nload = 1\nover = 0", r"program: found beside \[friction\]"),
+        (
+            "load = 1\nspeeds = 1",
+            PERIODIC + "[[program]]\nload = 1\nover = 0",
+            r"program: found together with \[friction\]",
+        ),
     ],
 )
 def test_study__refuses_in_one_sentence(read, friction, rest, message):

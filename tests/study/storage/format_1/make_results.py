@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import roughvisc as rv
-from roughvisc.study.trade.files import write_trade
+from roughvisc.study.storage.store import write_dataset
 
 HERE = Path(__file__).parent
 
@@ -104,4 +104,4 @@ if __name__ == "__main__":
         run = rv.sweep if name == "sweep" else rv.run
         run(path, out=HERE / name, progress=False)
         rv.observe(path, out=HERE / name)
-    write_trade(rv.trade(HERE / "creep.toml", budget=20, progress=False), HERE / "trade.nc")
+    write_dataset(rv.trade(HERE / "creep.toml", budget=20, progress=False), HERE / "trade.nc")
