@@ -191,7 +191,7 @@ def boundary_of_card(path: Path) -> Literal["free", "periodic"] | None:
     InputError
         If the card cannot be read.
     """
-    card = read_toml(path, "surface card in TOML")
+    card = read_toml(path, "a surface card in TOML")
     steps, recipe = card.get("conditioning", {}), card.get("generate")
     known = isinstance(steps, Mapping) and isinstance(recipe, str | None)  # else it is refused where it is opened
     return boundary_after(steps, BOUNDARIES.get(recipe or "")) if known else None

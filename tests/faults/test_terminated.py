@@ -89,7 +89,7 @@ sys.meta_path.insert(0, Finder())
 sys.argv = ["roughvisc", "run", "s.toml"]
 runpy.run_module("roughvisc", run_name="__main__")
 """
-LATER_MODULES = "roughvisc.cli.upkeep", "rich.console", "numpy.random"
+LATER_MODULES = "roughvisc.cli.upkeep", "rich.console", "xarray"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

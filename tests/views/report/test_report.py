@@ -235,7 +235,7 @@ def test_table__of_many_parameters_has_them_in_one_column(tmp_path):
 @pytest.mark.thorough
 def test_datasets__without_a_study_say_so(tmp_path):
     out = report(made.rough_creep(), tmp_path / "one.html")
-    assert "does not record the whole computation" in out.read_text()
+    assert "do not record the whole study" in out.read_text()
     with pytest.raises(InputError, match="expected the name of the page"):
         report([made.one_frame()])
 

@@ -392,7 +392,8 @@ def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures)
 
     done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path)])
     assert done.exit_code == 0
-    assert done.output.count("sweep-") == 3
+    assert done.output == f"9 figures: {tmp_path}\n"
+    assert len(list(tmp_path.glob("sweep-*.png"))) == 3
     names = {path.name for path in tmp_path.glob("*-history.png")}
     assert len(names) == 6
     assert "load_5mN-hold_0.2s-history.png" in names
