@@ -1,13 +1,14 @@
 """Does the stated interval hold the truth? Rough surfaces whose true numbers are known, each measured coarsely.
 
-    python workflows/benchmarks/whole_error.py [--first N] [--count N] [--out whole_error.jsonl] [--friction]
+    python workflows/benchmarks/whole_error.py [--first N] [--count N] [--out whole_error.jsonl] [--friction] [--seed N]
 
 A true surface has waves down to a cut-off of its own on a grid four times finer than that of its scan, which holds the
 waves of two of its cells and longer ones. ``rv.budget`` sees the scan and the cut-off. It is compared with the number
 of the true surface (``patch``) and with the mean of the logarithms of 24 other surfaces of the same recipe on cells
 half as long as the scan's (``ensemble``). Five families (Hurst exponent, cut-off in cells of the scan), three loads and
 three materials give 45 scenes, each with three times, or with ``--friction`` with three speeds: 135 cases for each
-quantity. Lines are appended to OUT; scenes that are found there are not run again. At the end the coverage is printed,
+quantity. Lines are appended to OUT; scenes that are found there are not run again. The factors
+of the budget were chosen on the surfaces of ``--seed 1``; the default are others. At the end the coverage is printed,
 by quantity and population, with the median half-width over the median error and the cost over that of one solve.
 """
 
@@ -44,7 +45,7 @@ LOADED = ("contact_area", "mean_gap", "leak_rate", "thermal_conductance")
 SLIDING = ("friction_coefficient", "contact_area", "mean_gap")
 
 
-def main(first=0, count=45, out="whole_error.jsonl", friction=False):
+def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2):
     """Run the scenes that are not in the record yet, and print what was found."""
     record = Path(out)
     lines = [json.loads(line) for line in record.read_text().splitlines()] if record.exists() else []
@@ -54,7 +55,7 @@ def main(first=0, count=45, out="whole_error.jsonl", friction=False):
         if (number, friction) in known:
             continue
         began = time.perf_counter()
-        line = {"scene": number, "friction": friction, **scene(*scenes[number], number, friction)}
+        line = {"scene": number, "friction": friction, **scene(*scenes[number], number, friction, seed)}
         lines.append(line)
         with record.open("a") as file:
             file.write(json.dumps(line) + "\n")
@@ -101,10 +102,10 @@ def numbers(text, names, folder):
     return {name: QUANTITIES[name].of(result, {}) for name in names}
 
 
-def scene(family, load, material, number, friction):
+def scene(family, load, material, number, friction, start):
     """Budgets of one scene, and its truths."""
     names = SLIDING if friction else LOADED
-    cutoff, seed = FAMILIES[family][1], 1000 + number
+    cutoff, seed = FAMILIES[family][1], 1000 * start + number
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scan.toml"
         path.write_text(study(family, load, material, seed, CELLS, friction))
@@ -139,7 +140,11 @@ def scene(family, load, material, number, friction):
             numbers(study(family, load, material, seed, 4 * CELLS, friction), names, folder)
         )
         others = [
-            numbers(study(family, load, material, 10_000 + PATCHES * number + one, 2 * CELLS, friction), names, folder)
+            numbers(
+                study(family, load, material, 10_000 * start + PATCHES * number + one, 2 * CELLS, friction),
+                names,
+                folder,
+            )
             for one in range(PATCHES)
         ]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -183,4 +188,5 @@ if __name__ == "__main__":
     parser.add_argument("--count", type=int, default=45)
     parser.add_argument("--out", default="whole_error.jsonl")
     parser.add_argument("--friction", action="store_true")
+    parser.add_argument("--seed", type=int, default=2)
     main(**vars(parser.parse_args()))

@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 Population = Literal["patch", "ensemble"]
 #: Of two grids: the power with which the error of the grid is taken to vanish, and Roache's factor.
 _ORDER, _TWO_GRIDS = 1.5, 3.0
-#: Of six patches: of the standard deviation of the logarithm, what holds the mean of all in 95 of 100 (Student).
-_SAMPLE = 2.57
+#: Of six patches: of the standard deviation of the logarithm, what holds the mean of all in 95 of 100. Student has
+#: 2.57; the patches have the spectrum of the one that was measured, whose longest waves scatter too.
+_SAMPLE = 3.3
 #: A spectrum that ends at a wavelength has 99 % of its slope above a wavelength longer by up to this factor.
 _SAME = 1.15
 #: Fewer waves than these: the number hangs on the few that the patch happens to hold.
@@ -68,7 +69,7 @@ class Asked:
         if self.time_scale_error:
             found["slower"] = slower(found[self.compared])
         if self.octaves > 0:
-            found["smooth"] = variants.without_last_octave()
+            found["smooth"] = variants.without_last_octave(found["fine" if self.sharp else "own"])
         if self.population == "ensemble" and variants.is_rough:
             found |= {f"patch {number}": variants.other_patch(number) for number in range(1, PATCHES + 1)}
         if variants.case.settings.surface.taper:
@@ -177,7 +178,7 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, stated: Arr
         return Found(None, "state cutoff, the shortest wavelength that the real surface has")
     if not asked.octaves:
         return Found(_nothing(values), f"the grid holds all waves down to {_length(asked.cutoff)}")
-    change = _apart(values, "own", "smooth")
+    change = _apart(values, "fine" if asked.sharp else "own", "smooth")
     factor = quantity.octave_factor
     if asked.variants.case.experiment().largest_speed > 0 and quantity.name == "contact_area":
         factor = _SLIDING_OCTAVE

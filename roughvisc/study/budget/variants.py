@@ -64,10 +64,13 @@ class Variants:
 
     @cached_property
     def shortest_wave(self) -> float:
-        """Wavelength above which 99 % of the mean square slope lie; zero of a surface without slopes. [m]"""
+        """Wavelength above which 99 % of the mean square slope lie, at least two cells; zero without slopes. [m]
+
+        Two cells: the grid holds shorter waves along its diagonals alone.
+        """
         q, power, count = self._waves
         begins = last_octave(q, count * power * q**2)
-        return math.pi / begins if begins else 0.0
+        return max(math.pi / begins, 2 * max(spacing(self.height))) if begins else 0.0
 
     @cached_property
     def number_of_waves(self) -> float:
@@ -89,9 +92,9 @@ class Variants:
         held = max(surface.shortest_wave or 0.0, 2 * max(spacing(self.height)))  # a finer grid would hold more waves
         return vary(self.case, {"surface.shortest_wave": held, "surface.resample": None, "surface.band_limit": cells})
 
-    def without_last_octave(self) -> Case:
-        """Without the shortest octave of its waves."""
-        return vary(self.case, {"surface.shortest_wave": 2 * self.shortest_wave})
+    def without_last_octave(self, case: Case) -> Case:
+        """The case, or one of it on other cells, without the shortest octave of the waves."""
+        return vary(case, {"surface.shortest_wave": 2 * self.shortest_wave})
 
     def other_patch(self, number: int) -> Case:
         """Another patch of the same roughness, as large as what was measured, on cells twice as long."""

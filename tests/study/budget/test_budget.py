@@ -138,7 +138,7 @@ def test_budget__missing_waves_count_on_one_side(tmp_path):
         assert (other < both + 1e-12).all()
     ratio = [width(found["contact_area"], octave) for found in (one, two)]
     shortest = 2 ** (ratio[0] / (ratio[1] - ratio[0])) * 18e-6  # both follow from one wavelength and one change
-    assert 2 * 1e-3 / 54 < shortest < 2.4 * 1e-3 / 54
+    assert 2 - 1e-9 <= shortest / (1e-3 / 54) < 2.1  # the grid holds whole rings of waves of two cells
 
 
 def test_budget__holds_the_waves_that_a_finer_grid_shows(tmp_path):
@@ -162,7 +162,7 @@ def test_budget__sample_is_the_scatter_of_other_patches(tmp_path):
         other = rv.vary(study, {"surface.seed": seed, "surface.band_limit": [27, 25]})
         gaps.append(rv.run(other, out=tmp_path / "others", progress=False)["mean_gap"].values[-1])
     scatter = np.std(np.log(gaps), ddof=1)
-    assert 0.3 < width(ensemble, "sample") / (2.57 * scatter) < 3  # 6 and 12 draws
+    assert 0.3 < width(ensemble, "sample") / (3.3 * scatter) < 3  # 6 and 12 draws
     assert ensemble["upper"][-1] > patch["upper"][-1]
 
 
