@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 import scipy.fft
+import scipy.ndimage
 import xarray as xr
 
 from roughvisc.errors import InputError
@@ -14,6 +15,9 @@ from roughvisc.topography.arguments import KEEP, ORDER
 from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
 from roughvisc.units import Quantity, quantities
+
+#: Points on each side over which a sum is as fast as transforms, whose library takes half a second to import.
+_SUMMED = 64
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
@@ -181,10 +185,12 @@ def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np
         field_q = scipy.fft.rfft(field, axis=axis)
         field_q *= transmission[:, None] if axis == 0 else transmission
         return scipy.fft.irfft(field_q, field.shape[axis], axis=axis)
-    from scipy.signal import oaconvolve  # slow to import
-
     reach = min(math.ceil(1.5 * cutoff), field.shape[axis] - 1)  # the weight has fallen to 1e-14
     at = np.arange(-reach, reach + 1)
     weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
     weights /= weights.sum()
+    if reach <= _SUMMED:
+        return scipy.ndimage.convolve1d(field, weights, axis, mode="constant")
+    from scipy.signal import oaconvolve  # slow to import
+
     return oaconvolve(field, weights[:, None] if axis == 0 else weights[None], mode="same", axes=axis)
