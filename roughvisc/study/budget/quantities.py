@@ -122,7 +122,7 @@ QUANTITIES = {
         Observable("mean_gap", "m", _stored("mean_gap"), grid_factor=1.0, of_longest_waves=True, stated=_of_approach),
         Observable("approach", "m", _stored("approach"), of_longest_waves=True, stated=_of_approach),
         Observable("force", "N", _stored("force"), stated=_of_force),
-        Observable("friction_coefficient", "1", _stored("friction_coefficient"), grid_factor=1.0),
+        Observable("friction_coefficient", "1", _stored("friction_coefficient"), grid_factor=1.0, octave_factor=1.8),
         Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), of_longest_waves=True, stated=_of_gap),
         Observable("thermal_conductance", "W/K", _thermal, ("pressure",), 2.5, 2.5, stated=_of_area),
         Observable("incremental_stiffness", "N/m", _stiffness, ("pressure",), 2.5, 2.5, stated=_of_area),

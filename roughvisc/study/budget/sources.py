@@ -187,7 +187,7 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, stated: Arr
 
 
 #: Of the contact area where it slides, what the next octave changes over what the last one did.
-_SLIDING_OCTAVE = 1.3
+_SLIDING_OCTAVE = 2.0
 
 
 def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
