@@ -11,7 +11,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.groups import whole_of
-from roughvisc.mechanics.bodies import operator as halfspace
+from roughvisc.mechanics.bodies import operator as operators
 
 long = pytest.mark.long
 ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1
@@ -457,13 +457,13 @@ def test_fields_not_kept__are_neither_stored_nor_paid_for():
 
 def test_periodic__is_not_padded(monkeypatch):
     sizes = set()
-    sound = halfspace.transforms(mirrored=False)
+    sound = operators.transforms(mirrored=False)
     watched = replace(
         sound,
         of_field=lambda field, **kw: sizes.add(field.shape) or sound.of_field(field, **kw),
         of_rows=lambda *a, **kw: pytest.fail("a padded transform"),
     )
-    monkeypatch.setattr(halfspace, "transforms", lambda mirrored: watched)
+    monkeypatch.setattr(operators, "transforms", lambda mirrored: watched)
     ds = simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
     assert sizes == {ROUGH.shape}
     assert "padding" in ds.roughvisc.attributes["left_out"]

@@ -283,7 +283,7 @@ class LoadingRows(Rows):
             step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
         shown, window = step.shown, self.profile.window
         contact = shown.contact.positive()
-        touching = float(np.count_nonzero(contact)) * step.scene.halfspace.cell_area
+        touching = float(np.count_nonzero(contact)) * step.scene.operator.cell_area
         area = max(touching - staircase_area(contact, step.scene), 0.0)
         arrays: dict[str, Array] = {}
         if window.whole:
@@ -436,7 +436,7 @@ class LoadingRows(Rows):
         def fill(rows: slice) -> None:
             found[rows] = self._gap(step, contact, rows)
 
-        over_rows(fill, contact.shape, step.scene.halfspace.threads)
+        over_rows(fill, contact.shape, step.scene.operator.threads)
         return found
 
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
@@ -453,7 +453,7 @@ class LoadingRows(Rows):
         def total(rows: slice) -> float:
             return float(np.sum(self._gap(step, contact, rows), where=present[rows]))
 
-        gaps = over_rows(total, contact.shape, step.scene.halfspace.threads)
+        gaps = over_rows(total, contact.shape, step.scene.operator.threads)
         return sum(gaps) / np.count_nonzero(present)
 
     def _mean_gap(self, window: Window, source: Array, level: float) -> float:
@@ -516,12 +516,12 @@ def friction_row(step: Step) -> dict[str, float]:
         return {}
     slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
     pressure, force = step.shown.pressure, step.shown.force
-    friction = tangential_force(scene.halfspace, pressure, step.displacement, slide)
+    friction = tangential_force(scene.operator, pressure, step.displacement, slide)
     return {
         "sliding_distance": slid.distance,
         "friction_force": friction,
         "friction_coefficient": friction / force if force > 0 else math.nan,
-        "friction_force_across": force_across(scene.halfspace, pressure, step.displacement, slide),
+        "friction_force_across": force_across(scene.operator, pressure, step.displacement, slide),
         "friction_force_error": step.uncertainty.friction,
         "friction_work": slid.work,
     }
@@ -534,11 +534,11 @@ def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
     cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
     """
     free = ~contact if scene.present is None else scene.present & ~contact
-    periodic, mirrored = scene.halfspace.boundary == "periodic", scene.halfspace.mirrored
+    periodic, mirrored = scene.operator.boundary == "periodic", scene.operator.mirrored
     goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
     # beyond a mirror a cell's neighbour is its image
     outside = {"before": goes_on and not mirrored, "beyond": goes_on}
-    return staircase(contact, free, scene.halfspace.cell_area, periodic and not mirrored, **outside)
+    return staircase(contact, free, scene.operator.cell_area, periodic and not mirrored, **outside)
 
 
 def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:

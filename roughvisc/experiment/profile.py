@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
+from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.bodies.window import Window, whole_domain, window_around
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Missing, Settings
@@ -112,9 +112,9 @@ class Profile:
         (i, j), (x, y) = self.window.first, self._centres
         return float(x[i]), float(y[j])
 
-    def halfspace(self, boundary: Boundary, workers: int | None = None) -> HalfSpace:
+    def operator(self, boundary: Boundary, workers: int | None = None) -> Operator:
         """The body under the window's grid."""
-        return HalfSpace(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
+        return Operator(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
 
     def contact_fraction(self, contact: NDArray[np.bool_], area: float) -> float:
         """Contact area over that of the surface; on a tapered one both are weighted by the taper.
@@ -151,8 +151,8 @@ class Profile:
             self.widen_window()
         self.growths += 1
         first = (self._cell(0, x) - self.window.first[0], self._cell(1, y) - self.window.first[1])
-        halfspace = self.halfspace(scene.halfspace.boundary, scene.halfspace.workers)
-        return replace(scene, halfspace=halfspace, **self.of_scene()), first
+        operator = self.operator(scene.operator.boundary, scene.operator.workers)
+        return replace(scene, operator=operator, **self.of_scene()), first
 
     def widen_window(self) -> None:
         """Take the next larger window, which contains the present one and is the whole surface in the end."""

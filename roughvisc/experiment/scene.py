@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.bodies.kernel import has_finite_mean
-from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
+from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.hereditary.memory import ActsOn
@@ -297,7 +297,7 @@ def build_scene(profile: Profile, material: Material, program: Program, settings
     )
     choice = choose_memory(material, **memory_options(program, settings, "pressure" if grows else "displacement"))
     scene = Scene(
-        halfspace=profile.halfspace(settings.boundary),
+        operator=profile.operator(settings.boundary),
         material=choice.material,
         memory=choice.memory,
         program=program,
@@ -322,9 +322,9 @@ def _foreseen(profile: Profile, program: Program, material: Material) -> float:
     stride = math.ceil(max(profile.height.shape) / _FORESEEN_ON)
     gap = profile.gap[::stride, ::stride]
     dx, dy = (stride * side for side in profile.spacing)
-    halfspace = HalfSpace((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=profile.mirrored, kernel=profile.kernel)
-    load = value * glassy / halfspace.cell_area
-    return solve_contact(halfspace, gap, load=load, tolerance=1e-2, max_iterations=50).approach
+    operator = Operator((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=profile.mirrored, kernel=profile.kernel)
+    load = value * glassy / operator.cell_area
+    return solve_contact(operator, gap, load=load, tolerance=1e-2, max_iterations=50).approach
 
 
 def _check_approach(program: Program, full: float) -> None:

@@ -33,10 +33,10 @@ def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
     if not contact.any() or not step.residual > 0:
         return 0.0, 0.0
     since = step.state.began if step.state.before is None else step.state.before.time
-    threads, area = scene.halfspace.threads, scene.halfspace.cell_area
+    threads, area = scene.operator.threads, scene.operator.cell_area
     mean = shown.contact.total() / np.count_nonzero(contact)
     pressure = _SOLVER_AT_EDGE * step.residual * mean
-    closed = pressure * scene.halfspace.self_influence * scene.compliance(step.state.now.time - since)
+    closed = pressure * scene.operator.self_influence * scene.compliance(step.state.now.time - since)
 
     def counted(rows: slice) -> tuple[int, int]:
         here = contact[rows]

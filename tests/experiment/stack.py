@@ -48,11 +48,11 @@ class Stack(Experiment):
     def _found(self, problem, done):
         (term,), settings = problem.body.terms(), problem.settings
         profile = Profile(problem.height, settings.missing, kernel=term.kernel)
-        halfspace = profile.halfspace(settings.boundary)
-        cell, alpha = halfspace.cell_area, float(term.material.contact_compliance(0.0))
+        operator = profile.operator(settings.boundary)
+        cell, alpha = operator.cell_area, float(term.material.contact_compliance(0.0))
         for number, load in enumerate(self.loads[done:], done + 1):
             options = {"error_tolerance": settings.tolerance, "estimate_error": True, "tolerance": settings.tolerance}
-            found = solve_contact(halfspace, profile.gap, load=load * alpha / cell, **options)
+            found = solve_contact(operator, profile.gap, load=load * alpha / cell, **options)
             contact = found.pressure > 0
             counted, area = areas(contact, profile.spacing)
             gap = np.where(contact, 0.0, np.maximum(profile.gap + found.displacement - found.approach, 0.0))

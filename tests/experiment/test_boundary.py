@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.settings import Settings, known_boundary
 
 PRESS = rv.Program().pressure(1e3, over=0)
@@ -84,7 +84,7 @@ def test_known_boundary__looks_at_the_surface_only_where_it_must():
 
 def test_auto__is_no_boundary_of_a_grid():
     with pytest.raises(rv.InputError, match="boundary is 'auto': expected 'free' or 'periodic'"):
-        HalfSpace((4, 4), (1.0, 1.0), "auto")
+        Operator((4, 4), (1.0, 1.0), "auto")
 
 
 def test_auto__of_a_moved_grid_of_waves_is_periodic_still():

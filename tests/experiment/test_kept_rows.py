@@ -10,7 +10,7 @@ import roughvisc as rv
 from roughvisc.experiment.loading import Loading, LoadingRows
 from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics.bodies.body import body_of
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
@@ -148,14 +148,14 @@ class Kept:
         """Take up a step with some pressure and some effective pressure in the window; give both on its domain."""
         self.seed += 1
         rng = np.random.default_rng(self.seed)
-        shape, window = self.scene.halfspace.shape, self.profile.window
+        shape, window = self.scene.operator.shape, self.profile.window
         pressure, source = rng.random(shape) * (rng.random(shape) < part), 1e-3 * rng.random(shape)
         if self.scene.present is not None:
             pressure, source = pressure * self.scene.present, source * self.scene.present
         shown = Instant(time, Sparse.of(pressure), force, 0.25)
         state = State(shown, pressure, None, largest_force=1.0, iterations=iterations, convolutions=2 * iterations)
         step = Step(
-            shown, Sum.whole(self.scene.halfspace.displacement(source)), source, level, "load", True, 0.0, 0.0,
+            shown, Sum.whole(self.scene.operator.displacement(source)), source, level, "load", True, 0.0, 0.0,
             Uncertainty(), converged, self.scene, state,
         )  # fmt: skip
         self.record(step, converged)
@@ -175,7 +175,7 @@ class Kept:
     def expected(self, pressure, source, level):
         """Displacement and gap over the domain, as the surface is now."""
         spacing = self.profile.spacing
-        displacement = HalfSpace(pressure.shape, spacing, mirrored=self.profile.mirrored).displacement(source)
+        displacement = Operator(pressure.shape, spacing, mirrored=self.profile.mirrored).displacement(source)
         gap = np.where(pressure > 0, 0.0, np.maximum(self.profile.gap + displacement - level, 0.0))
         return displacement, np.where(self.profile.present, gap, np.nan)
 
@@ -310,7 +310,7 @@ def test_rows__keep_nothing_of_larger_arrays():
     """What is a view of a larger array is copied, once; what is not is kept as it is."""
     rows = Kept(BALL, fields=("pressure", "displacement"), edge="accept", tolerance=Settings.tolerance)
     profile, store = rows.profile, rows.store
-    scene = Scene(HalfSpace(BALL.shape, profile.spacing), profile.gap, MATERIAL, Modes(MATERIAL), PROGRAM)
+    scene = Scene(Operator(BALL.shape, profile.spacing), profile.gap, MATERIAL, Modes(MATERIAL), PROGRAM)
     pair = np.ones((2, *BALL.shape))
     shown = Instant(0.0, Sparse.of(pair[0]), 1.0, 0.1)
     own = np.ones(BALL.shape)

@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc.experiment import profile
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.reference import closed_form
@@ -122,7 +122,7 @@ def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
     kernel, n = Screened(0.05), 256
     x = np.arange(n) - n / 2
     gap = (x[:, None] ** 2 + x**2) / 2000
-    body = HalfSpace((n, n), (1.0, 1.0), kernel=kernel)
+    body = Operator((n, n), (1.0, 1.0), kernel=kernel)
     found = solve_contact(body, gap, load=200.0)
     guessed = solve_contact(body, gap, load=200.0, start=np.ones((n, n)))
     assert found.pressure == pytest.approx(guessed.pressure, abs=1e-5 * guessed.pressure.max())
@@ -172,7 +172,7 @@ def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeyp
 
 
 def test_preconditioner__knows_the_mean():
-    body = HalfSpace((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
+    body = Operator((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
     pressure = 1 + np.random.default_rng(1).random((12, 15))
     back = body.approximate_inverse(body.displacement(pressure).astype(np.float32))
     assert back == pytest.approx(pressure, rel=1e-5)

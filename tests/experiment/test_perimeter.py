@@ -9,7 +9,7 @@ from support import simulate_whole
 import roughvisc as rv
 from roughvisc.experiment.loading import staircase_area
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact.neighbours import PERIMETER_CORRECTION
 
 UNIT = rv.elastic(0.25)
@@ -37,7 +37,7 @@ def test_perimeter__runs_between_contact_and_material_out_of_contact(seed, bound
     shape, sides = (7, 6), (1.0, 0.7)
     present = rng.random(shape) < 0.8
     contact = present & (rng.random(shape) < 0.5)
-    scene = SimpleNamespace(halfspace=HalfSpace(shape, sides, boundary), present=present, outside=np.inf)
+    scene = SimpleNamespace(operator=Operator(shape, sides, boundary), present=present, outside=np.inf)
     assert staircase_area(contact, scene) == pytest.approx(counted(contact, present, sides, boundary == "periodic"))
 
 
@@ -46,19 +46,17 @@ def test_perimeter__of_a_quarter_is_a_quarter(boundary):
     rng = np.random.default_rng(5)
     part, there = rng.random((4, 3)) < 0.5, rng.random((4, 3)) < 0.8
     contact, present = (np.block([[a[::-1, ::-1], a[::-1]], [a[:, ::-1], a]]) for a in (part & there, there))
-    halfspace = HalfSpace((4, 3), (1.0, 0.7), boundary, mirrored=True)
-    scene = SimpleNamespace(halfspace=halfspace, present=there, outside=np.inf)
+    operator = Operator((4, 3), (1.0, 0.7), boundary, mirrored=True)
+    scene = SimpleNamespace(operator=operator, present=there, outside=np.inf)
     whole = counted(contact, present, (1.0, 0.7), boundary == "periodic")
-    assert halfspace.cell_area == pytest.approx(4 * 0.7)
+    assert operator.cell_area == pytest.approx(4 * 0.7)
     assert staircase_area(part & there, scene) == pytest.approx(whole)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_perimeter__goes_on_at_the_border_of_a_window(mirrored):
     contact = np.ones((4, 3), dtype=bool)
-    scene = SimpleNamespace(
-        halfspace=HalfSpace((4, 3), (1.0, 1.0), "free", mirrored=mirrored), present=None, outside=1.0
-    )
+    scene = SimpleNamespace(operator=Operator((4, 3), (1.0, 1.0), "free", mirrored=mirrored), present=None, outside=1.0)
     faces = 4 * (4 + 3) if mirrored else 2 * (4 + 3)
     assert staircase_area(contact, scene) == pytest.approx(PERIMETER_CORRECTION * faces)
 

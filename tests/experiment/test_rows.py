@@ -10,7 +10,7 @@ from roughvisc.experiment import loading
 from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics import sparse
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -104,7 +104,7 @@ def soft_steps(control, tolerance=1e-2):
     x, y = ((np.arange(n) - n // 2) * 0.1 for n in shape)
     gap, soft = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2), rv.zener(1.0, 0.01, 0.01)
     program = getattr(rv.Program(), control)({"approach": 0.1, "load": 5e-3}[control], over=1.0)
-    scene = Scene(HalfSpace(shape, (0.1, 0.1)), gap, soft, Modes(soft), program, tolerance=tolerance)
+    scene = Scene(Operator(shape, (0.1, 0.1)), gap, soft, Modes(soft), program, tolerance=tolerance)
     return [step for step in march(scene) if step.state.before is not None]
 
 

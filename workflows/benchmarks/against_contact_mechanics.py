@@ -29,11 +29,11 @@ def measure(sizes=(256, 512), areas=(0.05, 0.3, 0.95), repeats=3):
 
     peer = "ContactMechanics"
     for cells in sizes:
-        gap, halfspace = rough_gap(cells), grid(cells, "periodic")
+        gap, operator = rough_gap(cells), grid(cells, "periodic")
         for area in areas:
-            mean = load_for_area(halfspace, gap, area)
+            mean = load_for_area(operator, gap, area)
             name = f"elastic periodic rough, {area:.0%} area, {cells}^2"
-            yield elastic(peer, name, press(gap, mean, "periodic"), halfspace, gap, mean, repeats)
+            yield elastic(peer, name, press(gap, mean, "periodic"), operator, gap, mean, repeats)
         gap, mean = sphere_gap(cells)
         name = f"elastic free-space sphere, {cells}^2"
         yield elastic(peer, name, press(gap, mean, "free"), grid(cells, "free"), gap, mean, repeats)

@@ -24,11 +24,11 @@ def measure(sizes=(256, 512, 1024), areas=(0.05, 0.3, 0.95), creep_steps=(20, 40
     tamaas.set_log_level(tamaas.LogLevel.error)
     tamaas.initialize(1)
     for cells in sizes:
-        gap, halfspace = rough_gap(cells), grid(cells, "periodic")
+        gap, operator = rough_gap(cells), grid(cells, "periodic")
         for area in areas:
-            mean = load_for_area(halfspace, gap, area)
+            mean = load_for_area(operator, gap, area)
             name = f"elastic periodic rough, {area:.0%} area, {cells}^2"
-            yield elastic("Tamaas", name, press(tamaas, gap, mean, "periodic"), halfspace, gap, mean, repeats)
+            yield elastic("Tamaas", name, press(tamaas, gap, mean, "periodic"), operator, gap, mean, repeats)
     for cells in sizes:
         gap, mean = sphere_gap(cells)
         name = f"elastic free-space sphere, {cells}^2"

@@ -28,7 +28,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.experiment.resources import retain_arena
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact, solver
 
 AREAS = (0.05, 0.3, 0.95)
@@ -47,12 +47,12 @@ def scene(cells, area):
     if area == "sphere":
         return (*sphere_gap(cells), "free")
     few = min(cells, 512)
-    gap, halfspace = rough_gap(few), HalfSpace((few, few), (1.0, 1.0), "periodic")
-    return rough_gap(cells), load_for_area(halfspace, gap, area), "periodic"
+    gap, operator = rough_gap(few), Operator((few, few), (1.0, 1.0), "periodic")
+    return rough_gap(cells), load_for_area(operator, gap, area), "periodic"
 
 
 def ours(gap, mean, boundary, tolerance, threads):
-    halfspace = HalfSpace(gap.shape, (1.0, 1.0), boundary)
+    operator = Operator(gap.shape, (1.0, 1.0), boundary)
     passes, solved = [], solver.pcg
 
     def counted(*given, **named):
@@ -62,7 +62,7 @@ def ours(gap, mean, boundary, tolerance, threads):
 
     counting = mock.patch.object(solver, "solved", counted)
     with counting, fft.set_workers(threads), retain_arena(gap.nbytes):  # the last two as a march does
-        state = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=tolerance)
+        state = solve_contact(operator, gap, load=mean * gap.size, tolerance=tolerance)
     return state.pressure, state.iterations, sum(passes)
 
 

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 
 PRESSURES = (0.003, 0.02)  # over the contact modulus
@@ -33,7 +33,7 @@ def contact(h, pressure):
     """Contact fraction, mean gap, pressure."""
     n = h.shape[0]
     gap = float(h.max()) - h.values
-    state = solve_contact(HalfSpace((n, n), (1 / n, 1 / n), "periodic"), gap, load=pressure * n * n, tolerance=1e-8)
+    state = solve_contact(Operator((n, n), (1 / n, 1 / n), "periodic"), gap, load=pressure * n * n, tolerance=1e-8)
     left = np.maximum(gap + state.displacement - state.approach, 0)
     return np.mean(state.pressure > 0), np.mean(left), state.pressure
 

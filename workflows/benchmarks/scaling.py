@@ -6,7 +6,7 @@ import numpy as np
 from scenes import RADIUS, seconds, with_symmetry_and_without, without_window
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.study.execution.profile import profiled
 
 
@@ -39,13 +39,13 @@ def run(name, surface, material, program, **settings):
 
 def iteration_by_scipy(surface, boundary):
     """Seconds that an iteration spends in transforms: a displacement in double precision, and the preconditioner."""
-    halfspace = HalfSpace(surface.shape, (1.0, 1.0), boundary)
+    operator = Operator(surface.shape, (1.0, 1.0), boundary)
     pressure = np.ones(surface.shape)
     single = pressure.astype(np.float32)
-    halfspace.displacement(pressure), halfspace.approximate_inverse(single)  # makes what the others share
+    operator.displacement(pressure), operator.approximate_inverse(single)  # makes what the others share
     return (
-        seconds(lambda: halfspace.displacement(pressure), 9)[0]
-        + seconds(lambda: halfspace.approximate_inverse(single), 9)[0]
+        seconds(lambda: operator.displacement(pressure), 9)[0]
+        + seconds(lambda: operator.approximate_inverse(single), 9)[0]
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment import profile
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 
 RADIUS = 1.0
@@ -62,37 +62,37 @@ def rough_gap(cells, seed=0):
     return float(surface.max()) - surface.values
 
 
-def load_for_area(halfspace, gap, fraction):
+def load_for_area(operator, gap, fraction):
     """Mean pressure over the contact modulus at which this fraction of the cells is in contact."""
     low, high = 1e-4, 20.0
     for _ in range(25):
         mean = (low * high) ** 0.5
-        state = solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-4)
+        state = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-4)
         low, high = (mean, high) if np.mean(state.pressure > 0) < fraction else (low, mean)
     return mean
 
 
-def tight_pressure(halfspace, gap, mean):
-    return solve_contact(halfspace, gap, load=mean * gap.size, tolerance=1e-13, max_iterations=5000).pressure
+def tight_pressure(operator, gap, mean):
+    return solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-13, max_iterations=5000).pressure
 
 
-def solved_to(halfspace, gap, mean, exact, error, repeats):
+def solved_to(operator, gap, mean, exact, error, repeats):
     """Our time to reach an L1 error: the loosest tolerance of a ladder that does."""
     for tolerance in 10.0 ** -np.arange(1, 14, 0.5):
-        took, state = seconds(lambda t=tolerance: solve_contact(halfspace, gap, load=mean * gap.size, tolerance=t), 1)
+        took, state = seconds(lambda t=tolerance: solve_contact(operator, gap, load=mean * gap.size, tolerance=t), 1)
         reached = float(np.abs(state.pressure - exact).sum() / exact.sum())
         if reached <= error:
             break
-    took, state = seconds(lambda: solve_contact(halfspace, gap, load=mean * gap.size, tolerance=tolerance), repeats)
+    took, state = seconds(lambda: solve_contact(operator, gap, load=mean * gap.size, tolerance=tolerance), repeats)
     return took, reached, state
 
 
-def elastic(peer, name, theirs, halfspace, gap, mean, repeats):
+def elastic(peer, name, theirs, operator, gap, mean, repeats):
     """A peer's pressure, computed by ``theirs``, against ours at the loosest tolerance that is not less accurate."""
-    exact = tight_pressure(halfspace, gap, mean)
+    exact = tight_pressure(operator, gap, mean)
     took, pressure = seconds(theirs, repeats)
     their_error = float(np.abs(pressure - exact).sum() / exact.sum())
-    ours, error, state = solved_to(halfspace, gap, mean, exact, their_error, repeats)
+    ours, error, state = solved_to(operator, gap, mean, exact, their_error, repeats)
     return row(peer, name, took, ours, their_error, error, state.convolutions)
 
 
@@ -117,4 +117,4 @@ def sphere_gap(cells):
 
 
 def grid(cells, boundary):
-    return HalfSpace((cells, cells), (1.0, 1.0), boundary)
+    return Operator((cells, cells), (1.0, 1.0), boundary)

@@ -18,7 +18,7 @@ import sys
 import numpy as np
 from scenes import rough_gap, sphere_gap
 
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 
 TOLERANCES = (1e-2, 3e-3, 1e-3, 3e-4, 3e-5, 3e-6, 3e-7)
@@ -28,8 +28,8 @@ QUANTILES = (0.02, 0.5, 0.98, 1.0)
 def problems(cells, boundary):
     """Name, half-space, gap, load and present cells; lengths in cells."""
     shape = (cells, cells - 3)
-    whole = HalfSpace(shape, (1.0, 1.0), boundary)
-    quarter = HalfSpace(shape, (1.0, 1.0), boundary, mirrored=True)
+    whole = Operator(shape, (1.0, 1.0), boundary)
+    quarter = Operator(shape, (1.0, 1.0), boundary, mirrored=True)
     x, y = np.arange(cells)[:, None] - cells / 2 + 0.37, np.arange(cells - 3) - cells / 2 + 1.1
     distance, inside = np.hypot(x, y), np.hypot(x, y) < cells / 3
     for a in (0.08, 0.2, 0.35):
@@ -49,17 +49,17 @@ def problems(cells, boundary):
 def rows(cells, tolerances=TOLERANCES):
     """Control, boundary, contact fraction, tolerance, relative L1 error, that of the load, its estimate and bound."""
     for boundary, size in itertools.product(("free", "periodic"), cells):
-        for name, halfspace, gap, load, present in problems(size, boundary):
+        for name, operator, gap, load, present in problems(size, boundary):
             given = {"present": present, "max_iterations": 5000}
-            exact = solve_contact(halfspace, gap, load=load, tolerance=1e-14, **given)
-            before = solve_contact(halfspace, gap, load=0.9 * load, tolerance=1e-8, **given).pressure
+            exact = solve_contact(operator, gap, load=load, tolerance=1e-14, **given)
+            before = solve_contact(operator, gap, load=0.9 * load, tolerance=1e-8, **given).pressure
             touching = exact.pressure > 0
             controls = [("load", load)]
             if boundary == "free" or not touching.all():  # else the approach does not determine the load
                 controls.append(("approach", float(np.mean((gap + exact.displacement)[touching]))))
             for (control, value), start, tolerance in itertools.product(controls, (None, before), tolerances):
                 state = solve_contact(
-                    halfspace, gap, **{control: value}, tolerance=tolerance, start=start, estimate_error=True, **given
+                    operator, gap, **{control: value}, tolerance=tolerance, start=start, estimate_error=True, **given
                 )
                 error = np.abs(state.pressure - exact.pressure).sum() / load
                 yield {

@@ -1,6 +1,6 @@
-"""Half-space of unit contact compliance: pressure to surface displacement, and back approximately.
+"""Influence operator of unit contact compliance: pressure to surface displacement, and back approximately.
 
-A :class:`HalfSpace` knows a grid, its boundary and the kernel of the body, which is a half-space unless another is
+An :class:`Operator` knows a grid, its boundary and the kernel of the body, which is a half-space unless another is
 given. It knows neither material, time nor contact.
 """
 
@@ -40,7 +40,7 @@ _BLOCKED = 1024**2
 _BLOCK = 8
 
 
-class HalfSpace:
+class Operator:
     """From pressure to displacement on a grid: convolution with a body's kernel, a half-space's by default.
 
     Of unit contact compliance, sampled by equal rectangular cells.
@@ -97,11 +97,11 @@ class HalfSpace:
         self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
 
-    def on(self, shape: tuple[int, int]) -> HalfSpace:
+    def on(self, shape: tuple[int, int]) -> Operator:
         """The same body, boundary, symmetry and extent on another number of cells."""
         (nx, ny), (mx, my), (dx, dy) = self.shape, shape, self.spacing
         spacing = dx * (nx / mx), dy * (ny / my)
-        return HalfSpace(shape, spacing, self.boundary, mirrored=self.mirrored, kernel=self.kernel)
+        return Operator(shape, spacing, self.boundary, mirrored=self.mirrored, kernel=self.kernel)
 
     @property
     def threads(self) -> int:
@@ -109,7 +109,7 @@ class HalfSpace:
         return threads_of(self.shape[0] * self.shape[1], self.workers)
 
     @cached_property
-    def coarse(self) -> HalfSpace:
+    def coarse(self) -> Operator:
         """The same body on blocks of some cells a side, of the same period."""
         return self.on((-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK)))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import Cells as Cells
 from roughvisc.mechanics.arrays import blockwise, gather
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.sparse import Scattered
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ class Influence:
 
     Parameters
     ----------
-    halfspace : HalfSpace
+    operator : Operator
         Grid and boundary.
     scale : float
         Unit of pressure over unit of length. [1/m]
@@ -36,12 +36,12 @@ class Influence:
         Number of cells.
     """
 
-    def __init__(self, halfspace: HalfSpace, scale: float) -> None:
-        self.halfspace = halfspace
-        self.threads = halfspace.threads
+    def __init__(self, operator: Operator, scale: float) -> None:
+        self.operator = operator
+        self.threads = operator.threads
         self.scale = scale
         self.convolutions = 0
-        self.size = halfspace.shape[0] * halfspace.shape[1]
+        self.size = operator.shape[0] * operator.shape[1]
 
     def at(self, field: Array, cells: Cells) -> Array:
         """Values of a field at some cells, as flat indices."""
@@ -50,38 +50,38 @@ class Influence:
     @property
     def largest(self) -> float:
         """Largest eigenvalue of the influence, or a bound on it."""
-        return self.halfspace.largest_influence * self.scale
+        return self.operator.largest_influence * self.scale
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Displacement by a pressure, in double precision; into some memory on large grids, where that is given."""
         self.convolutions += 1
-        displacement = self.halfspace.displacement(pressure, out)
+        displacement = self.operator.displacement(pressure, out)
         blockwise(np.multiply, displacement, self.scale, out=displacement, threads=self.threads)
         return displacement
 
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:
         """Displacement by a pressure on some cells in single precision, and its unit."""
         self.convolutions += 1
-        field = Scattered.over_largest(self.halfspace.shape, cells, pressure)
-        unit = field.size * self.halfspace.largest_influence * self.scale
-        return self.halfspace.displacement_single(field), unit
+        field = Scattered.over_largest(self.operator.shape, cells, pressure)
+        unit = field.size * self.operator.largest_influence * self.scale
+        return self.operator.displacement_single(field), unit
 
     def approximate_pressure(self, displacement: Array, cells: Cells) -> Array:
         """About the pressure on some cells that displaces them, but for the scale: the preconditioner."""
         self.convolutions += 1
-        return self.halfspace.approximate_inverse_within(
-            Scattered.over_largest(self.halfspace.shape, cells, displacement)
+        return self.operator.approximate_inverse_within(
+            Scattered.over_largest(self.operator.shape, cells, displacement)
         )
 
     def approximate_pressure_field(self, displacement: Single) -> Array:
         """The same for a displacement everywhere, of ordinary size."""
         self.convolutions += 1
-        return self.halfspace.approximate_inverse(displacement).astype(float)
+        return self.operator.approximate_inverse(displacement).astype(float)
 
     def of_blocks(self, loads: NDArray[Any]) -> NDArray[Any]:
         """Displacement of blocks of cells by their loads, both flat, in one precision: no convolution to speak of."""
-        blocks, single = self.halfspace.coarse, loads.dtype == np.float32
-        pressure: NDArray[Any] = loads.reshape(blocks.shape) / (blocks.cell_area / self.halfspace.cell_area)
+        blocks, single = self.operator.coarse, loads.dtype == np.float32
+        pressure: NDArray[Any] = loads.reshape(blocks.shape) / (blocks.cell_area / self.operator.cell_area)
         displacement: NDArray[Any] = blocks.displacement_single(pressure) if single else blocks.displacement(pressure)
         displacement *= self.scale * (blocks.largest_influence if single else 1.0)
         return displacement.reshape(-1)
@@ -89,5 +89,5 @@ class Influence:
     @property
     def of_one_block(self) -> float:
         """Displacement of a block by a unit load on it alone."""
-        blocks = self.halfspace.coarse
-        return blocks.self_influence * self.scale * self.halfspace.cell_area / blocks.cell_area
+        blocks = self.operator.coarse
+        return blocks.self_influence * self.scale * self.operator.cell_area / blocks.cell_area

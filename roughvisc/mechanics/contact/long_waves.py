@@ -76,10 +76,10 @@ class LongWaves:
     @classmethod
     def of(cls, influence: Influence, free_set: Cells, pressure: Array, energy: float) -> LongWaves | None:
         """The blocks of a free set, by a pressure on it and ``p.Kp``; None where they do not pay."""
-        shape = influence.halfspace.shape
+        shape = influence.operator.shape
         if min(shape) < _FROM or free_set.size > _SPARSE * influence.size:
             return None
-        coarse = influence.halfspace.coarse.shape
+        coarse = influence.operator.coarse.shape
         blocks = _blocks(shape, coarse, free_set, influence.threads)
         cells = _sums(influence, blocks, None)
         all_free = cells > 0.98 * influence.size / cells.size
@@ -179,7 +179,7 @@ def _blocks(shape: tuple[int, int], coarse: tuple[int, int], cells: Cells, threa
 
 def _sums(influence: Influence, blocks: NDArray[np.intp], values: Array | None) -> Array:
     """Sums of the values of the cells in each block, or their number."""
-    shape = influence.halfspace.coarse.shape
+    shape = influence.operator.coarse.shape
     sums = np.zeros(shape)
 
     def work(part: slice) -> tuple[slice, NDArray[Any]]:

@@ -22,7 +22,7 @@ from roughvisc.mechanics.arrays import (
     total,
 )
 from roughvisc.mechanics.arrays import lowest as lowest_value
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact.influence import Array, Cells, Influence
 from roughvisc.mechanics.contact.long_waves import CAUTION, LongWaves
 
@@ -83,7 +83,7 @@ class ContactProblem:
     @classmethod
     def scaled(
         cls,
-        halfspace: HalfSpace,
+        operator: Operator,
         gap: Array,
         *,
         load: float | None,
@@ -92,20 +92,20 @@ class ContactProblem:
         present: Mask | None,
     ) -> ContactProblem:
         """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
-        lowest = lowest_value(gap, present, halfspace.threads)
+        lowest = lowest_value(gap, present, operator.threads)
         if load is not None:
             unit = load
-            length = load * halfspace.self_influence or load * halfspace.spacing[0]
+            length = load * operator.self_influence or load * operator.spacing[0]
         else:
             assert approach is not None
             length = approach - lowest
-            unit = length / (halfspace.self_influence or halfspace.spacing[0])
-        blockwise(np.subtract, gap, lowest, out=gap, threads=halfspace.threads)
-        blockwise(np.divide, gap, length, out=gap, threads=halfspace.threads)
+            unit = length / (operator.self_influence or operator.spacing[0])
+        blockwise(np.subtract, gap, lowest, out=gap, threads=operator.threads)
+        blockwise(np.divide, gap, length, out=gap, threads=operator.threads)
         target = math.nan if approach is None else 1.0
-        known = load is None and not halfspace.definite and present is None
+        known = load is None and not operator.definite and present is None
         return cls(
-            influence=Influence(halfspace, unit / length),
+            influence=Influence(operator, unit / length),
             gap=gap,
             load=None if load is None else load / unit,
             target=target,
@@ -120,7 +120,7 @@ class ContactProblem:
     @property
     def definite(self) -> bool:
         """Whether every pressure displaces: with periodic boundaries a uniform one does not, on a half-space."""
-        return self.influence.halfspace.definite
+        return self.influence.operator.definite
 
     @property
     def sees_load(self) -> bool:

@@ -56,7 +56,7 @@ from roughvisc.mechanics.arrays import (
     summed,
     total,
 )
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact.certificate import (
     Asked,
     Certificate,
@@ -138,7 +138,7 @@ class ContactState:
 
 
 def solve_contact(
-    halfspace: HalfSpace,
+    operator: Operator,
     gap: Array,
     *,
     load: float | None = None,
@@ -156,7 +156,7 @@ def solve_contact(
 
     Parameters
     ----------
-    halfspace : HalfSpace
+    operator : Operator
         Grid and boundary.
     gap : ndarray, shape (nx, ny)
         Gap without pressure at zero approach; ignored at absent cells. [m]
@@ -206,9 +206,9 @@ def solve_contact(
         )
     with reused():
         if load is not None and present is None and (start is None or not any_positive(start)):
-            start, start_displacement = coarse_guess(halfspace, gap, load), None
+            start, start_displacement = coarse_guess(operator, gap, load), None
         problem = ContactProblem.scaled(
-            halfspace, gap, load=load, approach=approach, tolerance=tolerance, present=present
+            operator, gap, load=load, approach=approach, tolerance=tolerance, present=present
         )
         return pcg(
             problem,
@@ -647,16 +647,16 @@ def in_own_units(
     )
 
 
-def coarse_guess(halfspace: HalfSpace, gap: Array, load: float) -> Array | None:
+def coarse_guess(operator: Operator, gap: Array, load: float) -> Array | None:
     """First guess of the pressure under a load, constant over two by two cells; None where that does not pay. [-]"""
     if min(gap.shape) < _COARSE_FROM:
         return None
-    coarse = halfspace.on((gap.shape[0] // 2, gap.shape[1] // 2))
-    few = _averaged(gap, coarse.shape, halfspace.threads)
+    coarse = operator.on((gap.shape[0] // 2, gap.shape[1] // 2))
+    few = _averaged(gap, coarse.shape, operator.threads)
     load *= few.size / gap.size
     with reused(apart=True):  # none of its fields is as large as those to come
         found = solve_contact(coarse, few, load=load, tolerance=_COARSE_TOLERANCE, overwrite=True).pressure
-    return _spread(found, gap.shape, halfspace.threads)
+    return _spread(found, gap.shape, operator.threads)
 
 
 def _averaged(field: Array, shape: tuple[int, int], threads: int) -> Array:

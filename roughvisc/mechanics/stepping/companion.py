@@ -131,7 +131,7 @@ def difference(
     compliance is there at once is more accurate.
     """
     fine, coarse = step.state.now, companion.now
-    area = scene.halfspace.cell_area
+    area = scene.operator.cell_area
     inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
     (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
     entered, soft = 0.0, scene.lacks_instantaneous_compliance(scene.program.duration)
@@ -196,8 +196,8 @@ def _used_by_work(scene: Scene, state: State) -> float:
 def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Array) -> float:
     """Difference of the tangential force to that of the companion's pressure and displacement. [N]"""
     slide = scene.motions[segment_number(step.state)]
-    fine = tangential_force(scene.halfspace, step.shown.pressure, step.displacement, slide)
-    return abs(fine - tangential_force(scene.halfspace, pressure, displacement, slide))
+    fine = tangential_force(scene.operator, step.shown.pressure, step.displacement, slide)
+    return abs(fine - tangential_force(scene.operator, pressure, displacement, slide))
 
 
 def _energies(state: Trajectory) -> tuple[float, float]:
@@ -222,7 +222,7 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[i
             outside &= present[part]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
 
-    found = over_blocks(work, scene.gap.size, scene.halfspace.threads)
+    found = over_blocks(work, scene.gap.size, scene.operator.threads)
     return sum(inside for inside, _ in found), sum(outside for _, outside in found)
 
 

@@ -273,9 +273,9 @@ def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment,
     approach = max(
         state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
     )
-    difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.halfspace.threads)
+    difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.operator.threads)
     counts = force > 0 and not state.pace.ignore_pressure_error
-    pressure_error = difference * scene.halfspace.cell_area / force if counts else 0.0
+    pressure_error = difference * scene.operator.cell_area / force if counts else 0.0
     ratio = trial.length / last
     if segment.control == "load":
         found, now, before, scale = trial.instant.approach, state.now.approach, state.before.approach, approach
@@ -295,8 +295,8 @@ def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment,
 
 def _unresolved_approach(scene: Scene, now: Instant) -> float:
     """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
-    pressure = now.force / (now.contact.size * scene.halfspace.cell_area)
-    return _ROUNDING * scene.compliance(now.time) * pressure * scene.halfspace.largest_influence
+    pressure = now.force / (now.contact.size * scene.operator.cell_area)
+    return _ROUNDING * scene.compliance(now.time) * pressure * scene.operator.largest_influence
 
 
 def _error_constant(trial: Trial, last: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import cut_at_zero, empty, lowest, threads_of, weighted
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.memory import Memory, Rule, mean_compliance, old_weight
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sparse import Sparse, Sum
@@ -163,7 +163,7 @@ class Scene:
 
     Attributes
     ----------
-    halfspace : HalfSpace
+    operator : Operator
         Grid and boundary.
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at the highest peak, which may lie between the cells; any finite number
@@ -189,7 +189,7 @@ class Scene:
         Least undeformed gap of the domain beyond the grid; infinite where the grid is all of it. [m]
     """
 
-    halfspace: HalfSpace
+    operator: Operator
     gap: Array
     material: Material
     memory: Memory
@@ -204,7 +204,7 @@ class Scene:
 
     def lowest(self, field: Array) -> float:
         """Least value over the present cells."""
-        return lowest(field, self.present, self.halfspace.threads)
+        return lowest(field, self.present, self.operator.threads)
 
     def compliance(self, t: float) -> float:
         """Contact compliance. [1/Pa]"""
@@ -467,15 +467,15 @@ class Step:
 
     def pressure_on(self, rows: slice) -> Array:
         """Pressure shown on some rows of cells, not to be changed. [Pa]"""
-        return self.shown.contact.part(self._cells_of(rows)).reshape(-1, self.scene.halfspace.shape[1])
+        return self.shown.contact.part(self._cells_of(rows)).reshape(-1, self.scene.operator.shape[1])
 
     def displacement_on(self, rows: slice) -> Array:
         """Total displacement of them, not to be changed. [m]"""
-        return self.moved.part(self._cells_of(rows)).reshape(-1, self.scene.halfspace.shape[1])
+        return self.moved.part(self._cells_of(rows)).reshape(-1, self.scene.operator.shape[1])
 
     def _cells_of(self, rows: slice) -> slice:
         """Flat indices."""
-        columns = self.scene.halfspace.shape[1]
+        columns = self.scene.operator.shape[1]
         return slice(rows.start * columns, rows.stop * columns)
 
     def with_fields(self) -> Step:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.events import next_event
@@ -39,7 +39,7 @@ class SeedSolution:
 
 
 def conjugate_gradients(
-    halfspace: HalfSpace,
+    operator: Operator,
     gap: Array,
     compliance: float,
     load: float,
@@ -52,7 +52,7 @@ def conjugate_gradients(
 
     Parameters
     ----------
-    halfspace : HalfSpace
+    operator : Operator
         Grid and boundary.
     gap : ndarray, shape (nx, ny)
         Gap without the present pressure. [m]
@@ -67,7 +67,7 @@ def conjugate_gradients(
     max_iterations : int
         Give up then.
     """
-    area = halfspace.cell_area
+    area = operator.cell_area
     # 1. The uniform first guess, all cells in contact.
     pressure = np.full(gap.shape, load / (area * gap.size))
     direction = np.zeros_like(gap)
@@ -76,7 +76,7 @@ def conjugate_gradients(
     while iterations < max_iterations and not stagnated:
         iterations += 1
         contact = pressure > 0
-        displacement = compliance * halfspace.displacement(pressure)
+        displacement = compliance * operator.displacement(pressure)
         convolutions += 1
         opening = gap + displacement
         opening -= float(np.mean(opening[contact]))  # 2. (7): the mean is over the contact, not over all cells
@@ -92,7 +92,7 @@ def conjugate_gradients(
         old_norm = norm
         # 4. (11) uses the kernel at lag k; the operator of the present step is the one at lag 0. With the printed
         #    one the step is Phi(k dt)/Phi(0) times too short, and (16) then stops far from the solution.
-        change = compliance * halfspace.displacement(direction)
+        change = compliance * operator.displacement(direction)
         convolutions += 1
         change -= float(np.mean(change[contact]))  # (10), over the contact
         curvature = float(np.sum(direction * change))
@@ -109,7 +109,7 @@ def conjugate_gradients(
             break
         pressure *= load / total
         stagnated = float(np.sum(np.abs(pressure - previous))) * area <= epsilon * load
-    displacement = compliance * halfspace.displacement(pressure)
+    displacement = compliance * operator.displacement(pressure)
     convolutions += 1
     contact = pressure > 0
     level = float(np.mean((gap + displacement)[contact]))
@@ -186,19 +186,19 @@ def _advance(
     scene: Scene, material: Prony, state: State, increments: list[tuple[float, Array]], time: float, load: float
 ) -> tuple[State, Step]:
     """One step: the displacement of every past increment, then the contact under the present load."""
-    halfspace = scene.halfspace
+    operator = scene.operator
     glassy = float(material.contact_compliance(0.0))
     past = np.zeros_like(scene.gap)
     for applied, increment in increments:
         # 7. (5): an increment "acted at n dt" is one applied then and kept; its lag is k - n, zero for the present
         #    one, whose compliance is therefore C(0) also in (17).
-        past += halfspace.displacement(float(material.contact_compliance(time - applied)) * increment)
-    past -= glassy * halfspace.displacement(state.now.pressure)
+        past += operator.displacement(float(material.contact_compliance(time - applied)) * increment)
+    past -= glassy * operator.displacement(state.now.pressure)
     gap = scene.gap + past
     if load == 0:
         solution = SeedSolution(np.zeros_like(gap), np.zeros_like(gap), float(np.min(gap)), 0, 0, True)
     else:
-        solution = conjugate_gradients(halfspace, gap, glassy, load, epsilon=1e-2 * scene.tolerance)
+        solution = conjugate_gradients(operator, gap, glassy, load, epsilon=1e-2 * scene.tolerance)
     contact = Sparse.whole(solution.pressure)
     if at_edge(scene, contact):
         raise edge_error(scene, time)

@@ -52,9 +52,9 @@ def through_slide(scene: Scene, state: State, segment: Segment) -> Held:
         If the slide is shorter than half a cell, or the surface is not periodic.
     """
     assert segment.slide is not None
-    if scene.halfspace.boundary != "periodic":
+    if scene.operator.boundary != "periodic":
         raise InputError("a profile slides with periodic boundaries alone: expected boundary = 'periodic'")
-    cells = segment.slide.cells(scene.halfspace.spacing)
+    cells = segment.slide.cells(scene.operator.spacing)
     end, length = scene.program.corners[state.segment + 1], segment.duration / cells
     while state.now.time < end:
         taken = round((state.now.time - state.began) / length)
@@ -122,7 +122,7 @@ def _path(scene: Scene, state: State, accepted: State, slide: Slide) -> Slid:
     """How far the profile has come with a step. What is controlled is held: so much is the work of the normal force."""
     before = state.slid or Slid()
     normal = accepted.now.force * (accepted.now.approach - state.now.approach)
-    side = scene.halfspace.spacing[slide.axis]
+    side = scene.operator.spacing[slide.axis]
     return Slid(before.distance + side, before.work + (accepted.work - state.work) - normal)
 
 

@@ -40,15 +40,15 @@ _DISCARDED = 1e-3  # length of the short solve that shows a soft step's pressure
 
 
 def initial_state(scene: Scene) -> State:
-    nothing = np.zeros(scene.halfspace.shape)
+    nothing = np.zeros(scene.operator.shape)
     given = any(segment.control == "approach" for segment in scene.program.segments[:1])
     now = Instant(0.0, Sparse.of(nothing), 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
     at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes) else None
-    return State(now, nothing, scene.memory.start(scene.halfspace.shape), energy=at_rest)
+    return State(now, nothing, scene.memory.start(scene.operator.shape), energy=at_rest)
 
 
 def trial_at_rest(scene: Scene, state: State) -> Trial:
-    nothing = np.zeros(scene.halfspace.shape)
+    nothing = np.zeros(scene.operator.shape)
     return Trial(state.now, nothing, None if scene.memory.acts_on == "displacement" else nothing, 0.0, "linear")
 
 
@@ -73,7 +73,7 @@ def trial_step(
     alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
     carried = None if effective is None else field
-    threads = scene.halfspace.threads
+    threads = scene.operator.threads
     gap = field if carried is None else empty(field.shape)
     blockwise(np.add, scene.gap, field, out=gap, threads=threads)
     del field
@@ -86,13 +86,13 @@ def trial_step(
         return Trial(instant, carried, effective, length, rule, control)
     if alpha <= 0:
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
-    area = scene.halfspace.cell_area
+    area = scene.operator.cell_area
     start, start_displacement = state.first_guess(length) if guess is None else guess
     blockwise(np.multiply, start, alpha, out=start, threads=threads)
     if start_displacement is not None:
         blockwise(np.multiply, start_displacement, alpha, out=start_displacement, threads=threads)
     contact = solve_contact(
-        scene.halfspace,
+        scene.operator,
         gap,
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
@@ -141,7 +141,7 @@ def carried_into_step(scene: Scene, memory: Any, length: float, rule: Rule) -> t
         return alpha, None, carried
     if scene.memory.acts_on == "both":
         return alpha, carried[0], carried[1]
-    return alpha, carried, scene.halfspace.displacement(carried)
+    return alpha, carried, scene.operator.displacement(carried)
 
 
 def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
@@ -204,7 +204,7 @@ def energy_after(scene: Scene, state: Trajectory, trial: Trial) -> energy.Energy
         trial.rule,
         before.unit_displacement,
         (now.contact, now.unit_displacement),
-        scene.halfspace.cell_area,
+        scene.operator.cell_area,
         fresh=state.before is None,
         jumped=state.unresolved,
         work=work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
@@ -234,7 +234,7 @@ def work_between(scene: Scene, state: Trajectory, pressure: Array, displacement:
     only. Without memory it is the stored energy, whatever the steps. ``jumped``: the pressure changed at once, before.
     """
     mean = pressure if jumped else 0.5 * (state.now.pressure + pressure)
-    return float(np.sum(mean * (displacement - state.displacement))) * scene.halfspace.cell_area
+    return float(np.sum(mean * (displacement - state.displacement))) * scene.operator.cell_area
 
 
 def with_cost(state: State, trial: Trial) -> State:
@@ -318,16 +318,16 @@ def at_edge(scene: Scene, contact: Sparse) -> bool:
 
 def at_border(scene: Scene, contact: Sparse) -> bool:
     """Whether there is pressure at the border of a free-space domain."""
-    if scene.halfspace.boundary != "free":
+    if scene.operator.boundary != "free":
         return False
     pressure = contact.field()
-    borders = (-1,) if scene.halfspace.mirrored else (0, -1)
+    borders = (-1,) if scene.operator.mirrored else (0, -1)
     return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
 
 
 def edge_error(scene: Scene, time: float) -> EdgeContactError:
     """The error to raise where the grid cannot grow."""
-    nx, ny = scene.halfspace.surface_shape
+    nx, ny = scene.operator.surface_shape
     return EdgeContactError(
         f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
         "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
@@ -346,8 +346,8 @@ def enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
 
 def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict[str, Any]:
     """What changes of a trajectory on a larger grid, in which the present one begins at a cell."""
-    shape = scene.halfspace.shape
-    memory = scene.memory.enlarged(state.memory, shape, offset, scene.halfspace.displacement)
+    shape = scene.operator.shape
+    memory = scene.memory.enlarged(state.memory, shape, offset, scene.operator.displacement)
 
     def moved(instant: Instant) -> Instant:
         if not instant.contact.size:  # of a companion
@@ -357,7 +357,7 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
     glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
-    unit_displacement = scene.halfspace.displacement(now.pressure)
+    unit_displacement = scene.operator.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement
     return {"now": now, "displacement": displacement, "before": before, "memory": memory}

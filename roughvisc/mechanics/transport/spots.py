@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
+from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
 
@@ -109,7 +109,7 @@ def frozen_contact(
         x, y = _bounds(contact)
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
-    body = HalfSpace((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
+    body = Operator((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
     if contact.all() and not body.definite:
         return FrozenContact(math.inf, 0.0)
     punch = _punch(body, contact, tolerance)
@@ -125,7 +125,7 @@ def frozen_contact(
 
 
 def _extrapolated(
-    coarse: FrozenContact, contact: Mask, body: HalfSpace, tolerance: float, *, share: float, oblique: float
+    coarse: FrozenContact, contact: Mask, body: Operator, tolerance: float, *, share: float, oblique: float
 ) -> FrozenContact:
     """With the part of the edge that is known for certain extrapolated from cells of half the side."""
     split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
@@ -142,7 +142,7 @@ def _extrapolated(
     )
 
 
-def _punch(body: HalfSpace, contact: Mask, tolerance: float) -> ContactState:
+def _punch(body: Operator, contact: Mask, tolerance: float) -> ContactState:
     return solve_contact(
         body, np.zeros(contact.shape), approach=1.0, present=contact, tolerance=tolerance, overwrite=True
     )

@@ -19,7 +19,7 @@ from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import build_scene, check_slides, kept_times
 from roughvisc.experiment.stated import in_slide
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, HalfSpace
+from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.direct import History
@@ -385,7 +385,7 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
             contacts.append(share)
         damped += now > reached and _is_damped(scene, now - reached)
         contact = max(contact, share)
-        taken_off = staircase_area(touching, scene) / (scene.halfspace.cell_area * touching.size)
+        taken_off = staircase_area(touching, scene) / (scene.operator.cell_area * touching.size)
         fraction = max(fraction, share - taken_off)
         level, force = max(level, step.level), max(force, step.shown.force)
         course.append(Passed(step.level, width_of(touching, profile), step.state.convolutions - work))
@@ -449,14 +449,14 @@ class ConvolutionTimer:
             height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
         profile = Profile(height, "absent", kernel=kernel)
-        halfspace: HalfSpace = profile.halfspace("free" if boundary == "free" else "periodic")
+        operator: Operator = profile.operator("free" if boundary == "free" else "periodic")
         gap = profile.gap
-        load = 0.02 * float(np.mean(gap)) / (halfspace.self_influence or halfspace.spacing[0]) * gap.size
+        load = 0.02 * float(np.mean(gap)) / (operator.self_influence or operator.spacing[0]) * gap.size
         seconds = math.inf
         for iterations in itertools.chain((2,), itertools.repeat(6)):
             start = time.perf_counter()
             state = solve_contact(
-                halfspace, gap, load=load or 1.0, tolerance=1e-15, max_iterations=iterations, present=profile.present
+                operator, gap, load=load or 1.0, tolerance=1e-15, max_iterations=iterations, present=profile.present
             )
             now = time.perf_counter()
             seconds = min(seconds, (now - start) / max(state.convolutions, 1))

@@ -85,15 +85,15 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
         Of the body.
     """
     profile = Profile(height, "absent", mirror=True, kernel=kernel)
-    halfspace, shape = profile.halfspace(boundary), (height.sizes["x"], height.sizes["y"])
+    operator, shape = profile.operator(boundary), (height.sizes["x"], height.sizes["y"])
     present = None if profile.present.all() else profile.present
     nothing = push.load == 0 if push.approach is None else push.approach <= profile.least_gap
     if nothing:
         return Pressed(shape, 0.0, push.approach or profile.least_gap, (0.0, 0.0), at_border=False)
     found = solve_contact(
-        halfspace,
+        operator,
         profile.gap,
-        load=None if push.load is None else push.load / halfspace.cell_area,
+        load=None if push.load is None else push.load / operator.cell_area,
         approach=push.approach,
         tolerance=_TOLERANCE,
         present=present,
@@ -101,9 +101,9 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     )
     touching = found.pressure > 0
     free = ~touching if present is None else present & ~touching
-    periodic = boundary == "periodic" and not halfspace.mirrored
-    counted = np.count_nonzero(touching) * halfspace.cell_area
-    area = max(counted - staircase(touching, free, halfspace.cell_area, periodic), 0.0)
+    periodic = boundary == "periodic" and not operator.mirrored
+    counted = np.count_nonzero(touching) * operator.cell_area
+    area = max(counted - staircase(touching, free, operator.cell_area, periodic), 0.0)
     fraction = profile.contact_fraction(touching, area)
     return Pressed(shape, fraction, found.approach, width_of(touching, profile), _at_border(touching, profile.mirrored))
 

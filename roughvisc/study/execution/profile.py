@@ -11,7 +11,7 @@ from functools import wraps
 from typing import Any
 
 from roughvisc.experiment import loading
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
@@ -26,8 +26,8 @@ from roughvisc.study.storage.records import RowFile
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
 _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "transforms": (
-        *((HalfSpace, name) for name in ("displacement", "displacement_single")),
-        *((HalfSpace, name) for name in ("approximate_inverse", "approximate_inverse_within")),
+        *((Operator, name) for name in ("displacement", "displacement_single")),
+        *((Operator, name) for name in ("approximate_inverse", "approximate_inverse_within")),
         (FarFieldDisplacement, "spread"),
         *((Sliding, name) for name in ("displacement", "full_contact", "lagging", "force_across")),
     ),
@@ -36,7 +36,7 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
     "surface and kernels": (
         (Case, "height"),
         (loading, "build_scene"),
-        *((kind, "__init__") for kind in (HalfSpace, FarFieldDisplacement, Sliding)),
+        *((kind, "__init__") for kind in (Operator, FarFieldDisplacement, Sliding)),
     ),
     "kept rows": ((loading.LoadingRows, "row"), (RowFile, "append")),
     "files": ((run, "keep"), (CheckpointWriter, "save"), (CheckpointWriter, "resume")),

@@ -10,8 +10,8 @@ from support import direct
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import arrays as threads_module
-from roughvisc.mechanics.bodies import operator
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies import operator as operators
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.sparse import Scattered
 
 GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
@@ -20,7 +20,7 @@ GRIDS = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
 @pytest.mark.parametrize("shape", GRIDS)
 def test_free_displacement__is_the_sum_over_cells(shape):
     pressure = np.random.default_rng(1).random(shape)
-    found = HalfSpace(shape, (1.3, 0.7)).displacement(pressure)
+    found = Operator(shape, (1.3, 0.7)).displacement(pressure)
     expected = direct(pressure, (1.3, 0.7))
     assert np.abs(found - expected).max() < 1e-14 * expected.max()
 
@@ -32,7 +32,7 @@ def test_periodic_displacement__of_a_wave(shape, waves):
     spacing = (0.4, 0.9)
     phase = sum(2 * np.pi * k * index / n for k, index, n in zip(waves, np.indices(shape), shape, strict=True))
     wave_number = np.hypot(*(2 * np.pi * k / (n * d) for k, n, d in zip(waves, shape, spacing, strict=True)))
-    found = HalfSpace(shape, spacing, "periodic").displacement(np.cos(phase))
+    found = Operator(shape, spacing, "periodic").displacement(np.cos(phase))
     assert found == pytest.approx(2 / wave_number * np.cos(phase), abs=1e-13)
 
 
@@ -43,9 +43,9 @@ def test_periodic_displacement__of_a_wave(shape, waves):
 )
 @examples(40)
 def test_operators__are_symmetric_and_positive(shape, boundary, seed):
-    halfspace = HalfSpace(shape, (1.0, 0.6), boundary)
+    operator = Operator(shape, (1.0, 0.6), boundary)
     a, b = np.random.default_rng(seed).standard_normal((2, *shape))
-    for applied, precision in ((halfspace.displacement, 1e-12), (halfspace.approximate_inverse, 1e-5)):
+    for applied, precision in ((operator.displacement, 1e-12), (operator.approximate_inverse, 1e-5)):
         scale = np.linalg.norm(applied(a)) * np.linalg.norm(b) + 1e-300
         assert np.sum(applied(a) * b) == pytest.approx(np.sum(a * applied(b)), abs=precision * scale)
         assert np.sum(applied(a) * a) >= -precision * scale
@@ -55,8 +55,8 @@ def test_operators__are_symmetric_and_positive(shape, boundary, seed):
 def test_approximate_inverse__inverts_what_is_far_from_the_border(boundary):
     x, y = np.indices((45, 64))
     pressure = np.cos(2 * np.pi * 9 * x / 45) * np.exp(-(((x - 22) / 6.0) ** 2) - ((y - 32) / 6.0) ** 2)
-    halfspace = HalfSpace((45, 64), (1.0, 1.0), boundary)
-    back = halfspace.approximate_inverse(halfspace.displacement(pressure))
+    operator = Operator((45, 64), (1.0, 1.0), boundary)
+    back = operator.approximate_inverse(operator.displacement(pressure))
     assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
 
 
@@ -65,19 +65,19 @@ def in_small_blocks(monkeypatch):
     """Blocks and threads as on a large grid."""
     monkeypatch.setattr(threads_module, "_THREADED", 1)
     for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
-        monkeypatch.setattr(operator, name, value)
+        monkeypatch.setattr(operators, name, value)
 
 
 FIELDS = pytest.mark.parametrize("boundary", ["free", "periodic"])
 KINDS = pytest.mark.parametrize("mirrored", [False, True])
 
 
-def fields_by(halfspace, pressure):
+def fields_by(operator, pressure):
     single = pressure.astype(np.float32)
-    displaced = [halfspace.displacement(pressure), halfspace.displacement_single(single)]
+    displaced = [operator.displacement(pressure), operator.displacement_single(single)]
     few = scattered(pressure)
-    of_few = [halfspace.displacement_single(few), halfspace.approximate_inverse_within(few)]
-    return [*displaced, halfspace.approximate_inverse(single), *of_few]
+    of_few = [operator.displacement_single(few), operator.approximate_inverse_within(few)]
+    return [*displaced, operator.approximate_inverse(single), *of_few]
 
 
 def scattered(pressure):
@@ -94,19 +94,19 @@ def scattered(pressure):
 def test_scattered_field__is_taken_and_given_back_as_the_whole_one(request, boundary, mirrored, blocked):
     if blocked:
         request.getfixturevalue("in_small_blocks")
-    halfspace = HalfSpace((33, 46), (1.0, 0.7), boundary, mirrored=mirrored)
+    operator = Operator((33, 46), (1.0, 0.7), boundary, mirrored=mirrored)
     few = scattered(np.random.default_rng(4).random((33, 46)) * 1e-50)
     field = few.rows(slice(0, 33))
     assert 0 < np.count_nonzero(field) == few.cells.size < 0.4 * field.size
-    assert np.array_equal(halfspace.displacement_single(few), halfspace.displacement_single(field))
-    expected = halfspace.approximate_inverse(field).reshape(-1)[few.cells].astype(float) * few.size
-    np.testing.assert_allclose(halfspace.approximate_inverse_within(few), expected, rtol=1e-6)
+    assert np.array_equal(operator.displacement_single(few), operator.displacement_single(field))
+    expected = operator.approximate_inverse(field).reshape(-1)[few.cells].astype(float) * few.size
+    np.testing.assert_allclose(operator.approximate_inverse_within(few), expected, rtol=1e-6)
 
 
 @given(st.integers(1, 5000), st.integers(1, 20_000), st.sampled_from([np.float32, np.complex64, np.complex128]))
 def test_columns_of_a_block__are_never_few(count, points, kind):
     """A block of one column, as 2^n points would have, takes as long as it takes to wait for it."""
-    blocks = operator._column_blocks(count, points, np.dtype(kind))
+    blocks = operators._column_blocks(count, points, np.dtype(kind))
     together = max((1 << 20) // (points * np.dtype(kind).itemsize), 32)
     assert np.concatenate([np.arange(count)[block] for block in blocks]).tolist() == list(range(count))
     *others, last = (block.stop - block.start for block in blocks)
@@ -121,9 +121,9 @@ def test_fields__do_not_depend_on_threads(in_small_blocks, boundary, mirrored):
     pressure = np.random.default_rng(4).random((65, 70))
     found = []
     for threads in (1, 2, 3):
-        halfspace = HalfSpace((65, 70), (1.0, 1.0), boundary, workers=threads, mirrored=mirrored)
-        assert halfspace.threads == threads
-        found.append(fields_by(halfspace, pressure))
+        operator = Operator((65, 70), (1.0, 1.0), boundary, workers=threads, mirrored=mirrored)
+        assert operator.threads == threads
+        found.append(fields_by(operator, pressure))
     for others in found[1:]:
         assert all(np.array_equal(*pair) for pair in zip(found[0], others, strict=True))
 
@@ -133,30 +133,30 @@ def test_fields__do_not_depend_on_threads(in_small_blocks, boundary, mirrored):
 def test_fields__are_the_same_by_blocks(monkeypatch, boundary, mirrored):
     pressure = np.random.default_rng(4).random((33, 46))
     made = {"boundary": boundary, "mirrored": mirrored}
-    whole = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
+    whole = fields_by(Operator((33, 46), (1.0, 0.7), **made), pressure)
     for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
-        monkeypatch.setattr(operator, name, value)
-    blocked = fields_by(HalfSpace((33, 46), (1.0, 0.7), **made), pressure)
+        monkeypatch.setattr(operators, name, value)
+    blocked = fields_by(Operator((33, 46), (1.0, 0.7), **made), pressure)
     for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6, 3e-6, 3e-6), strict=True):
         assert other.dtype == one.dtype
         assert np.abs(one - other).max() < precision * np.abs(one).max()
 
 
 def test_threads__are_those_of_scipy_on_a_large_grid():
-    assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic").threads == 1
+    assert Operator((1024, 1024), (1.0, 1.0), "periodic").threads == 1
     with fft.set_workers(2):
-        assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic").threads == 2
-        assert HalfSpace((1024, 1023), (1.0, 1.0), "periodic").threads == 1
-        assert HalfSpace((1024, 1024), (1.0, 1.0), "periodic", workers=3).threads == 3
+        assert Operator((1024, 1024), (1.0, 1.0), "periodic").threads == 2
+        assert Operator((1024, 1023), (1.0, 1.0), "periodic").threads == 1
+        assert Operator((1024, 1024), (1.0, 1.0), "periodic", workers=3).threads == 3
 
 
 @pytest.mark.parametrize("shape", [(64, 128), (45, 150)])
 def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines(shape):
     """Blocks of 32 columns share no line, and columns do not all fall on the same places of the cache."""
-    halfspace = HalfSpace(shape, (1.0, 1.0), "periodic", workers=2)
+    operator = Operator(shape, (1.0, 1.0), "periodic", workers=2)
     for kind in (np.float32, np.float64):
-        spectrum, rooms = halfspace._working_memory(shape, np.dtype(kind), 2)
-        rows = operator._as(rooms.get(), np.dtype(kind), (2, shape[1]))
+        spectrum, rooms = operator._working_memory(shape, np.dtype(kind), 2)
+        rows = operators._as(rooms.get(), np.dtype(kind), (2, shape[1]))
         for memory in (spectrum, rows):
             assert memory.ctypes.data % 64 == 0
             assert memory.strides[0] % 128 == 64
@@ -164,7 +164,7 @@ def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines
 
 def test_boundary__is_named_when_unknown():
     with pytest.raises(InputError, match=r"boundary is 'open': expected 'free' or 'periodic'"):
-        HalfSpace((4, 4), (1.0, 1.0), "open")
+        Operator((4, 4), (1.0, 1.0), "open")
 
 
 def unfolded(corner):
@@ -175,8 +175,8 @@ def unfolded(corner):
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
     corner = np.random.default_rng(3).random(shape)
-    quarter = HalfSpace(shape, (1.3, 0.7), boundary, mirrored=True)
-    surface = HalfSpace(quarter.surface_shape, (1.3, 0.7), boundary)
+    quarter = Operator(shape, (1.3, 0.7), boundary, mirrored=True)
+    surface = Operator(quarter.surface_shape, (1.3, 0.7), boundary)
     assert surface.shape == (2 * shape[0], 2 * shape[1])
     assert quarter.cell_area == 4 * surface.cell_area
     for name, precision in (("displacement", 1e-13), ("approximate_inverse", 1e-5)):
@@ -192,13 +192,13 @@ def test_mirrored__is_the_quarter_of_a_surface(boundary, shape):
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_displacement_single__is_the_displacement_over_the_largest_influence(boundary, mirrored):
-    halfspace = HalfSpace((45, 150), (2e-9, 3e-9), boundary, mirrored=mirrored)
+    operator = Operator((45, 150), (2e-9, 3e-9), boundary, mirrored=mirrored)
     pressure = np.random.default_rng(0).random((45, 150))
-    exact = halfspace.displacement(pressure)
-    found = halfspace.displacement_single(pressure.astype(np.float32))
+    exact = operator.displacement(pressure)
+    found = operator.displacement_single(pressure.astype(np.float32))
     assert found.dtype == np.float32
-    np.testing.assert_allclose(found * halfspace.largest_influence, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
-    assert np.array_equal(halfspace.displacement(pressure), exact), "they share their working memory"
+    np.testing.assert_allclose(found * operator.largest_influence, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
+    assert np.array_equal(operator.displacement(pressure), exact), "they share their working memory"
 
 
 @pytest.mark.parametrize("shape", [(7, 5), (8, 6), (1, 9)])
@@ -209,24 +209,24 @@ def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
     def at_centre(a, b):
         return 2 / np.pi * (a * np.arcsinh(b / a) + b * np.arcsinh(a / b))
 
-    assert HalfSpace(shape, (a, b)).self_influence == pytest.approx(at_centre(a, b), rel=1e-12)
+    assert Operator(shape, (a, b)).self_influence == pytest.approx(at_centre(a, b), rel=1e-12)
     # seen from the centre of one of four: quarters of the rectangles of one and of three cells along each axis
     four = sum(at_centre(i * a, j * b) for i in (1, 3) for j in (1, 3)) / 4
-    assert HalfSpace(shape, (a, b), mirrored=True).self_influence == pytest.approx(four, rel=1e-12)
+    assert Operator(shape, (a, b), mirrored=True).self_influence == pytest.approx(four, rel=1e-12)
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("shape", [(7, 6), (8, 5), (1, 4), (1, 1)])
 def test_self_influence__is_the_displacement_of_a_cell_that_is_loaded_alone(boundary, mirrored, shape):
-    halfspace = HalfSpace(shape, (1.3, 0.7), boundary, mirrored=mirrored)
+    operator = Operator(shape, (1.3, 0.7), boundary, mirrored=mirrored)
     alone = np.zeros(shape)
     alone[0, 0] = 1
-    assert halfspace.self_influence == pytest.approx(halfspace.displacement(alone)[0, 0], rel=1e-13)
+    assert operator.self_influence == pytest.approx(operator.displacement(alone)[0, 0], rel=1e-13)
 
 
 def test_self_influence__with_periodic_boundaries_is_the_mean_of_the_symbol():
-    found = HalfSpace((7, 6), (1.3, 0.7), "periodic").self_influence
+    found = Operator((7, 6), (1.3, 0.7), "periodic").self_influence
     qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((7, 6), (1.3, 0.7), strict=True))
     q = np.hypot(qx[:, None], qy).ravel()[1:]
     assert found == pytest.approx((2 / q).sum() / 42, rel=1e-12)

@@ -7,7 +7,7 @@ from scipy import fft
 import roughvisc as rv
 from roughvisc.mechanics.bodies import ducc, transforms
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window
 
@@ -58,8 +58,8 @@ def test_half_space__is_the_same_by_both(boundary, mirrored, monkeypatch):
     found = []
     for engine in ("scipy", "ducc0"):
         monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
-        halfspace = HalfSpace(pressure.shape, (1.0, 0.7), boundary, mirrored=mirrored)
-        found.append((halfspace.displacement(pressure), halfspace.approximate_inverse(pressure.astype(np.float32))))
+        operator = Operator(pressure.shape, (1.0, 0.7), boundary, mirrored=mirrored)
+        found.append((operator.displacement(pressure), operator.approximate_inverse(pressure.astype(np.float32))))
     for (a, b), precision in zip(zip(*found, strict=True), (1e-14, 1e-5), strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
 
@@ -107,4 +107,4 @@ def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
 def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):
     monkeypatch.setattr(ducc, "ducc0", None)
     assert transform_library().startswith("scipy.fft ")
-    HalfSpace((5, 4), (1.0, 1.0)).displacement(np.ones((5, 4)))
+    Operator((5, 4), (1.0, 1.0)).displacement(np.ones((5, 4)))

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.window import (
     FarFieldDisplacement,
     Window,
@@ -81,7 +81,7 @@ def test_window__takes_in_every_summit_of_the_same_height():
 def test_reach__is_the_displacement_of_the_whole_domain(spacing, first, shape):
     domain = (41, 53)
     pressure = np.random.default_rng(0).random(shape)
-    expected = HalfSpace(domain, spacing).displacement(padded(pressure, domain, first))
+    expected = Operator(domain, spacing).displacement(padded(pressure, domain, first))
     window = Window(domain, first, shape)
     found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(pressure)])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
@@ -123,7 +123,7 @@ def test_mirrored_reach__is_that_of_the_window_with_its_images(spacing, shape):
     corner, domain = np.random.default_rng(0).random(shape), (21, 27)
     pressure = np.block([[corner[::-1, ::-1], corner[::-1]], [corner[:, ::-1], corner]])
     first = (domain[0] - shape[0], domain[1] - shape[1])
-    expected = HalfSpace((42, 54), spacing).displacement(padded(pressure, (42, 54), first))
+    expected = Operator((42, 54), spacing).displacement(padded(pressure, (42, 54), first))
     window = Window(domain, (0, 0), shape, mirrored=True)
     found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(corner)])
     np.testing.assert_allclose(found, expected[21:, 27:], rtol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from support import rough_gap
 
 from roughvisc.mechanics import arrays as passes
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import certificate as full_contact
 from roughvisc.mechanics.contact import problem
 from roughvisc.mechanics.contact.certificate import Asked, Certificate, certify, estimated_error
@@ -23,15 +23,15 @@ class Case:
     """A problem in its own units, a pressure on part of the cells, and the matrix that displaces them."""
 
     def __init__(self, boundary="free", present=None, tolerance=1e-6, touching=0.6, **known):
-        self.halfspace = HalfSpace(SHAPE, SPACING, boundary)
+        self.operator = Operator(SHAPE, SPACING, boundary)
         self.gap = rough_gap(SHAPE)
         wanted = {"load": None, "approach": None} | known
         self.problem = ContactProblem.scaled(
-            self.halfspace, self.gap.copy(), **wanted, tolerance=tolerance, present=present
+            self.operator, self.gap.copy(), **wanted, tolerance=tolerance, present=present
         )
         cells = np.eye(self.gap.size).reshape(-1, *SHAPE)
         ratio = self.problem.unit / self.problem.length
-        self.matrix = np.array([self.halfspace.displacement(cell).ravel() for cell in cells]) * ratio
+        self.matrix = np.array([self.operator.displacement(cell).ravel() for cell in cells]) * ratio
         rng = np.random.default_rng(1)
         self.pressure = rng.random(SHAPE) * (rng.random(SHAPE) < touching)
         if present is not None:
@@ -56,7 +56,7 @@ def test_scaled_problem__is_the_same_in_other_units():
         assert problem.gap * problem.length + lowest == pytest.approx(case.gap)
         pressure = np.arange(case.gap.size, dtype=float).reshape(SHAPE)
         displaced = problem.influence.displacement(pressure)
-        assert displaced * problem.length == pytest.approx(case.halfspace.displacement(pressure * problem.unit))
+        assert displaced * problem.length == pytest.approx(case.operator.displacement(pressure * problem.unit))
         if "load" in known:
             assert problem.load * problem.unit == pytest.approx(3.0)
         else:
@@ -70,7 +70,7 @@ def test_first_guess__is_made_admissible(known, told):
     guess = np.random.default_rng(4).standard_normal(SHAPE)
     if told:
         guess = np.abs(guess) * CORNER
-    displacement = case.halfspace.displacement(guess) if told else None
+    displacement = case.operator.displacement(guess) if told else None
     pressure, displaced = case.problem.initial_iterate(guess.copy(), displacement)
     expected = np.maximum(guess, 0) * CORNER
     expected *= 3.0 / expected.sum() if "load" in known else 1.0
@@ -249,7 +249,7 @@ def test_estimated_error__where_the_energy_does_not_see_the_load():
     free = (case.separation < 1.0) | (case.pressure > 0)
     residual = np.where(free, case.separation - 1.0, 0.0)
     inverse = np.array(
-        [case.problem.influence.halfspace.approximate_inverse(c.astype(np.float32)).ravel()
+        [case.problem.influence.operator.approximate_inverse(c.astype(np.float32)).ravel()
          for c in np.eye(case.gap.size).reshape(-1, *SHAPE)]
     ).T  # fmt: skip
     change = (inverse @ residual.ravel())[free.ravel()] * case.problem.length / case.problem.unit

@@ -7,7 +7,7 @@ import pytest
 from support import rough_gap
 
 from roughvisc.mechanics import arrays as passes
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solver
 from roughvisc.mechanics.contact.problem import ContactProblem
 from roughvisc.mechanics.contact.solver import (
@@ -25,11 +25,11 @@ CONTROLS = pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 0.9}], 
 
 def scaled(known, boundary="free", present=None):
     """A problem, and the matrix that displaces its cells, both in its own units."""
-    halfspace = HalfSpace(SHAPE, SPACING, boundary)
+    operator = Operator(SHAPE, SPACING, boundary)
     wanted = {"load": None, "approach": None} | known
-    problem = ContactProblem.scaled(halfspace, rough_gap(SHAPE), **wanted, tolerance=1e-6, present=present)
+    problem = ContactProblem.scaled(operator, rough_gap(SHAPE), **wanted, tolerance=1e-6, present=present)
     cells = np.eye(problem.gap.size).reshape(-1, *SHAPE)
-    matrix = np.array([halfspace.displacement(cell).ravel() for cell in cells]) * problem.unit / problem.length
+    matrix = np.array([operator.displacement(cell).ravel() for cell in cells]) * problem.unit / problem.length
     return problem, matrix
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solver
 
 
@@ -16,7 +16,7 @@ def test_first_guess__is_the_pressure_of_hertz(shape, spacing):
     width, area = min(n * side for n, side in zip(shape, spacing, strict=True)), spacing[0] * spacing[1]
     radius, wanted = 10 * width, 0.2 * width
     force = 4 / 3 * wanted**3 / radius  # a contact of this radius on a unit modulus
-    guess = solver.coarse_guess(HalfSpace(shape, spacing), squared / (2 * radius), force / area)
+    guess = solver.coarse_guess(Operator(shape, spacing), squared / (2 * radius), force / area)
     assert guess.shape == shape
     exact = closed_forms.hertz(radius, 1.0, force).pressure(np.sqrt(squared))
     assert np.sum(guess) * area == pytest.approx(force, rel=2e-2)
@@ -35,10 +35,10 @@ def test_first_guess__is_the_solution_on_blocks_of_two_by_two_cells(shape, monke
     within = [np.arange(n) * m // n for n, m in zip(shape, of_blocks, strict=True)]
     gap = profile[np.ix_(*within)]
     load = 0.05 * gap.size
-    guess = solver.coarse_guess(HalfSpace(shape, spacing, "periodic"), gap, load)
+    guess = solver.coarse_guess(Operator(shape, spacing, "periodic"), gap, load)
     wide = tuple(d * n / m for d, n, m in zip(spacing, shape, of_blocks, strict=True))
     of_them = load * profile.size / gap.size
-    found = solver.solve_contact(HalfSpace(of_blocks, wide, "periodic"), profile, load=of_them, tolerance=1e-10)
+    found = solver.solve_contact(Operator(of_blocks, wide, "periodic"), profile, load=of_them, tolerance=1e-10)
     assert 0.01 < np.mean(found.pressure > 0) < 0.5
     np.testing.assert_allclose(guess, found.pressure[np.ix_(*within)], atol=1e-4 * found.pressure.max())
 
@@ -48,30 +48,30 @@ def test_first_guess__is_of_means_over_blocks():
     random, shape = np.random.default_rng(5), (258, 256)
     rises = [np.kron(random.random(n // 2), [1.0, -1.0]) for n in shape]
     gap = 3.0 + rises[0][:, None] + rises[1]
-    guess = solver.coarse_guess(HalfSpace(shape, (1.0, 1.0), "periodic"), gap, 5.0)
+    guess = solver.coarse_guess(Operator(shape, (1.0, 1.0), "periodic"), gap, 5.0)
     np.testing.assert_allclose(guess, 5.0 / guess.size, rtol=1e-9)
 
 
 def test_first_guess__is_for_large_grids():
     x, y = np.indices((256, 255)) - 127.3
     gap = x**2 + y**2
-    assert solver.coarse_guess(HalfSpace((256, 255), (1.0, 1.0)), gap, 1.0) is None
+    assert solver.coarse_guess(Operator((256, 255), (1.0, 1.0)), gap, 1.0) is None
     wide = np.pad(gap, ((0, 0), (0, 1)), mode="edge")
-    assert all(solver.coarse_guess(HalfSpace((256, 256), (1.0, 1.0)), wide, load) is not None for load in (1.0, 1e9))
+    assert all(solver.coarse_guess(Operator((256, 256), (1.0, 1.0)), wide, load) is not None for load in (1.0, 1e9))
 
 
 def test_contact__asks_for_a_load_or_an_approach():
-    halfspace, gap = HalfSpace((3, 4), (1.0, 1.0)), np.zeros((3, 4))
+    operator, gap = Operator((3, 4), (1.0, 1.0)), np.zeros((3, 4))
     for known in ({}, {"load": 1.0, "approach": 1.0}):
         with pytest.raises(ValueError, match="either a load or an approach"):
-            solver.solve_contact(halfspace, gap, **known)
+            solver.solve_contact(operator, gap, **known)
 
 
 def test_contact__leaves_its_arguments_alone_unless_told():
-    halfspace = HalfSpace((6, 5), (1.0, 1.0))
+    operator = Operator((6, 5), (1.0, 1.0))
     gap, start = np.random.default_rng(0).random((6, 5)), np.random.default_rng(1).random((6, 5))
-    displacement = halfspace.displacement(start)
+    displacement = operator.displacement(start)
     before = [array.copy() for array in (gap, start, displacement)]
     for known in ({"load": 2.0}, {"approach": 0.5}):
-        solver.solve_contact(halfspace, gap, start=start, start_displacement=displacement, **known)
+        solver.solve_contact(operator, gap, start=start, start_displacement=displacement, **known)
         assert all(np.array_equal(*pair) for pair in zip((gap, start, displacement), before, strict=True))

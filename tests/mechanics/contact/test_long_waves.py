@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import long_waves, solve_contact
 from roughvisc.mechanics.contact.influence import Influence
 from roughvisc.mechanics.contact.long_waves import LongWaves
@@ -33,7 +33,7 @@ def spots():
 
 
 def waves_of(boundary="periodic", mirrored=False):
-    influence = Influence(HalfSpace(SHAPE, SPACING, boundary, mirrored=mirrored), 1.7)
+    influence = Influence(Operator(SHAPE, SPACING, boundary, mirrored=mirrored), 1.7)
     cells = spots()
     pressure = np.zeros(SHAPE)
     pressure.reshape(-1)[cells] = np.random.default_rng(1).random(cells.size) + 0.5
@@ -66,7 +66,7 @@ def test_both_levels__are_symmetric_and_positive(on_small_grids, boundary, mirro
 def test_blocks__are_answered_by_the_inverse_of_their_own_equations(on_small_grids, boundary, mirrored):
     influence, _, waves = waves_of(boundary, mirrored)
     count = waves.cells.size
-    coarse = influence.halfspace.coarse
+    coarse = influence.operator.coarse
     assert coarse.shape == (7, 5)
     assert np.multiply(coarse.shape, coarse.spacing) == pytest.approx(np.multiply(SHAPE, SPACING))
     kernel = matrix(influence.of_blocks, count)
@@ -100,16 +100,16 @@ def test_local_compliance__is_what_spots_sink_in_beside_their_blocks(on_small_gr
 def test_both_levels__need_fewer_iterations_on_a_wide_rough_surface(monkeypatch):
     """Those of one level grow with the width."""
     surface = self_affine((500.0, 490.0), (500, 490), hurst=0.8, rms_slope=1.0, rolloff=125.0, seed=3)
-    halfspace, gap = HalfSpace((500, 490), (1.0, 1.0), "free"), surface.values.max() - surface.values
-    alone = solve_contact(halfspace, gap, load=0.05 * gap.size, tolerance=1e-4)
+    operator, gap = Operator((500, 490), (1.0, 1.0), "free"), surface.values.max() - surface.values
+    alone = solve_contact(operator, gap, load=0.05 * gap.size, tolerance=1e-4)
     monkeypatch.setattr(long_waves, "_FROM", 400)
-    both = solve_contact(halfspace, gap, load=0.05 * gap.size, tolerance=1e-4)
+    both = solve_contact(operator, gap, load=0.05 * gap.size, tolerance=1e-4)
     assert 0.05 < np.mean(alone.pressure > 0) < 0.15
     assert both.iterations < 0.75 * alone.iterations
 
 
 def test_long_waves__are_left_to_large_grids_sparse_contact_and_kernels_that_give_way():
-    influence, cells, _ = Influence(HalfSpace(SHAPE, SPACING), 1.0), spots(), None
+    influence, cells, _ = Influence(Operator(SHAPE, SPACING), 1.0), spots(), None
     ones = np.ones(cells.size)
     assert LongWaves.of(influence, cells, ones, 1e9) is None
     with pytest.MonkeyPatch.context() as patch:
@@ -124,7 +124,7 @@ def test_long_waves__are_left_to_large_grids_sparse_contact_and_kernels_that_giv
 
 def test_spots__count_by_the_cells_whose_block_is_not_all_free(monkeypatch):
     """Half of the free cells fill their blocks, the others do not: 0.5 times 8 blocks a side."""
-    influence = Influence(HalfSpace((64, 72), (1.0, 1.0)), 1.0)
+    influence = Influence(Operator((64, 72), (1.0, 1.0)), 1.0)
     mask = np.zeros((64, 72), bool)
     mask[8:16, :8] = mask[24:32, 16:24] = True
     mask[40:56, 4::9] = True
@@ -139,7 +139,7 @@ def test_one_round_contact__needs_no_blocks(monkeypatch):
     """With them it took 117 iterations."""
     monkeypatch.setattr(long_waves, "_FROM", 384)
     gap = sum(np.square(x - 191.5) for x in np.indices((384, 384))) / 384.0
-    state = solve_contact(HalfSpace((384, 384), (1.0, 1.0), "free"), gap, load=0.1 * gap.size, tolerance=1e-6)
+    state = solve_contact(Operator((384, 384), (1.0, 1.0), "free"), gap, load=0.1 * gap.size, tolerance=1e-6)
     assert 0.1 < np.mean(state.pressure > 0) < 0.4
     assert state.iterations < 25
 
@@ -149,12 +149,12 @@ def test_one_round_contact__needs_no_blocks(monkeypatch):
 def test_contact__is_the_same_with_both_levels(monkeypatch, boundary, given):
     rng = np.random.default_rng(5)
     gap = rng.random((96, 75)) + 0.002 * ((np.indices((96, 75)).T - (50, 31)) ** 2).sum(-1).T
-    halfspace = HalfSpace((96, 75), (1.0, 1.3), boundary)
+    operator = Operator((96, 75), (1.0, 1.3), boundary)
     known = {"load": 300.0} if given == "load" else {"approach": 1.2}
-    alone = solve_contact(halfspace, gap, tolerance=1e-12, **known)
+    alone = solve_contact(operator, gap, tolerance=1e-12, **known)
     monkeypatch.setattr(long_waves, "_FROM", 1)
     monkeypatch.setattr(long_waves, "_SPOTS", 0.0)
-    both = solve_contact(halfspace, gap, tolerance=1e-12, **known)
+    both = solve_contact(operator, gap, tolerance=1e-12, **known)
     assert both.converged
     assert both.iterations != alone.iterations  # the second level was there
     assert np.abs(both.pressure - alone.pressure).sum() < 3e-6 * alone.pressure.sum()

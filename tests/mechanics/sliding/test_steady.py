@@ -11,7 +11,7 @@ from scipy import fft
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.materials.frequency import complex_compliance
@@ -175,7 +175,7 @@ def test_ends_of_the_speed_axis__are_elastic_and_without_friction(speed, complia
     found = slid(row, rubber(), speed, 2e-4)
     spacing = (PERIOD / 45, PERIOD / 45)
     load = 2e-4 * compliance / math.prod(spacing)
-    elastic = solve_contact(HalfSpace((45, 1), spacing, "periodic"), row.max() - row, load=load)
+    elastic = solve_contact(Operator((45, 1), spacing, "periodic"), row.max() - row, load=load)
     assert 0.1 < np.mean(found.pressure > 0) < 0.9
     assert 0 < found.power_force < 1e-2 * slid(row, rubber(), 0.1, 2e-4).power_force
     np.testing.assert_allclose(found.pressure, elastic.pressure / compliance, atol=2e-3 * found.pressure.max())
@@ -186,7 +186,7 @@ def test_slow_sliding__is_relaxed_on_a_rough_surface():
     found = slid(ROUGH, rubber(), 1e-6, LOAD)
     spacing = (PERIOD / 45, PERIOD / 40)
     load = LOAD * 1e-6 / math.prod(spacing)
-    elastic = solve_contact(HalfSpace((45, 40), spacing, "periodic"), ROUGH.max() - ROUGH, load=load)
+    elastic = solve_contact(Operator((45, 40), spacing, "periodic"), ROUGH.max() - ROUGH, load=load)
     assert np.abs(found.pressure - elastic.pressure / 1e-6).sum() < 1e-3 * found.pressure.sum()
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import events as apart
 from roughvisc.mechanics.stepping import march as marching
@@ -27,7 +27,7 @@ def sphere(program, material=MATERIAL, **settings):
     shape, spacing = (9, 7), (0.1, 0.12)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(HalfSpace(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def contacts(steps):
@@ -88,7 +88,7 @@ def test_dent_of_a_punch__is_touched_again_when_it_has_recovered_so_far():
     shape = (9, 7)
     x, y = (np.arange(n) - n // 2 for n in shape)
     present = x[:, None] ** 2 + y[None, :] ** 2 < 6
-    half_space, material = HalfSpace(shape, (1.0, 1.0)), rv.zener(1.0, 0.5, 0.5)  # retarded in 1 s
+    half_space, material = Operator(shape, (1.0, 1.0)), rv.zener(1.0, 0.5, 0.5)  # retarded in 1 s
     first = Scene(half_space, np.zeros(shape), material, Modes(material), program, present=present)
     left = list(march(first))[-1].shown.approach  # where it would be touched
     assert left > 0

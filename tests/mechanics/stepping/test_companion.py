@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment.stated import error_columns, meets_tolerance
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sparse import Sparse, Sum
@@ -36,7 +36,7 @@ def sphere(material, program, **settings):
     shape, spacing = (19, 16), (0.08, 0.09)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(HalfSpace(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def rough(material, program, **settings):
@@ -51,7 +51,7 @@ def rough(material, program, **settings):
                 phase = i * x[:, None] + j * y[None, :] + 2 * np.pi * rng.random()
                 height += 0.02 * (i**2 + j**2) ** -0.9 * np.cos(phase)
     gap = height.max() - height
-    return Scene(HalfSpace(shape, spacing, "periodic"), gap, material, Modes(material), program, **settings)
+    return Scene(Operator(shape, spacing, "periodic"), gap, material, Modes(material), program, **settings)
 
 
 SURFACES = {"sphere": sphere, "rough": rough}
@@ -68,7 +68,7 @@ def true_errors(found, exact):
 
 def _true_error(step, exact):
     one, other, force = step.shown, exact.shown, exact.state.largest_force
-    pressure = step.scene.halfspace.cell_area * float(np.abs(one.pressure - other.pressure).sum())
+    pressure = step.scene.operator.cell_area * float(np.abs(one.pressure - other.pressure).sum())
     by_approach = abs(one.approach - other.approach) / exact.state.largest_approach
     return max(pressure / force, abs(one.force - other.force) / force, by_approach)
 
@@ -178,11 +178,11 @@ def test_work_error__of_a_direct_history_covers_the_true_one():
 def test_area_in_doubt__is_counted_cell_by_cell():
     """In contact where both differ by no less than is there; out of it where the companion touches, or might have."""
     program = rv.Program().load(1.0, over=1.0)
-    halfspace, nothing = HalfSpace((3, 4), (1.0, 1.0)), np.zeros((3, 4))
+    operator, nothing = Operator((3, 4), (1.0, 1.0)), np.zeros((3, 4))
     material = MATERIALS["zener"]
     gap = np.array([[0.0] * 4, [0.0] * 4, [0.1, 0.1, 0.3, 0.1]])
     present = np.array([[True] * 4, [True] * 4, [True, True, True, False]])
-    scene = Scene(halfspace, gap, material, Modes(material), program, present=present)
+    scene = Scene(operator, gap, material, Modes(material), program, present=present)
     # the first two rows are in contact, but for the last cell of the second one
     fine = np.array([[4.0, 4.0, 4.0, 4.0], [4.0, 4.0, 4.0, 0.0], [0.0] * 4])
     coarse = np.array([[4.0, 3.0, 0.0, 7.9], [8.1, 4.0, 0.0, 0.5], [0.0] * 4])

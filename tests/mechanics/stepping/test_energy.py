@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 from roughvisc.mechanics.sparse import Sparse
@@ -30,8 +30,8 @@ NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 
 def dense(boundary="free"):
     """The influence matrix, column by column."""
-    halfspace = HalfSpace(SHAPE, SPACING, boundary)
-    return np.array([halfspace.displacement(unit.reshape(SHAPE)).ravel() for unit in np.eye(np.prod(SHAPE))])
+    operator = Operator(SHAPE, SPACING, boundary)
+    return np.array([operator.displacement(unit.reshape(SHAPE)).ravel() for unit in np.eye(np.prod(SHAPE))])
 
 
 def pressures(count, seed=3):
@@ -42,10 +42,10 @@ def pressures(count, seed=3):
 
 def carried(material, fields, lengths, rule, acts_on="displacement", boundary="free", fresh=False):
     """The energies after steps between fields, a step of no length being a jump."""
-    halfspace = HalfSpace(SHAPE, SPACING, boundary)
+    operator = Operator(SHAPE, SPACING, boundary)
     memory = Modes(material, acts_on)
     state, found = memory.start(SHAPE), energy.at_rest(memory)
-    pairs = [(field, halfspace.displacement(field)) for field in fields]
+    pairs = [(field, operator.displacement(field)) for field in fields]
     for number, (length, start, end) in enumerate(zip(lengths, *zip(*pairwise(pairs), strict=True), strict=True)):
         now = "euler" if rule == "bdf2" and number == 0 else rule
         held = Sparse.whole(end[0]), end[1]
@@ -147,10 +147,10 @@ def test_first_step_after_an_event__leaves_open_a_quarter_of_what_two_ways_of_co
 def test_step_that_stands_for_a_jump__works_as_a_held_load():
     """All of the pressure on all of the displacement, where nothing gives way at once."""
     material, step = rv.Prony(0.0, 0.2, (1.0, 0.4), (0.3, 2.0)), 0.1
-    halfspace, memory = HalfSpace(SHAPE, SPACING), Modes(material)
+    operator, memory = Operator(SHAPE, SPACING), Modes(material)
     rest, pressure = pressures(1)
     state = memory.start(SHAPE)
-    ends = rest, (Sparse.whole(pressure), halfspace.displacement(pressure))
+    ends = rest, (Sparse.whole(pressure), operator.displacement(pressure))
     found = energy.after_step(
         energy.at_rest(memory), memory, state, step, "euler", *ends, AREA, fresh=True, jumped=True
     )
@@ -187,11 +187,11 @@ def punch(material, program, cells=(11, 9), radius=3.6, **settings):
     """A flat punch of a few cells, and the radius of the round one that is as stiff."""
     x, y = (np.arange(n) - n // 2 for n in cells)
     present = x[:, None] ** 2 + y[None, :] ** 2 <= radius**2
-    halfspace = HalfSpace(cells, (1.0, 1.0))
+    operator = Operator(cells, (1.0, 1.0))
     units = [unit.reshape(cells) for unit in np.eye(present.size)[present.ravel()]]
-    matrix = np.array([halfspace.displacement(unit)[present] for unit in units])
+    matrix = np.array([operator.displacement(unit)[present] for unit in units])
     stiff_as = 0.5 * np.linalg.solve(matrix, np.ones(len(units))).sum()  # F = 2 a E* delta
-    scene = Scene(halfspace, np.zeros(cells), material, Modes(material), program, present=present, **settings)
+    scene = Scene(operator, np.zeros(cells), material, Modes(material), program, present=present, **settings)
     return scene, float(stiff_as)
 
 
@@ -199,7 +199,7 @@ def sphere(material, program, **settings):
     shape, spacing = (17, 15), (0.1, 0.11)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(HalfSpace(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def rows(scene):

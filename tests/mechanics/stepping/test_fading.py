@@ -97,7 +97,7 @@ def test_one_kept_time__costs_less_and_is_as_right_as_asked(name, what, monkeypa
     )
     all_alike = list(march(replace(made, times=(2.0,))))[-1]
     assert last.state.convolutions < 0.9 * all_alike.state.convolutions
-    off = np.abs(last.shown.pressure - exact.shown.pressure).sum() * made.halfspace.cell_area
+    off = np.abs(last.shown.pressure - exact.shown.pressure).sum() * made.operator.cell_area
     assert off <= 1e-3 * exact.state.largest_force
     assert abs(last.work - exact.work) <= 1e-3 * exact.state.largest_work
     assert last.time_error <= 1e-3 * 1.5

@@ -8,7 +8,7 @@ from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, scene
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms, sparse
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 
@@ -96,7 +96,7 @@ def test_forms_of_memory__give_the_same_numbers():
 @pytest.mark.parametrize("rule", ["linear", "bdf2"])
 def test_memory_of_both__outlives_a_change_of_the_grid(rule):
     """On the larger grid, what is carried displaces it as the carried pressure does."""
-    small, large, offset = HalfSpace((9, 7), (0.1, 0.1)), HalfSpace((14, 11), (0.1, 0.1)), (3, 2)
+    small, large, offset = Operator((9, 7), (0.1, 0.1)), Operator((14, 11), (0.1, 0.1)), (3, 2)
     memory = Modes(MATERIALS["two_branches"], "both")
     state, rng = memory.start(small.shape), np.random.default_rng(1)
     for _ in range(3):

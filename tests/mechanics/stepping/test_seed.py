@@ -6,7 +6,7 @@ from support import MATERIALS, STEP_LOAD, scene
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.stepping import seed
 from roughvisc.mechanics.stepping.march import march
 
@@ -15,8 +15,8 @@ def hertz_run(sign, max_iterations=600):
     n, size = 65, 1.6
     x = (np.arange(n) - n // 2) * size / n
     gap = (x[:, None] ** 2 + x[None, :] ** 2) / 2
-    halfspace = HalfSpace((n, n), (size / n, size / n))
-    return seed.conjugate_gradients(halfspace, gap, 0.25, 0.1, epsilon=1e-10, sign=sign, max_iterations=max_iterations)
+    operator = Operator((n, n), (size / n, size / n))
+    return seed.conjugate_gradients(operator, gap, 0.25, 0.1, epsilon=1e-10, sign=sign, max_iterations=max_iterations)
 
 
 def test_printed_sign_of_equation_9__stalls_where_the_coded_one_converges():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -14,8 +14,8 @@ SHAPE, MEAN, AMPLITUDE, PERIOD = (5, 4), 1.0, 0.5, 1.0
 
 def punch(material, program, **settings):
     """A flat punch of five by four cells, all of them always in contact: approach is linear in load."""
-    halfspace = HalfSpace(SHAPE, (1.0, 1.2))
-    return march(Scene(halfspace, np.zeros(SHAPE), material, Modes(material), program, accept_edge=True, **settings))
+    operator = Operator(SHAPE, (1.0, 1.2))
+    return march(Scene(operator, np.zeros(SHAPE), material, Modes(material), program, accept_edge=True, **settings))
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])

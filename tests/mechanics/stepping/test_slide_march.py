@@ -10,7 +10,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance
@@ -44,19 +44,19 @@ def scene(height, material, program, times=(), tolerance=1e-3, memory=None):
     """On a square surface, or on a strip of square cells."""
     nx, ny = height.shape
     spacing = (PERIOD / nx, PERIOD / ny if ny > 3 else PERIOD / nx)
-    halfspace = HalfSpace((nx, ny), spacing, "periodic")
+    operator = Operator((nx, ny), spacing, "periodic")
     memory = memory or Modes(material)
-    return Scene(halfspace, height.max() - height, material, memory, program, times=times, tolerance=tolerance)
+    return Scene(operator, height.max() - height, material, memory, program, times=times, tolerance=tolerance)
 
 
 def force(found, step):
     """Against the motion. [N]"""
     slide = found.motions[segment_number(step.state)]
-    return tangential_force(found.halfspace, step.shown.pressure, step.displacement, slide)
+    return tangential_force(found.operator, step.shown.pressure, step.displacement, slide)
 
 
 def area(found):
-    return found.halfspace.cell_area * found.gap.size
+    return found.operator.cell_area * found.gap.size
 
 
 def modulus(material, frequency):
@@ -69,8 +69,8 @@ def settled(height, material, speed, load, periods=6, **settings):
 
 
 def steady(found, material, speed, load):
-    halfspace = found.halfspace
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, material), halfspace.shape, halfspace.spacing, speed)
+    operator = found.operator
+    sliding = Sliding(HALF_SPACE, partial(complex_compliance, material), operator.shape, operator.spacing, speed)
     return steady_state(sliding, found.gap, load, tolerance=1e-6)
 
 
@@ -171,7 +171,7 @@ def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
     assert dissipated == pytest.approx(got * speed, rel=0.01)
     work = (after.state.slid.work - before.state.slid.work) / PERIOD
     assert work == pytest.approx(exact.power_force, rel=2e-3)
-    by_slopes = float(np.sum(after.shown.pressure * slope(found.gap, PERIOD / 128, 0))) * found.halfspace.cell_area
+    by_slopes = float(np.sum(after.shown.pressure * slope(found.gap, PERIOD / 128, 0))) * found.operator.cell_area
     assert by_slopes == pytest.approx(got, rel=5e-3)
 
 
@@ -180,15 +180,15 @@ def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_d
     """At every instant: the profile is pushed along the wave's normal, q_y / q_x = 2.5, and left of y lies -x."""
     nx, ny = 15, 21
     x, y = (2 * np.pi * k * (np.arange(n) + 0.5) / n for n, k in ((nx, 1), (ny, 2)))
-    halfspace = HalfSpace((nx, ny), (PERIOD / nx, 0.8 * PERIOD / ny), "periodic")
+    operator = Operator((nx, ny), (PERIOD / nx, 0.8 * PERIOD / ny), "periodic")
     height = AMPLITUDE * np.cos(x[:, None] + y)
     program = rv.Program().load(0.05, over=0).slide(0.6 * PERIOD, speed=0.1, direction=direction).hold(TIME)
-    found = Scene(halfspace, height.max() - height, rubber(), Modes(rubber()), program, times=None, tolerance=1e-3)
+    found = Scene(operator, height.max() - height, rubber(), Modes(rubber()), program, times=None, tolerance=1e-3)
     for step in march(found):
         if step.shown.time > 0:
             assert (step.shown.pressure > 0).all()
             slide = found.motions[segment_number(step.state)]
-            sideways = force_across(halfspace, step.shown.pressure, step.displacement, slide)
+            sideways = force_across(operator, step.shown.pressure, step.displacement, slide)
             assert sideways == pytest.approx(across * force(found, step), rel=1e-9)
 
 
@@ -305,6 +305,6 @@ def test_slide__is_of_whole_cells_and_periodic():
     with pytest.raises(InputError, match=r"a slide of 40 µm is less than half a cell of 100 µm"):
         Slide(4e-5).cells((1e-4, 1e-4))
     found = scene(wave(12), rubber(), rv.Program().load(1e-6, over=0).slide(PERIOD, speed=0.1))
-    free = replace(found, halfspace=HalfSpace((12, 1), (PERIOD / 12, PERIOD / 12), "free"), accept_edge=True)
+    free = replace(found, operator=Operator((12, 1), (PERIOD / 12, PERIOD / 12), "free"), accept_edge=True)
     with pytest.raises(InputError, match="periodic"):
         list(march(free))

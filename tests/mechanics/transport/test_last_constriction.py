@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.transport.flow import flow
 
@@ -17,10 +17,10 @@ def conductance():
     wave = np.cos(2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS)
     undeformed = AMPLITUDE * (1 - wave[:, None] * wave)
     cell = (1 / CELLS, 1 / CELLS)
-    halfspace = HalfSpace(undeformed.shape, cell, "periodic")
+    operator = Operator(undeformed.shape, cell, "periodic")
 
     def at(load):
-        state = solve_contact(halfspace, undeformed, load=load * FULL * CELLS**2, tolerance=1e-10)
+        state = solve_contact(operator, undeformed, load=load * FULL * CELLS**2, tolerance=1e-10)
         gap = np.maximum(undeformed + state.displacement - state.approach, 0.0)
         return flow(np.where(state.pressure > 0, 0.0, gap), cell, wrap=True).conductance
 

@@ -14,7 +14,7 @@ from roughvisc.experiment import profile as profile_module
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import march_bytes
 from roughvisc.experiment.scene import build_scene
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.settings import Settings
 from roughvisc.study.cost import estimate
@@ -79,13 +79,13 @@ def study(tmp_path):
 def convolved(monkeypatch):
     """Cells of each convolution."""
     cells = []
-    displacement = HalfSpace.displacement
+    displacement = Operator.displacement
 
     def noted(self, *rest, **named):
         cells.append(np.prod(self.shape))
         return displacement(self, *rest, **named)
 
-    monkeypatch.setattr(HalfSpace, "displacement", noted)
+    monkeypatch.setattr(Operator, "displacement", noted)
     return cells
 
 

@@ -424,8 +424,8 @@ def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
     """A convolution takes N log N microseconds by a clock that the test moves; the first on each grid takes longer."""
     clock, timed = [0.0], []
 
-    def solve(halfspace, gap, *, load, **_):
-        lifted = load / gap.size * halfspace.self_influence
+    def solve(operator, gap, *, load, **_):
+        lifted = load / gap.size * operator.self_influence
         assert lifted == pytest.approx(0.02 * gap.mean()), "a light contact"
         clock[0] += 50 * 1e-6 * estimate.work(gap.size) * (1 if gap.size in timed else 3)
         timed.append(gap.size)

@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.cost import first_pressure as first_module
 from roughvisc.study.cost.first_pressure import first_pressure
@@ -60,9 +60,9 @@ def test_copy_to_press__is_the_surface_where_that_is_small_enough():
 
 def touching(surface, pressure, compliance):
     """By the solver itself, on all cells; less 0.088 of the staircase at the rim."""
-    halfspace = HalfSpace(surface.shape, spacing(surface), "periodic")
+    operator = Operator(surface.shape, spacing(surface), "periodic")
     gap = float(surface.max()) - surface.values
-    contact = solve_contact(halfspace, gap, load=pressure * gap.size * compliance, tolerance=1e-6).pressure > 0
+    contact = solve_contact(operator, gap, load=pressure * gap.size * compliance, tolerance=1e-6).pressure > 0
     rim = sum((contact & ~np.roll(contact, turn, axis)).sum() for axis in (0, 1) for turn in (1, -1))
     return (contact.sum() - 0.088 * rim) / contact.size
 

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from support import run_whole
 
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.study.execution.profile import REST, TimeProfile, profiled
 
 STUDY = """
@@ -39,11 +39,11 @@ def study(tmp_path):
 
 
 def test_profile__sums_up_to_the_whole_and_counts_the_transforms(study, tmp_path):
-    original = HalfSpace.displacement
+    original = Operator.displacement
     with profiled() as profile:
         ds = run_whole(study, tmp_path / "out", progress=False)
-        assert HalfSpace.displacement is not original
-    assert HalfSpace.displacement is original
+        assert Operator.displacement is not original
+    assert Operator.displacement is original
     assert sum(profile.seconds.values()) == pytest.approx(profile.whole)
     assert all(seconds > 0 for seconds in profile.seconds.values())
     assert profile.calls["transforms"] >= int(ds.convolutions.sum())
@@ -63,10 +63,10 @@ def test_profile__counts_the_inner_of_two_parts():
 
 
 def test_profile__is_restored_when_the_run_fails():
-    original = HalfSpace.displacement
+    original = Operator.displacement
     with pytest.raises(ZeroDivisionError), profiled():
         1 / 0  # noqa: B018
-    assert HalfSpace.displacement is original
+    assert Operator.displacement is original
 
 
 def test_run_profile__prints_a_table_and_refuses_other_processes(study, tmp_path):

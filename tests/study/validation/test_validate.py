@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.operator import HalfSpace
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.study.validation.closed_cases import CASES
@@ -35,8 +35,8 @@ def test_expected_errors__shrink_with_the_grid_down_to_the_tolerance():
 
 def scaled_displacement(monkeypatch):
     """A kernel one per cent too soft."""
-    sound = HalfSpace.displacement
-    monkeypatch.setattr(HalfSpace, "displacement", lambda self, *given: 1.01 * sound(self, *given))
+    sound = Operator.displacement
+    monkeypatch.setattr(Operator, "displacement", lambda self, *given: 1.01 * sound(self, *given))
 
 
 def forgetful_recursion(monkeypatch):
@@ -90,7 +90,7 @@ def test_refusal__is_a_comparison_that_fails(monkeypatch):
     def refuse(self, pressure, out=None):
         raise rv.ConvergenceError("it does not converge")
 
-    monkeypatch.setattr(HalfSpace, "displacement", refuse)
+    monkeypatch.setattr(Operator, "displacement", refuse)
     (found,) = rv.validate(33, cases=["Hertz"])
     assert found.compared == "refused: it does not converge"
     assert not found.passed
