@@ -177,8 +177,8 @@ def summary(lines):
             within, error, width, cost = np.array(rows, dtype=float).T
             print(
                 f"{label:16s} {name:20s} {len(rows):4d} cases  within {100 * within.mean():5.1f} %  median error "
-                f"{100 * np.median(error):6.2f} %  half-width {100 * np.median(width):6.2f} %  "
-                f"ratio {np.median(width) / max(np.median(error), 1e-12):5.1f}  cost {np.median(cost):4.1f}"
+                f"{100 * np.median(error):6.2f} %  half-width {100 * np.nanmedian(width):6.2f} %  "
+                f"ratio {np.nanmedian(width) / max(np.median(error), 1e-12):5.1f}  cost {np.median(cost):4.1f}"
             )
 
 
