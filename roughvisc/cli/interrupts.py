@@ -17,6 +17,8 @@ INTERRUPTED = "interrupted; finished work is kept; repeat the command to resume"
 
 #: An interrupt that came during an import is tried again after so long. [s]
 _AGAIN = 0.01
+#: Signals that came during an import and wait for its end.
+_waiting: list[int] = []
 
 
 class Terminated(KeyboardInterrupt):
@@ -62,12 +64,20 @@ def _end_process(number: int, _: FrameType | None) -> None:
     os._exit(128 + number)
 
 
+def end_if_interrupted() -> None:
+    """Raise the interrupt that waits for the end of an import: called before anything is written."""
+    if _waiting:
+        _interrupt(_waiting[-1], None)
+
+
 def _interrupt(number: int, frame: FrameType | None) -> None:
     if _imports(frame):
+        _waiting.append(number)
         later = threading.Timer(_AGAIN, _send, (number,))
         later.daemon = True
         later.start()
         return
+    _waiting.clear()
     if number == signal.SIGTERM:
         signal.signal(number, signal.SIG_IGN)  # once is enough: the checkpoint is being written
         raise Terminated
@@ -85,6 +95,8 @@ def _imports(frame: Any) -> bool:
 
 def _send(number: int) -> None:
     """Send a signal to the main thread, which may be waiting for something."""
+    if not _waiting:  # it was raised meanwhile
+        return
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:

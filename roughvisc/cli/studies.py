@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say, say_figures
+from roughvisc.cli.interrupts import end_if_interrupted
 from roughvisc.cli.reading import naming_keys
 from roughvisc.errors import InputError, printable
 
@@ -105,6 +106,7 @@ def _run_one(
         require_writable(folder, "since the case is not finished")
         if told := upgrade_note(folder, [case]):
             complain(told)
+    end_if_interrupted()
     with Bar(console, label, case.at) as bar:
         path = run_case(case, folder, progress=bar.reached, same_bits=same_bits, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
