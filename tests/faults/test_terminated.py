@@ -70,6 +70,19 @@ def test_terminable__leaves_a_handler_of_others_alone():
     assert signal.getsignal(signal.SIGTERM) == before
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_interrupt_of_an_import__is_raised_before_anything_is_written(monkeypatch):
+    """It waits for the end of the import, and not for the hundredth of a second after which it is tried again."""
+    monkeypatch.setattr(interrupts, "_AGAIN", 100.0)
+    monkeypatch.setattr(interrupts, "_imports", lambda frame: frame is not None)
+    with interrupts.terminable():
+        interrupts.end_if_interrupted()  # nothing waits
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            interrupts.end_if_interrupted()
+        interrupts.end_if_interrupted()  # it was raised once
+
+
 #: Runs the command line; a signal comes while a module is imported, and what the import raises is an ImportError, as
 #: the initialization of compiled modules has it.
 SIGNALLED = """
