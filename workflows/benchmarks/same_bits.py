@@ -26,6 +26,13 @@ except ImportError:  # a checkout whose results have no groups
 LEFT_OUT = ("wall_time", "roughvisc_version", "history", "source", "result_format", "step")
 
 
+def set_numerics(**settings):
+    """Rarely changed settings as the checkout takes them: together, or in former ones each for itself."""
+    import roughvisc as rv
+
+    return {"numerics": rv.Numerics(**settings)} if hasattr(rv, "Numerics") else settings
+
+
 def scenes():
     """Each scene by its name, a callable that gives a Dataset."""
     import roughvisc as rv
@@ -62,7 +69,7 @@ def scenes():
         "no compliance at once": lambda: rv.simulate(ball, soft, ramp, **few),
         "flow": lambda: rv.simulate(ball, rv.maxwell(1e6, 1e6, 0.5), hold, **few),
         "power law": lambda: rv.simulate(ball, law, hold, **few),
-        "direct": lambda: rv.simulate(ball, law, hold, numerics=rv.Numerics(memory="direct"), **few),
+        "direct": lambda: rv.simulate(ball, law, hold, **set_numerics(memory="direct"), **few),
         "opening cycle": lambda: rv.simulate(ball, zener, opening, **few),
         "slide": lambda: rv.simulate(rough, zener, slide, **periodic),
         "friction": lambda: rv.friction(rough, zener, speeds=[1e-4, 1e-3], load=0.02, progress=False),
