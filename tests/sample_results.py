@@ -168,3 +168,11 @@ def open_contact():
         made[name][:] = np.nan
     made["status"][:] = 2
     return made
+
+
+def of_mirror_images():
+    """A result of 22 x 16 cells whose heights are the mirror images of a quarter of them."""
+    ds = rough_creep((22, 16))
+    quarter = ds["height"].values[:11, :8]
+    ds["height"].values[:] = np.block([[quarter, quarter[:, ::-1]], [quarter[::-1], quarter[::-1, ::-1]]])
+    return ds.assign_attrs(history="read a.x3p\nmirrored along x and y")

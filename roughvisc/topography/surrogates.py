@@ -10,7 +10,7 @@ import scipy.fft
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.borders import is_periodic, period_of
+from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, labelled, noted, spacing
 from roughvisc.topography.spectrum import psd
@@ -107,7 +107,4 @@ def surrogate(
 
 def _measured_part(h: xr.DataArray) -> xr.DataArray:
     """The part of a surface that its mirror images repeat; all of it where it is not made of them. [m]"""
-    values = h.values
-    if all(n % 2 == 0 for n in h.shape) and all(np.array_equal(values, np.flip(values, axis)) for axis in (0, 1)):
-        return h[: h.shape[0] // 2, : h.shape[1] // 2]
-    return h
+    return h[: h.shape[0] // 2, : h.shape[1] // 2] if is_mirrored(h.values) else h

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +27,7 @@ from roughvisc.variables.axes import AXES
 if TYPE_CHECKING:
     from distributed import Client
 
+log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 #: Folder of the further solves, in that of the results.
 FOLDER = "budget"
@@ -164,8 +166,11 @@ def budgets(
     solves = asked.solves()
     outcomes = run_cases(list(solves.values()), folder, watch=watcher(progress), client=client, workers=workers)
     for name, one in solves.items():
-        if outcomes[one.key].entry is None:
-            raise RoughviscError(f"budget: the solve {name!r} failed: {outcomes[one.key].message}")
+        outcome = outcomes[one.key]
+        if outcome.entry is None:
+            raise RoughviscError(f"budget: the solve {name!r} failed: {outcome.message}")
+        if outcome.kind != "done":
+            log.warning("budget: the solve %r: %s: %s", name, outcome.kind, outcome.message)
     results = {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
     try:
         rows = _rows_at(results["own"], experiment.axis, places)

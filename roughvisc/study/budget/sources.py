@@ -28,6 +28,8 @@ _ORDER, _TWO_GRIDS = 1.5, 3.0
 _SAMPLE = 3.3
 #: A spectrum that ends at a wavelength has 99 % of its slope above a wavelength longer by up to this factor.
 _SAME = 1.15
+#: Of the contact area where it slides, what the next octave changes over what the last one did.
+_SLIDING_OCTAVE = 2.0
 #: Fewer waves than these: the number hangs on the few that the patch happens to hold.
 _FEW_WAVES = 30.0
 
@@ -184,10 +186,6 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, stated: Arr
         factor = _SLIDING_OCTAVE
     words = f"without the shortest octave; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
     return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), ("smooth",))
-
-
-#: Of the contact area where it slides, what the next octave changes over what the last one did.
-_SLIDING_OCTAVE = 2.0
 
 
 def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:

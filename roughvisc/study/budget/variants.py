@@ -47,13 +47,9 @@ class Variants:
 
     @property
     def is_rough(self) -> bool:
-        """Whether the surface stands for a larger one: then another patch and shorter waves have a meaning."""
-        return self.case.solving().boundary == "periodic" and is_data(self.case)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether no point is missing."""
-        return bool(np.isfinite(self.height.values).all())
+        """Whether the whole surface stands for a larger one: then another patch and shorter waves have a meaning."""
+        stands_for_more = self.case.solving().boundary == "periodic" and is_data(self.case)
+        return stands_for_more and bool(np.isfinite(self.height.values).all())
 
     @cached_property
     def _waves(self) -> tuple[Any, Any, Any]:
@@ -124,6 +120,8 @@ def with_rows(case: Case, places: Any, fields: tuple[str, ...]) -> Case:
     """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
     settings, experiment = case.solving(), case.experiment()
     changes: dict[str, Any] = {"keep.fields": list(fields), "solve.grid_error": False}
+    if getattr(experiment, "last_octave", False):  # a source of its own here, and twice the cost of every solve
+        changes[f"{experiment.table}.last_octave"] = False
     if places is not None:
         wanted = experiment.with_rows_at(settings, [float(one) for one in places])
         changes |= _changed_settings(settings, wanted)

@@ -22,6 +22,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
+from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import in_si
 from roughvisc.variables import FIELDS, VARIABLES
@@ -90,8 +91,12 @@ def plane_ratio(dataset: xr.Dataset | xr.DataArray) -> float:
 
 
 def measured_part(dataset: xr.Dataset) -> xr.Dataset:
-    """The part of a result that was measured, where the surface was made to repeat by its mirror images."""
-    if "mirrored along x and y" not in str(dataset.attrs.get("history", "")):
+    """The part of a result that was measured, where the surface was made to repeat by its mirror images.
+
+    The history stays where a surface is cropped afterwards, so that the heights must still be their own mirror images.
+    """
+    mirrored = MIRRORED in str(dataset.attrs.get("history", "")).split("\n")
+    if not (mirrored and "height" in dataset and is_mirrored(dataset["height"].values)):
         return dataset
     return dataset.isel({axis: slice(0, dataset.sizes[axis] // 2) for axis in ("x", "y")})
 

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
 from roughvisc.observables import contact
+from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import VARIABLES
@@ -59,7 +60,7 @@ def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
 def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
     """Which lines of a direction are not at a seam: all of them, where the surface itself repeats."""
     inner = np.ones(count, dtype=bool)
-    mirrored = "mirrored along x and y" in str(dataset.attrs.get("history", ""))
+    mirrored = MIRRORED in str(dataset.attrs.get("history", ""))
     if ("border_note" in attributes_of(dataset.attrs) or mirrored) and count > 8:
         margin = max(2, count // 16)
         inner[:margin] = inner[-margin:] = False

@@ -181,6 +181,33 @@ def test_budget__of_friction_knows_its_slope_over_speed(tmp_path):
     assert found["value"].dims == ("speed",)
 
 
+def test_budget__of_friction_computes_no_octave_beside_each_solve(tmp_path):
+    text = (
+        ROUGH[: ROUGH.index("[[program]]")] + '[friction]\nspeeds = [1e-3]\npressure = "50 kPa"\nlast_octave = true\n'
+    )
+    stated(case(text, tmp_path), tmp_path, "friction_coefficient")
+    for path in (tmp_path / "budget").glob("*.nc"):
+        with xr.open_dataset(path) as one:
+            assert not json.loads(one.attrs["case"])["friction"]["last_octave"]
+
+
+def test_budget__of_a_surface_with_absent_cells_is_of_no_sample(tmp_path):
+    heights = rv.self_affine(1e-3, (24, 22), hurst=0.8, rms_slope=0.2, rolloff=3e-4, seed=3)
+    heights[3:6, 4:8] = np.nan
+    rv.save_scan(heights, tmp_path / "scan.x3p")
+    recipe = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
+    text = ROUGH.replace(recipe, 'file = "scan.x3p"\nmissing = "absent"\n')
+    found = stated(case(text, tmp_path), tmp_path, "contact_area", population="ensemble", cutoff="10 um")
+    states = dict(zip(found["source"].values.tolist(), found["state"].values.tolist(), strict=True))
+    assert [states[name] for name in ("sample", "next octave of waves", "longest waves")] == ["none"] * 3
+    assert (found["lower"] < found["value"]).all()
+
+
+def test_budget__warns_of_a_solve_that_did_not_converge(tmp_path, caplog, stubborn):
+    stated(case(BALL, tmp_path), tmp_path, "contact_area")
+    assert "budget: the solve 'own': unconverged" in caplog.text
+
+
 def test_budget__of_a_tapered_surface_compares_with_its_mirror_images(tmp_path):
     study = case(ROUGH, tmp_path, **{"surface.taper": ["0.1 mm", "0.1 mm"]})
     found = stated(study, tmp_path, "contact_area")

@@ -600,7 +600,7 @@ def test_maps__contact_too_ragged_for_an_outline_has_a_colour_in_every_frame():
 
 
 def test_animate__of_a_mirrored_surface_shows_what_was_measured():
-    ds = made.rough_creep((22, 16)).assign_attrs(history="read a.x3p\nmirrored along x and y")
+    ds = made.of_mirror_images()
     assert first_picture(ds).axes[0].images[0].get_array().shape == (8, 11)
 
 
@@ -719,13 +719,15 @@ def test_surface__scale_is_not_moved_by_spikes_and_missing_points_are_grey():
 
 
 def test_maps_and_section__of_a_mirrored_surface_show_what_was_measured():
-    ds = made.rough_creep((22, 16))
-    whole = ds.assign_attrs(history="read a.x3p\nmirrored along x and y")
+    whole = made.of_mirror_images()
+    ds = whole.assign_attrs(history="read a.x3p")
     (first, *_) = plot.maps(whole).axes
     assert first.get_images()[0].get_array().shape == (8, 11)
     assert plot.maps(ds).axes[0].get_images()[0].get_array().shape == (16, 22)
     profiles = [plot.section(one).axes[1].lines[0].get_xdata() for one in (whole, ds)]
     assert [len(x) for x in profiles] == [11, 22]
+    changed = made.rough_creep((22, 16)).assign_attrs(history=whole.attrs["history"] + "\ncropped")
+    assert plot.maps(changed).axes[0].get_images()[0].get_array().shape == (16, 22), "no mirror images any more"
 
 
 def test_leakage__lakes_contact_and_channels_are_told_apart():

@@ -317,8 +317,8 @@ def test_browser__shows_the_page_without_horizontal_overflow(page, tmp_path, wid
 
 
 def test_frames__of_a_mirrored_surface_show_what_was_measured():
-    whole = made.rough_creep((22, 16))
-    mirrored = whole.assign_attrs(history="read a.x3p\nmirrored along x and y")
+    mirrored = made.of_mirror_images()
+    whole = mirrored.assign_attrs(history="read a.x3p")
     sizes = []
     for ds in (whole, mirrored):
         view = frames_of(ds, 10**6)
