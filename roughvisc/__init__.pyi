@@ -31,6 +31,7 @@ from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.budget.budget import budget as budget
 from roughvisc.study.cost.plan import plan as plan
+from roughvisc.study.ensembles import over_realisations as over_realisations
 from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.observed import observe as observe

@@ -126,18 +126,29 @@ def _is_known(dataset: xr.Dataset, rows: str) -> bool:
 
 def _selected(part: xr.Dataset, dataset: xr.Dataset, rows: str) -> xr.Dataset | None:
     """A group at the rows and the cases that a Dataset holds; None where these are not all known."""
-    if "case" in part.dims:
-        keys = list(part["case_key"].values)
-        wanted = dataset.coords.get("case_key")
-        if wanted is None or wanted.dims not in ((), ("case",)) or not set(np.atleast_1d(wanted.values)) <= set(keys):
+    for dimension in ("realisation", rows):
+        if dimension not in part.dims:
+            continue
+        wanted = dataset.coords.get(dimension)
+        if wanted is None or wanted.dims not in ((), (dimension,)) or not np.isin(wanted, part[dimension]).all():
             return None
-        part = part.isel(case=[keys.index(key) for key in wanted.values] if wanted.dims else keys.index(wanted.item()))
-    if rows not in part.dims:
+        if not wanted.equals(part[dimension]):
+            part = part.sel({dimension: wanted.values})
+    if "case" not in part.dims:
         return part
-    wanted = dataset.coords.get(rows)
-    if wanted is None or wanted.dims not in ((), (rows,)) or not np.isin(wanted.values, part[rows].values).all():
+    wanted = dataset.coords.get("case_key")
+    if wanted is None or wanted.dims != tuple(dim for dim in part["case_key"].dims if dim in dataset.dims):
         return None
-    return part if wanted.equals(part[rows]) else part.sel({rows: wanted.values})
+    known = np.reshape(part["case_key"].values, (part.sizes["case"], -1))
+    row_of = {key: row for row, keys in enumerate(known) for key in keys if key}  # empty: no result there
+    several = "case" in wanted.dims
+    found = [
+        next((row_of[key] for key in np.ravel(keys) if key in row_of), None)
+        for keys in (wanted.values if several else [wanted.values])
+    ]
+    if None in found:
+        return None
+    return part.isel(case=found if several else found[0])
 
 
 def group_of(dataset: xr.Dataset, group: str) -> xr.Dataset:

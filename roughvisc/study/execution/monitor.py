@@ -18,6 +18,7 @@ from roughvisc.errors import ON_SCREEN, DiskFullError, printable, shortened
 from roughvisc.progress import Display, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.realisations import REALISATION
 from roughvisc.study.storage.failures import forget_failure, record_failure
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.store import is_writable
@@ -247,7 +248,8 @@ class SweepLog:
         self.saved = time.monotonic()
         if not is_writable(self.folder):
             return
-        index = Index(index_of(self.folder, self.entries).entries, tuple(self.cases))
+        drawn = {key: case.varied[REALISATION] for key, case in self.cases.items() if REALISATION in case.varied}
+        index = Index(index_of(self.folder, self.entries).entries, tuple(self.cases), realisations=drawn)
         save_index(self.folder, index)
         held = {key: outcome.message for key, outcome in self.outcomes.items() if outcome.kind == "held"}
         write_table(self.folder, index, {key: json.loads(case.to_json()) for key, case in self.cases.items()}, held)

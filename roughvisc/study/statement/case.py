@@ -15,8 +15,9 @@ from roughvisc.errors import ChangedError, InputError
 from roughvisc.notebook import table
 from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.problems import Problems, in_sweep, line, report
+from roughvisc.study.statement.realisations import REALISATION, SURROGATE
 from roughvisc.study.statement.schema import Study, study_schema
-from roughvisc.study.statement.variation import expand, place, with_files
+from roughvisc.study.statement.variation import expand, place, with_files, with_realisations
 from roughvisc.topography.cards import read_toml
 
 if TYPE_CHECKING:
@@ -220,6 +221,7 @@ def read_cases(path: str | Path) -> list[Case]:
     """Read all cases of a study file: the product of the lists in ``[sweep]``, or the runs of ``[[sweep]]``.
 
     A table ``[[sweep]]`` contains lists of equal length, combined entry by entry; several tables give consecutive runs.
+    ``realisations = 24`` in a table computes each of its cases for 24 realisations of the surface.
     A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of matching files. Without a sweep there is
     one case.
 
@@ -246,22 +248,32 @@ def read_cases(path: str | Path) -> list[Case]:
     def refusal(key: str, found: str) -> InputError:
         return InputError(line(path, key, found))
 
-    changes = expand(with_files(data.pop("sweep", {}), path.parent, refusal), refusal)
-    for key in dict.fromkeys(key for change in changes for key in change):
+    swept = with_files(data.pop("sweep", {}), path.parent, refusal)
+    changes = with_realisations(expand(swept, refusal), data, path.parent, refusal)
+    for key in dict.fromkeys(key for change, _ in changes for key in change):
         if key.partition(".")[0] == "observe":
             found = "cannot be varied: what is observed changes no result: expected one value, in [observe]"
             raise refusal(f"sweep: {key}", found)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
-    for number, change in enumerate(changes):
+    for number, (change, drawn) in enumerate(changes):
         try:
-            cases.append(_varied(data, change, path, path))
+            case = _varied(data, change, path, path)
         except Problems as error:
             for problem in error.lines:
                 problems.setdefault(problem, []).append(number)
+        else:
+            cases.append(case if drawn is None else as_realisation(case, drawn))
     if problems:
-        raise InputError(report(path, [in_sweep(problem, where, changes) for problem, where in problems.items()]))
+        told = [change if drawn is None else change | {REALISATION: drawn} for change, drawn in changes]
+        raise InputError(report(path, [in_sweep(problem, where, told) for problem, where in problems.items()]))
     return cases
+
+
+def as_realisation(case: Case, number: int) -> Case:
+    """The same case, which says of itself which realisation of its surface it is; its key stays."""
+    varied = {key: value for key, value in case.varied.items() if key != SURROGATE}
+    return replace(case, varied={**varied, REALISATION: number})
 
 
 def vary(case: Case, changes: Mapping[str, Any]) -> Case:

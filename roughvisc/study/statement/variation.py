@@ -7,11 +7,13 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from glob import glob
 from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
+from roughvisc.study.statement.realisations import DRAWN, REALISATIONS, numbers, realisation
 from roughvisc.units import shown
 
 Refusal = Callable[[str, str], InputError]
@@ -27,7 +29,8 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
     ----------
     sweep : dict or list of dict
         ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
-        table. A value that is no list holds for its whole table.
+        table. A value that is no list holds for its whole table; ``realisations`` is a number, see
+        :func:`with_realisations`.
     refusal : callable
         Makes the error to raise from a dotted key and what is wrong with it.
 
@@ -45,6 +48,8 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
     """
     if isinstance(sweep, Mapping):
         keys = dict(_flat(sweep))
+        if REALISATIONS in keys:
+            keys[REALISATIONS] = [keys[REALISATIONS]]
         for key, values in keys.items():
             if not isinstance(values, list) or not values:
                 raise refusal(f"sweep.{key}", f"found {shown(values)}: expected a list of values")
@@ -56,6 +61,57 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
     if not isinstance(sweep, list) or not all(isinstance(table, Mapping) and table for table in sweep):
         raise refusal("sweep", f"found {shown(sweep)}: expected a table of lists, or [[sweep]] tables")
     return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)), refusal)]
+
+
+def with_realisations(
+    changes: list[dict[str, Any]], data: Mapping[str, Any], folder: Path, refusal: Refusal
+) -> list[tuple[dict[str, Any], int | None]]:
+    """Changes that make each case of a sweep, those with a number of realisations once for each of them.
+
+    Parameters
+    ----------
+    changes : list of dict
+        As :func:`expand` gives them.
+    data : mapping
+        The study without its sweep.
+    folder : Path
+        That files are relative to.
+    refusal : callable
+        Makes the error to raise from a dotted key and what is wrong with it.
+
+    Returns
+    -------
+    list of (dict, int or None)
+        Changes, and the number of the realisation; None of a case that is no realisation.
+    """
+    found: list[tuple[dict[str, Any], int | None]] = []
+    for change in changes:
+        if REALISATIONS not in change:
+            found.append((change, None))
+            continue
+        rest = {key: value for key, value in change.items() if key != REALISATIONS}
+        surface = _surface(data, rest)
+        try:
+            twice = [key for key in rest if key in DRAWN]
+            if twice:
+                raise InputError(f"found together with sweep.{twice[0]}: expected one of them")
+            for number in numbers(surface, change[REALISATIONS], folder):
+                found.append((rest | realisation(surface, number), number))
+        except InputError as error:
+            raise refusal(f"sweep.{REALISATIONS}", str(error)) from error
+        if len(found) > MOST_CASES:
+            raise refusal("sweep", f"found {len(found)} cases or more with realisations: expected at most {MOST_CASES}")
+    return found
+
+
+def _surface(data: Mapping[str, Any], change: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The table ``[surface]`` of a case; empty where it is none, which is refused with the case."""
+    for key, value in change.items():
+        if key.partition(".")[0] == "surface":
+            with suppress(InputError):
+                data = place(data, key, value)
+    surface = data.get("surface")
+    return surface if isinstance(surface, Mapping) and isinstance(surface.get("second"), Mapping | None) else {}
 
 
 def _zipped(number: int, table: Mapping[str, Any], refusal: Refusal) -> list[dict[str, Any]]:

@@ -117,11 +117,15 @@ class Index:
         Keys of the sweep that ran last in the folder, in its order; None if not known.
     problems : dict
         Key that a file is named by -> why that is not its result.
+    realisations : dict
+        Key -> number of the realisation that a case was in that sweep. A result may have been computed before, as a
+        case that was none.
     """
 
     entries: dict[str, Entry]
     sweep: tuple[str, ...] | None = ()
     problems: dict[str, str] = field(default_factory=dict)
+    realisations: dict[str, int] = field(default_factory=dict)
 
 
 def read_entry(path: Path) -> Entry:
@@ -229,7 +233,8 @@ def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) ->
             else:
                 found = f"{path}: holds the result of case {entry.key}"
                 problems[path.stem] = f"{found}: expected the one that its name says"
-    index = Index(entries, _latest(folder), problems)
+    sweep, realisations = _latest(folder)
+    index = Index(entries, sweep, problems, realisations)
     if warn:
         warn_of(folder, problems)
     return index
@@ -266,10 +271,11 @@ def save_index(folder: Path, index: Index) -> None:
     with suppress(OSError, InputError), atomic_write(folder / INDEX) as temporary:
         np.savez(temporary, head=np.frombuffer(text.encode(), np.uint8), **arrays)
         append_checksum(temporary)
-    if index.sweep is not None and index.sweep != _latest(folder):
-        keys = list(index.sweep)
+    if index.sweep is not None and (index.sweep, index.realisations) != _latest(folder):
+        keys, drawn = list(index.sweep), index.realisations
+        stated = {"keys": keys} | ({"realisations": drawn} if drawn else {}) | {"checksum": _checksum(keys, drawn)}
         with suppress(OSError, InputError), atomic_write(folder / LATEST) as temporary:
-            temporary.write_text(json.dumps({"keys": keys, "checksum": _checksum(keys)}))
+            temporary.write_text(json.dumps(stated))
 
 
 class _Grids:
@@ -286,20 +292,23 @@ class _Grids:
         return number
 
 
-def _latest(folder: Path) -> tuple[str, ...] | None:
-    """Keys of the sweep that ran last; none if none did, None if what says so is damaged."""
+def _latest(folder: Path) -> tuple[tuple[str, ...] | None, dict[str, int]]:
+    """Keys of the sweep that ran last, and which of them were realisations.
+
+    No keys if no sweep ran, None if what says so is damaged.
+    """
     try:
         stated = json.loads((folder / LATEST).read_bytes())
-        keys = stated["keys"]
-        return tuple(keys) if stated["checksum"] == _checksum(keys) else None
+        keys, drawn = stated["keys"], stated.get("realisations", {})
+        return (tuple(keys), dict(drawn)) if stated["checksum"] == _checksum(keys, drawn) else (None, {})
     except FileNotFoundError:
-        return ()
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return None
+        return (), {}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None, {}
 
 
-def _checksum(keys: Sequence[str]) -> int:
-    return zlib.crc32(" ".join(keys).encode())
+def _checksum(keys: Sequence[str], drawn: Mapping[str, int]) -> int:
+    return zlib.crc32(" ".join([*keys, *(f"{key}={number}" for key, number in drawn.items())]).encode())
 
 
 def _load(path: Path) -> list[Entry]:

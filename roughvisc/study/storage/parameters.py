@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.study.statement.realisations import REALISATION, SURROGATE
 from roughvisc.study.statement.schema.units import unit_of
 
 #: Coordinate that holds the key of the case.
@@ -63,13 +64,19 @@ def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
     return labels_of({name: np.asarray(value) for name, value in varied.items()}, case)
 
 
+def as_realisation(case: Mapping[str, Any], number: int | None) -> Mapping[str, Any]:
+    """A case in JSON, which says of itself which realisation of its surface it is; as it is where that is None."""
+    return case if number is None else {**case, "varied": {**case.get("varied", {}), REALISATION: number}}
+
+
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
     """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    said_already = {SURROGATE} if REALISATION in keys else set()
     leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
     for key in dict.fromkeys(key for leaf in leaves for key in leaf):
         below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
-        if not below and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
+        if not below and key not in said_already and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
             keys[key] = None
     values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
     return {key: _column(found) for key, found in values.items()}

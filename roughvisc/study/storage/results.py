@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, overload
 
@@ -14,9 +15,10 @@ from roughvisc.errors import InputError
 from roughvisc.groups import root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
+from roughvisc.study.statement.realisations import DRAWN, REALISATION
 from roughvisc.study.storage.checksum import warn_once
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
-from roughvisc.study.storage.parameters import CASE_KEY, labels_of, parameters_of
+from roughvisc.study.storage.parameters import CASE_KEY, as_realisation, identifier, labels_of, parameters_of
 from roughvisc.study.storage.reading import read_variable
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.upkeep import counted_versions, version_of
@@ -74,10 +76,12 @@ def open_results(out, *, cases="last", ragged=False):
     -------
     xarray.Dataset or xarray.DataTree
         Variables as in a single result, over ``time`` or ``speed``, with ``case`` as first dimension; ``height`` has it
-        only if heights differ. Varied parameters are coordinates on ``case``, numbers in SI or strings, each under two
-        names: its dotted key, and its identifier in the files, ``program_0_load``. The coordinate ``roughvisc_version``
-        states which version computed each case; if they differ, a warning lists them. In a tree the parameters are
-        scalar coordinates of each node, whose name is the key of the case.
+        only if heights differ. A sweep with ``realisations`` has ``realisation`` as second dimension, in which 0 is a
+        measured surface itself; what has not been computed is missing there, with an empty key. Varied parameters are
+        coordinates on ``case``, numbers in SI or strings, each under two names: its dotted key, and its identifier in
+        the files, ``program_0_load``. The coordinate ``roughvisc_version`` states which version computed each case; if
+        they differ, a warning lists them. In a tree the parameters are scalar coordinates of each node, whose name is
+        the key of the case.
 
     Raises
     ------
@@ -100,10 +104,13 @@ def open_results(out, *, cases="last", ragged=False):
     entries = _chosen(index.entries, index.sweep or (), cases)
     if not entries:
         raise no_results(folder)
+    drawn = dict(index.realisations)
+    if not isinstance(cases, str):
+        drawn = {case.key: case.varied[REALISATION] for case in cases if REALISATION in case.varied}
     if len({version_of(entry.attributes) for entry in entries}) > 1:
         told = f"{folder}: results of several versions: {counted_versions(entries)}"
         warn_once(folder / entries[0].file, f"{told}; the coordinate {VERSION} says which is which")
-    parameters = parameters_of([entry.case for entry in entries])
+    parameters = parameters_of([as_realisation(entry.case, drawn.get(entry.key)) for entry in entries])
     if ragged:
         return _tree(folder, entries, parameters)
     _check_common(folder, entries)
@@ -165,7 +172,48 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
     versions = np.array([version_of(entry.attributes) for entry in entries])
     keys[VERSION] = (("case",), versions, VARIABLES[VERSION].attributes())
     labels = labels_of(parameters, first.case, ("case",))
-    return root_of(dataset.assign_coords(keys | labels))
+    return root_of(_by_realisation(dataset.assign_coords(keys | labels), parameters))
+
+
+def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    """Cases side by side over (case, realisation); as they are where some are no realisation, or one is there twice."""
+    drawn = parameters.get(REALISATION)
+    if drawn is None or drawn.dtype.kind != "i":
+        return flat
+    of_case = [key for key in parameters if key not in (REALISATION, *DRAWN)]
+    settings = list(zip(*(parameters[key].tolist() for key in of_case), strict=True)) or [()] * len(drawn)
+    rows, columns = list(dict.fromkeys(settings)), np.unique(drawn)
+    place = np.full((len(rows), len(columns)), -1)
+    place[[rows.index(one) for one in settings], np.searchsorted(columns, drawn)] = np.arange(len(drawn))
+    if np.count_nonzero(place >= 0) < len(drawn):
+        return flat
+    spread = {name: _spread(one, place) for name, one in flat.variables.items() if "case" in one.dims}
+    for key in of_case:
+        spread[identifier(key)] = flat.variables[identifier(key)][place.max(axis=1)]
+    for key in DRAWN:
+        one = spread.get(identifier(key))
+        if one is not None and (one.values == one.values[:1]).all():  # each case has the same seeds
+            spread[identifier(key)] = one[0]
+    attributes = {
+        "long_name": "realisation",
+        "comment": "number of another patch of the same roughness; 0: the measured surface itself",
+    }
+    spread[REALISATION] = xr.Variable(REALISATION, columns, attributes)
+    known = flat.drop_vars([name for name in flat.variables if name in spread])
+    coords = {name: one for name, one in spread.items() if name in flat.coords or name == REALISATION}
+    return known.assign({name: one for name, one in spread.items() if name not in coords}).assign_coords(coords)
+
+
+def _spread(variable: xr.Variable, place: NDArray[np.intp]) -> xr.Variable:
+    """A variable over (case, realisation, ...) from one over (case, ...); missing where there is no case."""
+    rows = [variable[np.maximum(row, 0)].data for row in place]
+    data = np.stack(rows)  # of Dask arrays: a Dask array
+    if (place < 0).any():
+        missing = {"f": np.nan, "U": "", "S": b"", "O": ""}.get(variable.dtype.kind, -1)
+        known = (place >= 0).reshape(*place.shape, *(1,) * (data.ndim - 2))
+        data = (np if isinstance(data, np.ndarray) else import_module("dask.array")).where(known, data, missing)
+        data = data.astype(variable.dtype)
+    return xr.Variable(("case", REALISATION, *variable.dims[1:]), data, variable.attrs)
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from roughvisc.labels import heading
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.parameters import parameters_of
+from roughvisc.study.storage.parameters import as_realisation, parameters_of
 from roughvisc.study.storage.store import atomic_write, no_results
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
@@ -92,7 +92,7 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
     known = {key: entry.case for key, entry in index.entries.items()}
     failures = {key: stated_failure(folder, key) for key in index.sweep if key not in known}
     known |= {key: record["case"] for key, record in failures.items() if record}
-    known |= cases
+    known = {key: as_realisation(case, index.realisations.get(key)) for key, case in known.items()} | dict(cases)
     keys = [key for key in index.sweep if key in known] or list(index.entries)
     stated = [known[key] for key in keys]
     entries = [index.entries.get(key) for key in keys]

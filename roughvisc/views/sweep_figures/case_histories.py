@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -32,6 +33,7 @@ from roughvisc.views.sweep_figures.cases import (
     without_zeros,
 )
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
 
 _MOST_PANELS = 9
 
@@ -39,6 +41,8 @@ _MOST_PANELS = 9
 @styled
 def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
     """A history of every case over its axis, coloured by what was varied; kept times are dots, where these are few.
+
+    Of realisations the mean is drawn, the band in which 95 % of patches lie and, of a scan, the scan itself.
 
     Up to eight values have a legend, more a colour bar. Other parameters make panels, up to nine.
 
@@ -68,6 +72,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     facets = _facets([one for one in ordered if one is not first], len(cases.members))
     colouring = Colouring(first)
     lines = [_line(member, quantity) for member in cases.members]
+    bands = [None if band is None else [_line(one, quantity) for one in _parts(band)] for band in cases.bands]
     times = np.unique(np.concatenate([rows_of(line).values for line in lines]))
     axis = RowAxis.of(times, cases.axis)
     unit = quantity_unit(cases, quantity, np.concatenate([line.values for line in lines]))
@@ -81,11 +86,11 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     dotted = False
     for level, ax in enumerate(panels[:count]):
         chosen = np.flatnonzero(facets.places == level)
-        drawn = [(lines[i], cases.members[i], int(first.places[i])) for i in chosen]
+        drawn = [(lines[i], cases.members[i], int(first.places[i]), bands[i]) for i in chosen]
         dotted |= _draw_panel(ax, axis, unit, colouring, drawn)
     if count > 1:
         letter_panels(panels[:count], [textwrap.fill(text, 22) for text in named_texts(facets)])
-    _limits(list(panels[:count]))
+    _limits(list(panels[:count]), unit(np.concatenate([one.values for band in bands for one in band or ()] or [[]])))
     for ax in panels[:count]:
         axis.apply(ax, times, most=7 if count == 1 else 4)
         ax.grid(color="0.9", lw=0.5)
@@ -95,8 +100,10 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
         ax.tick_params(labelbottom=number + columns >= count)
     figure.supxlabel(axis.unit.label(axis.label))
     figure.supylabel(label_of(cases, quantity, unit))
-    named: dict[str, Line2D] = {str(handle.get_label()): handle for handle in colouring.handles()}
+    handles = colouring.handles() if len(first.levels) > 1 else []
+    named: dict[str, Artist] = {str(handle.get_label()): handle for handle in handles}
     title = first.name if named else ""
+    named |= {str(handle.get_label()): handle for handle in band_handles(cases.bands)}
     if dotted:
         named[AXES[cases.axis].rows] = Line2D([], [], color="0.3", ls="", marker="o", ms=3)
     legend_above(figure, named, title)
@@ -114,15 +121,25 @@ def _facets(others: list[Parameter], cases: int) -> Parameter:
 
 def _draw_panel(ax: Axes, axis: RowAxis, unit: Unit, colouring: Colouring, drawn: list[Any]) -> bool:
     """Lines of some cases, the later ones thinner, so that none hides another that it lies on; whether with dots."""
-    dotted, few = False, len({level for _, _, level in drawn}) <= 8
-    for number, (line, member, level) in enumerate(sorted(drawn, key=lambda one: one[2])):
+    dotted, few = False, len({level for _, _, level, _ in drawn}) <= 8
+    for number, (line, member, level, band) in enumerate(sorted(drawn, key=lambda one: one[2])):
         width = 2.3 - 1.3 * number / max(1, len(drawn) - 1) if few and len(drawn) > 1 else 1.0
         colour = colouring.colour(level)
         ax.plot(axis.unit(rows_of(line)), unit(line), color=colour, lw=width)
+        if band is not None:
+            lower, upper, *itself = band
+            draw_band(ax, axis.unit(rows_of(lower)), unit(lower), unit(upper), colour)
+            for one in itself:
+                ax.plot(axis.unit(rows_of(one)), unit(one), color=colour, **ITSELF_STYLE)
         if few and len(drawn) <= 8 and rows_of(member).size <= 40 and line.name in member:
             ax.plot(axis.unit(rows_of(member)), unit(member[line.name]), "o", ms=1.5 + width, color=colour)
             dotted = True
     return dotted
+
+
+def _parts(band: Band) -> list[xr.Dataset]:
+    """Both ends of a band and, if there is one, the measured surface itself."""
+    return [band.lower, band.upper, *([] if band.itself is None else [band.itself])]
 
 
 def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
@@ -138,10 +155,11 @@ def _numbered(count: int) -> Parameter:
     return Parameter("case", np.arange(1, count + 1), "", "Case")
 
 
-def _limits(panels: list[Axes]) -> None:
+def _limits(panels: list[Axes], bands: np.ndarray) -> None:
     """Linear from zero, or logarithmic where all that is drawn is positive and spans two decades; for all alike."""
     ax = panels[0]  # the others share its axis
-    shown = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for one in panels for line in one.lines])
+    lines = [np.asarray(line.get_ydata(), dtype=float) for one in panels for line in one.lines]
+    shown = np.concatenate([*lines, bands])
     shown = shown[np.isfinite(shown)]
     low, high = (shown.min(), shown.max()) if shown.size else (0.0, 1.0)
     logarithmic = bool(low > 0 and high >= 100 * low)

@@ -15,6 +15,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.labels import expect_current_names
+from roughvisc.study.statement.realisations import DRAWN, REALISATION
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES, current_name
@@ -22,6 +23,7 @@ from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.axes import Unit, unit_for, verbatim
 from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
+from roughvisc.views.sweep_figures.ensembles import Band, pooled
 
 #: Quantities that span decades, and of which zero means that there is none.
 _SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")
@@ -129,13 +131,17 @@ class Cases:
     Parameters
     ----------
     members : list of xarray.Dataset
-        Histories of each case over its own times and over its steps, or over the places on another axis.
+        Histories of each case over its own times and over its steps, or over the places on another axis; of
+        realisations of one case their mean.
     parameters : list of Parameter
         What was varied, but what says the same as one before it.
+    bands : list of Band or None
+        Where a patch lies among the realisations of each case; None of a case that has none.
     """
 
     members: list[xr.Dataset]
     parameters: list[Parameter]
+    bands: list[Band | None]
 
     def parameter(self, key: str) -> Parameter:
         """Parameter of a dotted key, or of the identifier that it has in the files.
@@ -210,11 +216,18 @@ def cases_of(results: Any) -> Cases:
         parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
         results = whole_of(results)
-        held = [name for name in results.data_vars if set(results[name].dims) <= {"case", "step", *AXES}]
+        over = [dim for dim in ("case", REALISATION) if dim in results.dims]
+        held = [name for name in results.data_vars if set(results[name].dims) <= {*over, "step", *AXES}]
         table = results[held].load()
-        members = [table.isel(case=i) for i in range(results.sizes["case"])]
-        on_case = [one for one in results.coords.values() if one.dims == ("case",) and one.name not in _NO_PARAMETERS]
-        parameters = {_key(one): (one.values, one) for one in on_case}
+        keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
+        places = [dict(zip(over, place, strict=True)) for place in np.argwhere(keys != "")]
+        members = [table.isel(place) for place in places]
+        on_case = [one for one in results.coords.values() if set(one.dims) <= {*over} and one.dims]
+        parameters = {
+            _key(one): (np.array([one[{d: p[d] for d in one.dims}].item() for p in places]), one)
+            for one in on_case
+            if one.name not in _NO_PARAMETERS
+        }
     else:
         raise InputError(
             "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
@@ -223,10 +236,28 @@ def cases_of(results: Any) -> Cases:
         expect_current_names(member)
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
+    members = [_finite(member) for member in members]
+    numbers = parameters[REALISATION][0] if REALISATION in parameters else np.full(len(members), np.nan)
+    settings = {key: found for key, found in parameters.items() if key not in (REALISATION, *DRAWN)}
+    if not np.isfinite(numbers).any():
+        settings = parameters
+    of_case = list(zip(*(values.tolist() for values, _ in settings.values()), strict=True)) or [()] * len(members)
+    groups: dict[Any, list[int]] = {}
+    for place, number in enumerate(numbers):
+        groups.setdefault(of_case[place] if np.isfinite(number) else place, []).append(place)
+    bands: list[Band | None] = [None] * len(groups)
+    together = []
+    for group, mine in enumerate(groups.values()):
+        one = members[mine[0]]
+        if np.isfinite(numbers[mine[0]]):
+            one, bands[group] = pooled([members[place] for place in mine], [int(numbers[place]) for place in mine])
+        together.append(one)
+    first = [mine[0] for mine in groups.values()]
     found = [
-        (key, values, str(source.attrs.get("units") or unit_of(key))) for key, (values, source) in parameters.items()
+        (key, values[first], str(source.attrs.get("units") or unit_of(key)))
+        for key, (values, source) in settings.items()
     ]
-    return Cases([_finite(member) for member in members], list(_independent(found)))
+    return Cases(together, list(_independent(found)), bands)
 
 
 def _key(coordinate: xr.DataArray) -> str:

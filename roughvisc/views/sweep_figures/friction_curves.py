@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,6 +17,7 @@ from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures.axes import legend_above, letter_panels, new_figure, styled, unit_for
 from roughvisc.views.sweep_figures.cases import Parameter, cases_of, combined, middle_of_decades
 from roughvisc.views.sweep_figures.colouring import Colouring
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
 
 _PANELS = ("friction_coefficient", "contact_fraction")
 _OPEN = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4, label="not converged")
@@ -25,7 +27,8 @@ _OPEN = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4, label="not
 def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one of every case, against the logarithm of the speed.
 
-    Lines are coloured by what was varied. Speeds that did not converge are open circles.
+    Lines are coloured by what was varied. Speeds that did not converge are open circles. Of realisations the mean is
+    drawn, the band in which 95 % of patches lie and, of a scan, the scan itself.
 
     Parameters
     ----------
@@ -53,10 +56,13 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     colouring = Colouring(_parameter(cases.parameters, len(cases.members)))
     speeds = np.concatenate([member[over].values for member in cases.members])
     across = unit_for(middle_of_decades(speeds), "m/s")
-    handles = colouring.handles()
+    handles: list[Artist] = [*colouring.handles()] if len(colouring.parameter.levels) > 1 else []
     figure = new_figure(6.6, 2.9 + 0.12 * len(handles))
     panels = figure.subplots(1, 2)
-    settled = [_draw(panels, member, over, across, colouring, number) for number, member in enumerate(cases.members)]
+    settled = [
+        _draw(panels, member, band, over, across, colouring.colour(int(place)))
+        for member, band, place in zip(cases.members, cases.bands, colouring.parameter.places, strict=True)
+    ]
     for ax, name in zip(panels, _PANELS, strict=True):
         ax.set_xscale("log")
         ax.set_ylim(bottom=0)
@@ -65,7 +71,7 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
         ax.grid(color="0.9", lw=0.5)
     letter_panels(list(panels))
     title = colouring.parameter.name if handles else ""
-    handles += [] if all(settled) else [_OPEN]
+    handles += band_handles(cases.bands) + ([] if all(settled) else [_OPEN])
     legend_above(figure, {str(one.get_label()): one for one in handles}, title)
     colouring.draw_bar(figure, list(panels))
     return figure
@@ -78,13 +84,18 @@ def _parameter(parameters: list[Parameter], cases: int) -> Parameter:
     return combined(parameters)
 
 
-def _draw(panels: list[Axes], member: xr.Dataset, over: str, across: Any, colouring: Colouring, number: int) -> bool:
+def _draw(panels: list[Axes], member: xr.Dataset, band: Band | None, over: str, across: Any, colour: Any) -> bool:
     """One case in both panels; whether all of it converged."""
     ordered = member.sortby("speed")
     speed, settled = across(ordered[over].values), ordered["status"].values != NOT_CONVERGED
-    colour = colouring.colour(int(colouring.parameter.places[number]))
     for ax, name in zip(panels, _PANELS, strict=True):
         values = ordered[name].values
+        if band is not None:
+            lower, upper = (one.sortby("speed")[name].values for one in (band.lower, band.upper))
+            draw_band(ax, speed, lower, upper, colour)
+        if band is not None and band.itself is not None:
+            itself = band.itself.sortby("speed")
+            ax.plot(across(itself[over].values), itself[name].values, color=colour, **ITSELF_STYLE)
         ax.plot(speed, values, "-", color=colour)
         ax.plot(speed[settled], values[settled], "o", ms=2.5, color=colour)
         ax.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)

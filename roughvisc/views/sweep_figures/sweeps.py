@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import Any, Literal
 
 import matplotlib
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -34,6 +36,7 @@ from roughvisc.views.sweep_figures.cases import (
     without_zeros,
 )
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
 from roughvisc.views.sweep_figures.maps import draw_maps, positions, set_parameter_axis
 
 #: Parameters with so many values or more make a map by default.
@@ -56,7 +59,8 @@ def sweep(
     """A quantity against what was varied in a sweep: lines, or a map of two parameters.
 
     Numbers lie on linear axes, or on logarithmic ones where they span decades; anything else, such as materials,
-    files and seeds, makes categories. Points that did not converge are crossed out.
+    files and seeds, makes categories. Points that did not converge are crossed out. Of realisations the mean is drawn,
+    the band in which 95 % of patches lie and, of a scan, the scan itself; a map has the mean.
 
     Parameters
     ----------
@@ -94,19 +98,34 @@ def sweep(
     if as_map and len(across) < 2:
         raise InputError(f"a map needs two parameters that vary: found {', '.join(p.key for p in cases.parameters)}")
     frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
-    values = np.array([[float(m[quantity][f]) for m, f in zip(cases.members, row, strict=True)] for row in frames])
-    values = without_zeros(quantity, values)
+    values = _at_frames(cases.members, quantity, frames)
+    bands = [_at_frames([None if b is None else end(b) for b in cases.bands], quantity, frames) for end in _ENDS]
     titles = _titles(cases, frames)
     if times is None and len(frames) == 1 and not _all_last(cases, frames[0]):
         titles = [f"{titles[0]}, where the cases differ most"]
     if as_map:
         return draw_maps(cases, across[:2], quantity, values, titles)
     if len(cases.parameters) == 1:
-        return _lines_by_time(cases, across[0], quantity, values, titles, frames)
-    return _families(cases, across[0], quantity, values, titles, frames)
+        return _lines_by_time(cases, across[0], quantity, values, bands, titles, frames)
+    return _families(cases, across[0], quantity, values, bands, titles, frames)
 
 
 # ------------------------------------------------------------------------------------------------ what is drawn
+
+#: Both ends of a band, and the measured surface itself.
+_ENDS: tuple[Callable[[Band], xr.Dataset | None], ...] = (
+    attrgetter("lower"),
+    attrgetter("upper"),
+    attrgetter("itself"),
+)
+
+
+def _at_frames(members: Sequence[xr.Dataset | None], quantity: str, frames: list[list[int]]) -> np.ndarray:
+    """Values over (time, case) as they are drawn; missing where there is no Dataset."""
+    values = [
+        [np.nan if m is None else float(m[quantity][f]) for m, f in zip(members, row, strict=True)] for row in frames
+    ]
+    return without_zeros(quantity, np.array(values))
 
 
 def _across(cases: Cases, along: str | Sequence[str] | None) -> list[Parameter]:
@@ -184,22 +203,37 @@ def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
 
 
 def _lines_by_time(
-    cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
+    cases: Cases,
+    across: Parameter,
+    quantity: str,
+    values: np.ndarray,
+    bands: list[np.ndarray],
+    titles: list[str],
+    frames: list[list[int]],
 ) -> Figure:
     """One parameter: a line for each time."""
     figure = new_figure(4.2, 3.2)
     ax = figure.add_subplot()
     unit = quantity_unit(cases, quantity, values)
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(values)))
-    for row, colour, title, frame in zip(values, shades, titles, frames, strict=True):
-        _draw_line(ax, across, np.arange(len(row)), unit(row), _failed(cases, frame), color=colour, label=title)
-    _finish(ax, cases, across, quantity, values)
-    legend_above(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)})
+    for number, (row, colour, title, frame) in enumerate(zip(values, shades, titles, frames, strict=True)):
+        members = np.arange(len(row))
+        ends = [unit(one[number]) for one in bands]
+        _draw_line(ax, across, members, unit(row), _failed(cases, frame), ends, color=colour, label=title)
+    _finish(ax, cases, across, quantity, np.array([values, *bands]))
+    named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    legend_above(figure, named | {str(one.get_label()): one for one in band_handles(cases.bands)})
     return figure
 
 
 def _families(
-    cases: Cases, across: Parameter, quantity: str, values: np.ndarray, titles: list[str], frames: list[list[int]]
+    cases: Cases,
+    across: Parameter,
+    quantity: str,
+    values: np.ndarray,
+    bands: list[np.ndarray],
+    titles: list[str],
+    frames: list[list[int]],
 ) -> Figure:
     """Several parameters: a panel for each time, in it a line for each combination of the others."""
     family = combined([one for one in cases.parameters if one.key != across.key])
@@ -208,18 +242,19 @@ def _families(
     axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
     unit = quantity_unit(cases, quantity, values)
     crossed = False
-    for ax, row, frame in zip(axes, values, frames, strict=True):
+    for number, (ax, row, frame) in enumerate(zip(axes, values, frames, strict=True)):
         failed = _failed(cases, frame)
         crossed |= bool(failed.any())
         for level in range(len(family.levels)):
             members = np.flatnonzero(family.places == level)
             nested = 1 - 0.55 * level / max(1, len(family.levels) - 1)  # so that none hides another that it lies on
             style = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
-            _draw_line(ax, across, members, unit(row[members]), failed[members], **style)
-        _finish(ax, cases, across, quantity, values)
+            ends = [unit(one[number][members]) for one in bands]
+            _draw_line(ax, across, members, unit(row[members]), failed[members], ends, **style)
+        _finish(ax, cases, across, quantity, np.array([values, *bands]))
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
-    handles = colouring.handles() + ([_CROSS] if crossed else [])
+    handles = [*colouring.handles(), *band_handles(cases.bands), *([_CROSS] if crossed else [])]
     legend_above(figure, {str(one.get_label()): one for one in handles}, family.name if colouring.handles() else "")
     colouring.draw_bar(figure, list(axes))
     letter_panels(axes, titles)
@@ -230,18 +265,30 @@ _CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged
 
 
 def _draw_line(
-    ax: Axes, across: Parameter, members: np.ndarray, shown: np.ndarray, failed: np.ndarray, **style
+    ax: Axes,
+    across: Parameter,
+    members: np.ndarray,
+    shown: np.ndarray,
+    failed: np.ndarray,
+    ends: list[np.ndarray],
+    **style,
 ) -> None:
-    """A line over the parameter; points of categories are not joined, nor that of an infinite value."""
+    """A line over the parameter, and its band; points of categories are not joined, nor that of an infinite value."""
     place = positions(across)[across.places[members]]
     order = np.argsort(place, kind="stable")
     few = len(members) <= 40
     style |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
-    x, y = place[order], shown[order]
+    columns = [place[order], *(one[order] for one in (shown, *ends))]
     if across.endless:
         last = int(np.isfinite(across.values[members]).sum())
-        x, y = np.insert(x, last, np.nan), np.insert(y, last, np.nan)
+        columns = [np.insert(one, last, np.nan) for one in columns]
+    x, y, lower, upper, itself = columns
     ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | style)
+    if np.isfinite(lower).any():
+        draw_band(ax, x, lower, upper, style["color"], across.numeric)
+    if np.isfinite(itself).any():
+        look = ITSELF_STYLE if across.numeric else {"ls": ""}
+        ax.plot(x, itself, marker="D", mfc="w", ms=4, color=style["color"], **look)
     if failed.any():
         ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
 

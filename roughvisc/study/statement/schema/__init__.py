@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 from pydantic.fields import FieldInfo
 
 from roughvisc.errors import InputError
@@ -121,10 +121,23 @@ class Study(Section):
         return self
 
 
+#: Table of a sweep: lists of values, and how many realisations of the surface.
+_VARIED = {
+    "type": "object",
+    "properties": {
+        "realisations": {"type": "integer", "minimum": 2, "description": "how many other patches of the same roughness"}
+    },
+    "additionalProperties": {"type": "array"},
+}
+
+
 class StudyFile(Study):
     """A study file: one case, and what is varied in it."""
 
-    sweep: dict[str, list[Any]] | list[dict[str, Any]] | None = None
+    sweep: Annotated[
+        dict[str, list[Any]] | list[dict[str, Any]] | None,
+        WithJsonSchema({"anyOf": [_VARIED, {"type": "array", "items": {"type": "object"}}]}),
+    ] = None
 
 
 def add_experiment(section: type[ExperimentSection], table: str) -> None:

@@ -1,0 +1,154 @@
+"""Realisations of one case drawn as one: their mean, the band in which a patch lies, and the scan itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from roughvisc.study.ensembles import statistics
+from roughvisc.study.statement.realisations import ITSELF
+from roughvisc.variables import NOT_CONVERGED, STEPPED, of_step
+from roughvisc.variables.axes import axis_of
+
+#: Times of a mean over realisations, whose accepted steps all differ.
+_MOST_TIMES = 400
+_STEP_TIME = of_step("time")
+#: How the measured surface itself is drawn.
+ITSELF_STYLE = {"ls": (0, (4, 1.5)), "lw": 1.1}
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where a patch lies among the realisations of a case.
+
+    Attributes
+    ----------
+    lower, upper : xarray.Dataset
+        Interval of a patch at 95 %, of every history; missing where there is none.
+    count : int
+        Number of realisations.
+    itself : xarray.Dataset or None
+        The measured surface itself, whose surrogates they are.
+    """
+
+    lower: xr.Dataset
+    upper: xr.Dataset
+    count: int
+    itself: xr.Dataset | None
+
+
+def pooled(members: Sequence[xr.Dataset], numbers: Sequence[int]) -> tuple[xr.Dataset, Band]:
+    """Mean of the realisations of one case over common rows, and their band.
+
+    Parameters
+    ----------
+    members : sequence of xarray.Dataset
+        Histories of each, over rows of its own and over its steps.
+    numbers : sequence of int
+        Number of each realisation.
+    """
+    itself = next((one for one, number in zip(members, numbers, strict=True) if number == ITSELF), None)
+    drawn = [one for one, number in zip(members, numbers, strict=True) if number != ITSELF] or list(members)
+    rows = axis_of(drawn[0].variables)
+    parts = [_of_rows(drawn, rows)]
+    if all(_STEP_TIME in one for one in drawn):
+        parts.append(_of_steps(drawn))
+    mean, lower, upper = ({name: one for part in parts for name, one in part[i].items()} for i in range(3))
+    if itself is not None and not np.array_equal(itself[rows], mean[rows]):
+        common = np.asarray(mean[rows].values)
+        names = [str(name) for name, one in itself.data_vars.items() if one.dims == (rows,)]
+        at_rows = {name: xr.Variable(rows, _at(itself, name, rows, common), itself[name].attrs) for name in names}
+        itself = itself.drop_dims(rows).assign(at_rows).assign_coords({rows: mean[rows]})
+    band = Band(xr.Dataset(lower), xr.Dataset(upper), len(drawn), itself)
+    return xr.Dataset(mean, attrs=drawn[0].attrs), band
+
+
+def _of_rows(drawn: Sequence[xr.Dataset], rows: str) -> tuple[dict, dict, dict]:
+    places = [one[rows].values for one in drawn]
+    if all(np.array_equal(one, places[0]) for one in places):
+        common = places[0]
+    else:
+        common = np.unique(np.concatenate(places))
+        common = common[(common >= max(one.min() for one in places)) & (common <= min(one.max() for one in places))]
+    held = (str(name) for name, one in drawn[0].data_vars.items() if one.dims == (rows,))
+    names = [name for name in held if all(name in one for one in drawn)]
+    found = _moments(drawn, names, rows, common, (rows,))
+    for one in found:
+        one[rows] = xr.Variable(rows, common, drawn[0][rows].attrs)
+    return found
+
+
+def _of_steps(drawn: Sequence[xr.Dataset]) -> tuple[dict, dict, dict]:
+    """Histories of steps, which each realisation takes in its own way, at times of all of them."""
+    clocks = [one[_STEP_TIME].values for one in drawn]
+    common = np.unique(np.concatenate([clock[np.isfinite(clock)] for clock in clocks]))
+    common = common[np.unique(np.linspace(0, len(common) - 1, _MOST_TIMES).astype(int))] if common.size else common
+    names = [name for name in map(of_step, STEPPED) if all(name in one for one in drawn)]
+    found = _moments(drawn, names, _STEP_TIME, common, ("step",))
+    for one in found:
+        one[_STEP_TIME] = xr.Variable("step", common, drawn[0][_STEP_TIME].attrs)
+    return found
+
+
+def _moments(
+    drawn: Sequence[xr.Dataset], names: Sequence[str], clock: str, common: np.ndarray, dims: tuple[str, ...]
+) -> tuple[dict, dict, dict]:
+    """Mean and band of some histories at common places."""
+    mean, lower, upper = {}, {}, {}
+    for name in names:
+        attrs = drawn[0][name].attrs
+        if "flag_values" in attrs:
+            told = np.array([_at(one, name, clock, common, nearest=True) for one in drawn])
+            bad = (told == NOT_CONVERGED).any(axis=0)  # the worst that any of them tells
+            mean[name] = xr.Variable(dims, np.where(bad, NOT_CONVERGED, told[0]), attrs)
+            continue
+        found = statistics(np.array([_at(one, name, clock, common) for one in drawn], dtype=float))
+        mean[name] = xr.Variable(dims, found["mean"], attrs)
+        lower[name] = xr.Variable(dims, found["patch_lower"], attrs)
+        upper[name] = xr.Variable(dims, found["patch_upper"], attrs)
+    return mean, lower, upper
+
+
+def _at(member: xr.Dataset, name: str, clock: str, common: np.ndarray, nearest: bool = False) -> np.ndarray:
+    """Values of a history at some places."""
+    places, values = member[clock].values, member[name].values
+    known = np.isfinite(places)
+    places, values = places[known], values[known]
+    order = np.argsort(places, kind="stable")
+    places, values = places[order], values[order]
+    if np.array_equal(places, common):
+        return values
+    if nearest:
+        return values[np.clip(np.searchsorted(places, common), 0, len(places) - 1)]
+    return np.interp(common, places, values)
+
+
+def draw_band(ax: Axes, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, colour, joined: bool = True) -> None:
+    """Shade a band, or draw a bar at each place where places are not joined."""
+    if joined:
+        ax.fill_between(x, lower, upper, color=colour, alpha=0.22, lw=0, zorder=1)
+    else:
+        ax.vlines(x, lower, upper, color=colour, alpha=0.35, lw=5, zorder=1)
+
+
+def band_handles(bands: Iterable[Band | None]) -> list[Artist]:
+    """Entries of a legend that say what lines and bands are; none without realisations."""
+    known = [band for band in bands if band is not None]
+    if not known:
+        return []
+    counts = sorted({band.count for band in known})
+    number = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    surrogates = any(band.itself is not None for band in known)
+    drawn = "Gaussian surrogates" if surrogates else "realisations"
+    found: list[Artist] = [
+        Line2D([], [], color="0.3", lw=1.6, label=f"mean of {number} {drawn}"),
+        Patch(color="0.3", alpha=0.22, lw=0, label="95 % of patches"),
+    ]
+    return found + ([Line2D([], [], color="0.3", **ITSELF_STYLE, label="the scan itself")] if surrogates else [])

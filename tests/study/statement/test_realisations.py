@@ -1,0 +1,127 @@
+"""Realisations of a surface in a study: which cases they are, and where they make no sense."""
+
+import pytest
+
+from roughvisc.errors import InputError
+from roughvisc.study.statement.case import read_cases, read_study, vary
+
+ROUGH = """
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [9, 7]
+hurst = 0.8
+rms_slope = 0.1
+amplitudes = "gaussian"
+seed = 5
+"""
+SCAN = """
+[surface]
+file = "rough.nc"
+mirror = true
+"""
+BODY = """
+[material]
+model = "elastic"
+shear_modulus = "1 MPa"
+[[program]]
+pressure = "10 kPa"
+over = 0
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    def write(text, sweep=""):
+        (tmp_path / "rough.nc").write_text("a scan, by its name")
+        (tmp_path / "ball.toml").write_text('generate = "sphere"\nradius = "1 mm"\nsize = "0.1 mm"\nshape = 9\n')
+        path = tmp_path / "study.toml"
+        path.write_text(text + BODY + sweep)
+        return path
+
+    return write
+
+
+def test_realisations__of_generated_roughness_are_the_seeds_from_the_stated_one(study):
+    plain = read_study(study(ROUGH))
+    three = read_cases(study(ROUGH, "[sweep]\nrealisations = 3\n"))
+    assert [dict(case.varied) for case in three] == [
+        {"surface.seed": 4 + number, "realisation": number} for number in (1, 2, 3)
+    ]
+    assert [case.key for case in three] == [vary(plain, {"surface.seed": seed}).key for seed in (5, 6, 7)]
+    more = read_cases(study(ROUGH, "[sweep]\nrealisations = 5\n"))
+    assert [case.key for case in more[:3]] == [case.key for case in three], "those that are there are used again"
+
+
+def test_realisations__of_a_scan_are_the_scan_itself_and_its_surrogates(study):
+    plain = read_study(study(SCAN))
+    cases = read_cases(study(SCAN, "[sweep]\nrealisations = 2\n"))
+    assert [dict(case.varied) for case in cases] == [{"realisation": number} for number in (0, 1, 2)]
+    assert cases[0].key == plain.key
+    assert [c.key for c in cases[1:]] == [vary(plain, {"surface.realisation": number}).key for number in (1, 2)]
+
+
+def test_realisations__are_crossed_with_lists_and_belong_to_their_table(study):
+    crossed = read_cases(study(ROUGH, '[sweep]\nrealisations = 2\n"program.0.pressure" = ["1 kPa", "2 kPa"]\n'))
+    told = [(case.varied["program.0.pressure"], case.varied["realisation"]) for case in crossed]
+    assert told == [(1e3, 1), (1e3, 2), (2e3, 1), (2e3, 2)]
+    tables = '[[sweep]]\nrealisations = 3\n"surface.hurst" = [0.6, 0.7]\n[[sweep]]\n"surface.hurst" = 0.9\n'
+    found = [(case.settings.surface.hurst, case.varied.get("realisation")) for case in read_cases(study(ROUGH, tables))]
+    assert found == [(0.6, 1), (0.6, 2), (0.6, 3), (0.7, 1), (0.7, 2), (0.7, 3), (0.9, None)]
+    kinds = '[[sweep]]\nrealisations = 2\nsurface = [{ file = "rough.nc", mirror = true }]\n'
+    assert [case.varied["realisation"] for case in read_cases(study(ROUGH, kinds))] == [0, 1, 2]
+
+
+def test_realisations__of_two_generated_faces_draw_both(study):
+    faces = ROUGH + ROUGH.replace("[surface]", "[surface.second]").replace("seed = 5", "seed = 50")
+    cases = read_cases(study(faces, '[solve]\nboundary = "periodic"\n[sweep]\nrealisations = 3\n'))
+    assert [(c.settings.surface.seed, c.settings.surface.second.seed) for c in cases] == [(5, 50), (6, 51), (7, 52)]
+
+
+@pytest.mark.parametrize(
+    ("surface", "sweep", "message"),
+    [
+        (ROUGH, "realisations = 1", "found 1: expected a whole number from 2 to 10000"),
+        (ROUGH, "realisations = [6, 24]", "found [6, 24]: expected a whole number from 2 to 10000"),
+        (
+            ROUGH.replace('"gaussian"', '"fixed"').replace("amplitudes", "# "),
+            "realisations = 3",
+            "without surface.amp",
+        ),
+        (ROUGH, 'realisations = 3\n"surface.seed" = [1, 2]', "together with sweep.surface.seed: expected one of them"),
+        (
+            SCAN + "realisation = 2\n",
+            "realisations = 3",
+            "together with surface.realisation: expected one of",
+        ),
+        (
+            '[surface]\nfile = "ball.toml"\n',
+            "realisations = 3",
+            "card of generate = 'sphere': expected a rough",
+        ),
+        (
+            '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.1 mm"\nshape = 9\n',
+            "realisations = 3",
+            "found together with generate = 'sphere': expected a scan, or generate = 'self_affine'",
+        ),
+        (
+            ROUGH + ROUGH.replace("[surface]", "[surface.second]").replace("seed = 5", "seed = 7"),
+            "realisations = 3",
+            "the seeds 5 and 7 of the two faces: expected seeds that are at least 3 apart, or equal",
+        ),
+    ],
+)
+def test_realisations__are_refused_where_they_make_no_sense(study, surface, sweep, message):
+    path = study(surface, f"[sweep]\n{sweep}\n")
+    with pytest.raises(InputError) as caught:
+        read_cases(path)
+    assert str(caught.value).startswith(f"{path}: sweep.realisations: found ")
+    assert message in str(caught.value)
+
+
+def test_realisations__a_case_that_is_refused_says_which_it_is(study):
+    open_border = SCAN.replace("mirror = true", "")  # whose surrogates repeat, while it does not
+    with pytest.raises(InputError, match=r"solve.boundary: .*\(case 1 of 3: realisation = 0\)"):
+        read_cases(study(open_border, "[sweep]\nrealisations = 2\n"))
+    with pytest.raises(InputError, match=r"realisation: unknown key"):
+        read_cases(study(ROUGH, "[sweep]\nrealisation = [1, 2]\n"))

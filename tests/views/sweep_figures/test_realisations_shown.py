@@ -1,0 +1,107 @@
+"""Realisations in figures of sweeps: one line a case, its band, and the scan itself; told apart in the legend."""
+
+import itertools
+
+import numpy as np
+import pytest
+import scipy.stats
+import xarray as xr
+from matplotlib.collections import PolyCollection
+from support import lines, text_boxes
+
+from roughvisc.views import plot
+from roughvisc.views.sweep_figures.cases import cases_of
+
+LOADS = np.array([0.01, 0.02, 0.04])
+TIMES = np.array([0.1, 1.0, 10.0])
+FACTORS = np.array([3.0, 0.8, 0.9, 1.1, 1.25])
+BANDED = {
+    "sweep": lambda ds: plot.sweep(ds, times=-1),
+    "several times": plot.sweep,
+    "histories": plot.histories_of_cases,
+}
+
+
+def patches(first=0, **more):
+    """A sweep of loads for the realisations from a number on; area and gap follow one factor each."""
+    numbers = np.arange(first, first + 5)
+    area = 1e-7 * LOADS[:, None, None] * FACTORS[:, None] * (1 + np.log10(TIMES / TIMES[0]))
+    over = ("case", "realisation", "time")
+    keys = [[f"{i}{j}" for j in range(5)] for i in range(3)]
+    ds = xr.Dataset(
+        {
+            "contact_area": (over, area, {"units": "m^2", "long_name": "real contact area"}),
+            "force": (over, np.broadcast_to(LOADS[:, None, None], area.shape), {"units": "N"}),
+            "status": (over, np.zeros(area.shape, "int8"), {"flag_values": np.arange(4, dtype="int8")}),
+        },
+        {"time": TIMES, "realisation": numbers, "program_0_load": ("case", LOADS, {"long_name": "program.0.load"})},
+    )
+    return ds.assign_coords(case_key=(("case", "realisation"), keys), **more)
+
+
+def interval(values):
+    """Of one more log-normal value."""
+    x = np.log(values)
+    half = scipy.stats.t.ppf(0.975, len(x) - 1) * x.std(ddof=1) * np.sqrt(1 + 1 / len(x))
+    return np.exp(x.mean() - half), np.exp(x.mean() + half)
+
+
+@pytest.mark.parametrize("draw", BANDED)
+def test_figures__draw_the_mean_the_band_and_the_scan_itself(draw):
+    figure = BANDED[draw](patches())
+    (ax,) = figure.axes
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told[-4 if draw == "histories" else -3 :][:3] == [
+        "mean of 4 Gaussian surrogates",
+        "95 % of patches",
+        "the scan itself",
+    ]
+    bands = [one for one in ax.collections if isinstance(one, PolyCollection)]
+    assert len(bands) == (1 if draw == "sweep" else 3)
+    corners = bands[-1].get_paths()[0].vertices  # of the largest load over time, or of the end over loads
+    low, high = interval(FACTORS[1:])
+    top = 1e-7 * LOADS[-1] * 3 * 1e12 if ax.get_ylabel() == "Contact area [µm²]" else 1e-7 * LOADS[-1] * 3 * 1e6
+    assert corners[:, 1].max() == pytest.approx(top * high)
+    at_end = corners[corners[:, 0] == corners[:, 0].max()]
+    assert at_end[:, 1].min() == pytest.approx(top * low)
+    drawn = np.concatenate([line.get_ydata() for line in ax.lines])
+    for factor in (FACTORS[1:].mean(), FACTORS[0]):
+        assert np.isclose(drawn, top * factor).any(), factor
+    assert ax.get_ylim()[1] > corners[:, 1].max()
+    boxes = text_boxes(figure)
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not a.overlaps(b), f"{one!r} covers {other!r}"
+
+
+def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter():
+    ds = patches(1, surface_seed=("realisation", np.arange(7, 12), {"long_name": "surface.seed"}))
+    told = [text.get_text() for text in plot.histories_of_cases(ds).legends[0].get_texts()]
+    assert "mean of 5 realisations" in told
+    assert "the scan itself" not in told
+    assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
+
+
+def test_cases_of__a_realisation_that_is_missing_does_not_count():
+    ds = patches()
+    hole = (ds["program_0_load"] == LOADS[1]) & (ds["realisation"] == 3)
+    ds = ds.assign(contact_area=ds["contact_area"].where(~hole)).assign_coords(case_key=ds["case_key"].where(~hole, ""))
+    bands = cases_of(ds).bands
+    assert [band.count for band in bands] == [4, 3, 4]
+    low, _ = interval(FACTORS[[1, 2, 4]])
+    assert float(bands[1].lower["contact_area"][-1]) == pytest.approx(3e-7 * LOADS[1] * low)
+
+
+def test_cases_of__realisations_of_other_times_are_compared_at_common_places():
+    nodes = {}
+    for number, times in ((1, [0.0, 1.0, 2.0]), (2, [0.0, 0.5, 2.0])):
+        area = xr.Variable("time", 1e-8 * number * np.array(times), {"units": "m^2"})
+        status = xr.Variable("time", np.full(3, number - 1, "int8"), {"flag_values": np.arange(4, dtype="int8")})
+        nodes[f"{number}"] = xr.Dataset(
+            {"contact_area": area, "status": status}, {"time": times, "realisation": number, "case_key": f"{number}"}
+        )
+    cases = cases_of(xr.DataTree.from_dict(nodes))
+    (mean,) = cases.members
+    np.testing.assert_allclose(mean["time"], [0, 0.5, 1, 2])
+    np.testing.assert_allclose(mean["contact_area"], 1.5e-8 * mean["time"])
+    assert mean["status"].values.tolist() == [1, 1, 1, 1]
+    assert lines(plot.histories_of_cases(xr.DataTree.from_dict(nodes)).axes[0])
