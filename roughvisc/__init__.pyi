@@ -11,6 +11,7 @@ from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.bodies.body import Body as Body
 from roughvisc.mechanics.bodies.body import sheet as sheet
+from roughvisc.mechanics.bodies.layer import layer as layer
 from roughvisc.mechanics.materials.models import PowerLaw as PowerLaw
 from roughvisc.mechanics.materials.models import Prony as Prony
 from roughvisc.mechanics.materials.models import Tabulated as Tabulated

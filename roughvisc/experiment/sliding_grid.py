@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,10 +14,8 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainty
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
-from roughvisc.mechanics.materials.frequency import complex_compliance
-from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.topography.spectrum import without_last_octave
@@ -71,19 +68,16 @@ class SlidingGrid:
         Undeformed, turned into the motion. [m]
     spacing : tuple of float
         Cell sides, turned likewise. [m]
-    kernel : Kernel
-        Of the body.
     """
 
     gap: Array
     spacing: tuple[float, float]
-    kernel: Kernel
 
     @classmethod
     def of(cls, profile: Profile, turn: AxisTransform) -> SlidingGrid:
         """That of a surface."""
         sides = profile.spacing[::-1] if turn.swapped else profile.spacing
-        return cls(np.ascontiguousarray(turn.there(profile.gap)), (sides[0], sides[1]), profile.kernel)
+        return cls(np.ascontiguousarray(turn.there(profile.gap)), (sides[0], sides[1]))
 
     def smooth(self) -> tuple[SlidingGrid, float]:
         """The same without its shortest octave of waves, and the length below which these are. [m]
@@ -96,7 +90,7 @@ class SlidingGrid:
         gap, shortest = without_last_octave(self.gap, self.spacing)
         if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
             raise InputError("height has no wavelengths above its shortest octave: expected last_octave = False")
-        return SlidingGrid(gap, self.spacing, self.kernel), shortest
+        return SlidingGrid(gap, self.spacing), shortest
 
     def coarser(self, factor: float) -> SlidingGrid | None:
         """The same waves on cells about so many times longer, as far as these can hold them; None if there is none."""
@@ -105,7 +99,7 @@ class SlidingGrid:
             return None
         sides = [side * many / few for side, many, few in zip(self.spacing, self.gap.shape, shape, strict=True)]
         gap = resample_periodic(self.gap, shape, first_kept=True)
-        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]), self.kernel)
+        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (sides[0], sides[1]))
 
     @property
     def period(self) -> float:
@@ -123,11 +117,11 @@ class SlidingGrid:
         across = float(np.ptp(self.gap, axis=1).max())
         return 1 if across <= _ROUNDING * float(np.ptp(self.gap)) else self.gap.shape[1]
 
-    def sliding(self, speed: float, material: Material) -> Sliding:
-        """The operator at a speed [m/s]; the material must have a complex compliance in closed form."""
+    def sliding(self, speed: float, body: Body) -> Sliding:
+        """The operator at a speed [m/s]; the body's materials must have a complex compliance in closed form."""
         (nx, ny), (dx, dy) = self.gap.shape, self.spacing
         shape, spacing = (nx, self.rows), (dx, dy * ny / self.rows)
-        return Sliding(self.kernel, partial(complex_compliance, material), shape, spacing, speed)
+        return Sliding(body, shape, spacing, speed)
 
     def slide(self, sliding: Sliding, force: float, tolerance: float) -> SteadyState:
         """Steady state under a force [N], on all cells."""
@@ -177,9 +171,7 @@ class CoarserFaces:
         if self.faces[-1].gap.size == self.faces[0].gap.size:
             del self.faces[1:]
 
-    def errors(
-        self, found: SteadyState, speed: float, law: Material, force: float, tolerance: float
-    ) -> dict[str, float]:
+    def errors(self, found: SteadyState, speed: float, law: Body, force: float, tolerance: float) -> dict[str, float]:
         """Relative errors of friction and contact area at a speed, missing where no coarser copy has a solution.
 
         Parameters
@@ -188,8 +180,8 @@ class CoarserFaces:
             On the surface's own grid.
         speed : float
             [m/s]
-        law : Material
-            With a complex compliance in closed form.
+        law : Body
+            Of materials with a complex compliance in closed form.
         force : float
             [N]
         tolerance : float

@@ -29,8 +29,6 @@ from roughvisc.experiment.resources import curve_bytes
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.operator import Boundary
-from roughvisc.mechanics.materials.frequency import over_frequencies
-from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
 from roughvisc.mechanics.stepping.program import Direction
@@ -186,9 +184,8 @@ class SlidingRows(Rows):
     """
 
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
-        (term,) = problem.body.terms()
-        self._material, self._curve, self._settings, self._done = term.material, curve, problem.settings, found
-        self._profile = Profile(problem.height, "refuse", kernel=term.kernel)
+        self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
+        self._profile = Profile(problem.height, "refuse")
         require_memory_of_curve((self._profile.gap.shape[0], self._profile.gap.shape[1]), problem.settings)
         if not self._profile.present.all():  # of a punch, which says so itself
             raise InputError("height is missing at some points: expected none, because the surface repeats")
@@ -215,7 +212,7 @@ class SlidingRows(Rows):
         """Slide at the speed of that number; so many are then done."""
         speed, tolerance = self._curve.asked[number], self._settings.tolerance
         # once a speed: a table takes a fit
-        law = over_frequencies(self._material, speed * self._face.waves, 0.1 * tolerance)
+        law = self._body.over_frequencies(speed * self._face.waves, 0.1 * tolerance)
         sliding = self._face.sliding(speed, law)
         found = self._face.slide(sliding, self._force, tolerance)
         row, fields = self._row(found, speed)
@@ -262,11 +259,12 @@ class SlidingRows(Rows):
         fields = {"pressure": np.ascontiguousarray(pressure), "gap": gap}
         return row, {name: fields[name] for name in self._settings.fields}
 
-    def _creep(self, found: SteadyState, speed: float, law: Material) -> float:
+    def _creep(self, found: SteadyState, speed: float, law: Body) -> float:
         """Part of the creep that has not recovered where the next contact comes; 0 unless the contact stands alone."""
         if not (contact_stands_alone(found.pressure, 0) if self._alone is None else self._alone):
             return 0.0
-        return creep_left(*(float(law.contact_compliance(t)) for t in (self._face.period / speed, np.inf)))
+        ages = self._face.period / speed, np.inf
+        return max(creep_left(*(float(one.contact_compliance(age)) for age in ages)) for one in law.materials)
 
     def _added(self, row: dict[str, Any], found: SteadyState, without: SteadyState) -> dict[str, float]:
         """What the shortest octave of waves adds, relative to what there is with it."""
@@ -296,7 +294,7 @@ class SlidingRows(Rows):
         return {
             "model_note": MODEL,
             "direction": self._curve.direction,
-            "material_note": self._material.note,
+            "material_note": self._body.note,
             "octave_note": octave_note(dataset),
             "last_octave": self._octave,
             **warnings,

@@ -6,16 +6,21 @@ A material alone is a half-space of it. A body is a value that everything takes 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
+from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.protocol import Material, complete
 from roughvisc.units import Quantity, quantities
 
+Array = NDArray[np.float64]
 #: Unless a base is given with a thickness.
 BASE: Base = "bonded"
 
@@ -76,6 +81,38 @@ class Body:
     def terms(self) -> tuple[Term, ...]:
         """What the response to pressure is a sum of: ``C(q, t) = sum_i C_i(t) K_i(q)``."""
         return (Term(complete(self.material), self.kernel),)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """What it is made of."""
+        return (complete(self.material),)
+
+    @property
+    def note(self) -> str:
+        """What a result should say of how its materials were found; often empty."""
+        return "; ".join(one.note for one in self.materials if one.note)
+
+    def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> Self:
+        """The same of what stands for the material at some frequencies, see :func:`over_frequencies`. [1/s]"""
+        return replace(self, material=over_frequencies(self.material, frequency, tolerance))
+
+    def waves(self, qx: Array, qy: Array, frequency: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Displacement over pressure of waves that oscillate: kernel [m] and complex contact compliance [1/Pa].
+
+        Parameters
+        ----------
+        qx, qy : ndarray
+            Wave numbers, which broadcast. [1/m]
+        frequency : ndarray
+            Angular frequencies, which broadcast with them; those that :meth:`over_frequencies` was told. [1/s]
+
+        Returns
+        -------
+        kernel, compliance : ndarray
+            Their product is the response; both broadcast with the wave numbers. Infinite where the material creeps
+            without end.
+        """
+        return self.kernel.transfer(qx, qy), complex_compliance(self.material, frequency)
 
     def attributes(self) -> dict[str, Any]:
         """What a result says of the body beside its material: names of attributes and their values."""

@@ -9,7 +9,6 @@ even, positive operator, the imaginary part a skew one. The contact is the compl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,11 +17,10 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import threads_of
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.sliding.interior_point import solve_complementarity
 
 Array = NDArray[np.float64]
-Compliance = Callable[[Array], NDArray[np.complex128]]
 
 # Stated error over the change by Newton's step. Measured on line contacts against dense solutions, with loss tangents
 # up to 27: the true error is 0.8 to 2.8 times that change.
@@ -74,10 +72,8 @@ class Sliding:
 
     Parameters
     ----------
-    body : Kernel
-        What is slid on.
-    compliance : callable
-        Complex contact compliance of angular frequencies. [1/Pa]
+    body : Body
+        What is slid on; its materials have a complex compliance in closed form.
     shape, spacing : pair
         Cells of one period, and their sides. [m]
     speed : float
@@ -92,8 +88,7 @@ class Sliding:
 
     def __init__(
         self,
-        body: Kernel,
-        compliance: Compliance,
+        body: Body,
         shape: tuple[int, int],
         spacing: tuple[float, float],
         speed: float,
@@ -109,9 +104,8 @@ class Sliding:
         if ny % 2 == 0:
             odd_across[:, -1] = 0
         self._derivative, self._derivative_across = 1j * odd, 1j * odd_across
-        response = body.transfer(self.qx, self.qy)
-        acting = response > 0
-        complex_compliance = np.broadcast_to(compliance(-self.qx * speed), response.shape)
+        response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
+        acting, complex_compliance = response > 0, np.broadcast_to(complex_compliance, response.shape)
         endless = acting & ~np.isfinite(complex_compliance)
         if endless.any():
             raise InputError(

@@ -4,11 +4,11 @@
 """
 
 import sys
-from functools import partial
 
 import numpy as np
 
 import roughvisc as rv
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
@@ -25,7 +25,7 @@ def slid(height, material, speed, load, body=HALF_SPACE, side=PERIOD, **settings
     """On a square surface, or on a strip of square cells."""
     nx, ny = height.shape
     spacing = (side / nx, side / ny if ny > 3 else side / nx)
-    sliding = Sliding(body, partial(complex_compliance, material), height.shape, spacing, speed)
+    sliding = Sliding(Body(material, body), height.shape, spacing, speed)
     return steady_state(sliding, height.max() - height, load, **settings)
 
 

@@ -1,15 +1,14 @@
 """Steady sliding of a cylinder against the closed form for one cylinder alone."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.closed_forms import sliding_cylinder
-from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 
 RADIUS, LOAD, TIME = 1e-2, 100.0, 1e-3
@@ -22,7 +21,7 @@ def slid(cells, speed):
     """One cylinder in each period of so many cells."""
     x = (np.arange(cells) - (cells - 1) / 2) * CELL
     gap = x[:, None] ** 2 / (2 * RADIUS)
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, RUBBER), (cells, 1), (CELL, CELL), speed)
+    sliding = Sliding(Body(RUBBER, HALF_SPACE), (cells, 1), (CELL, CELL), speed)
     return steady_state(sliding, gap, LOAD * CELL, tolerance=1e-6)
 
 

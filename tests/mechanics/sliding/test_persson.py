@@ -1,7 +1,6 @@
 """Persson's theory on the waves of a surface: its exact limits, and its integrals."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
 import roughvisc as rv
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.materials.frequency import complex_compliance
@@ -21,7 +21,7 @@ RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
 
 def sliding_on(shape, material=RUBBER, body=HALF_SPACE):
     spacing = (SIDE / shape[0], SIDE / shape[1])
-    return Sliding(body, partial(complex_compliance, material), shape, spacing, SPEED)
+    return Sliding(Body(material, body), shape, spacing, SPEED)
 
 
 def rough(shape, **settings):

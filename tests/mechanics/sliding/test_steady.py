@@ -1,7 +1,6 @@
 """Steady sliding: against closed forms, against a dense solution of the same equations, and what must hold for any."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
@@ -60,7 +60,7 @@ def test_full_contact_of_a_wave__is_exact(loss, speed, body):
 def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_direction(waves, shape):
     """F_y / F_x = q_y / q_x: the profile is pushed along the wave's normal, and two waves push as each alone does."""
     spacing = (PERIOD / shape[0], 0.8 * PERIOD / shape[1])
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, rubber()), shape, spacing, 0.16)
+    sliding = Sliding(Body(rubber(), HALF_SPACE), shape, spacing, 0.16)
     height = oblique(shape, 1e-6, waves)
     found = steady_state(sliding, height.max() - height, 0.05, tolerance=1e-7)
     assert (found.pressure > 0).all()
@@ -72,7 +72,7 @@ def test_force_across__in_partial_contact_is_pressure_times_slope_of_the_profile
     """Which converges slower: within 3 % on 90 cells a wave, where it is a third of the friction."""
     height = oblique((90, 81), 1e-5, (1, 1)) + oblique((90, 81), 2e-6, (2, -1))
     spacing = (PERIOD / 90, PERIOD / 81)
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, rubber()), height.shape, spacing, 0.2)
+    sliding = Sliding(Body(rubber(), HALF_SPACE), height.shape, spacing, 0.2)
     found = steady_state(sliding, height.max() - height, 0.01)
     assert 0.1 < np.mean(found.pressure > 0) < 0.6
     across = mean_traction(height.T, found.pressure.T) * PERIOD**2
@@ -82,7 +82,7 @@ def test_force_across__in_partial_contact_is_pressure_times_slope_of_the_profile
 
 def test_force_across__is_zero_of_a_surface_that_is_its_own_image_across_the_motion():
     height = ROUGH + np.roll(ROUGH[:, ::-1], 1, axis=1)
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, rubber()), ROUGH.shape, (PERIOD / 45, PERIOD / 40), 0.1)
+    sliding = Sliding(Body(rubber(), HALF_SPACE), ROUGH.shape, (PERIOD / 45, PERIOD / 40), 0.1)
     found = steady_state(sliding, height.max() - height, LOAD)
     assert found.power_force > 0
     assert abs(sliding.force_across(found.pressure)) < 1e-6 * found.power_force
@@ -245,7 +245,7 @@ def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch
             fft, name, lambda *given, plain=plain, workers=None, **named: used.add(workers) or plain(*given, **named)
         )
     with fft.set_workers(2):
-        sliding = Sliding(HALF_SPACE, partial(complex_compliance, rubber()), shape, (1e-3, 1e-3), 1.0)
+        sliding = Sliding(Body(rubber(), HALF_SPACE), shape, (1e-3, 1e-3), 1.0)
         pressure = np.zeros(shape)
         for transformed in (sliding.displacement, sliding.full_contact, sliding.lagging, sliding.force_across):
             transformed(pressure)

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.direct import History
@@ -70,7 +70,7 @@ def settled(height, material, speed, load, periods=6, **settings):
 
 def steady(found, material, speed, load):
     operator = found.operator
-    sliding = Sliding(HALF_SPACE, partial(complex_compliance, material), operator.shape, operator.spacing, speed)
+    sliding = Sliding(Body(material, HALF_SPACE), operator.shape, operator.spacing, speed)
     return steady_state(sliding, found.gap, load, tolerance=1e-6)
 
 

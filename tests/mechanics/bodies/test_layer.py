@@ -1,0 +1,141 @@
+"""Layers on a half-space: the response of waves, the kernel in free space, and the friction of full contact."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import j0
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.half_space import love_kernel
+from roughvisc.mechanics.bodies.layered import Layered, effective_compliance
+from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.materials.frequency import complex_compliance
+
+X = np.geomspace(1e-3, 50, 23)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_effective_compliance__of_one_material_is_that_of_its_half_space(poisson):
+    found = effective_compliance(X, (0.4, 0.6), (poisson,) * 3, (2.0,) * 3)
+    np.testing.assert_allclose(found, (1 - poisson) / 2 * 2.0, rtol=1e-11)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_effective_compliance__on_a_rigid_base_is_that_of_a_bonded_sheet(poisson):
+    x = np.geomspace(0.05, 50, 23)
+    found = effective_compliance(x, (1.0,), (poisson, 0.2), (1.0, 1e-12)) / ((1 - poisson) / 2)
+    np.testing.assert_allclose(found, x / 2 * Sheet(1.0, poisson).transfer(x, 0.0), rtol=1e-7)
+
+
+def test_effective_compliance__of_one_material_in_two_layers_is_that_of_one():
+    once = effective_compliance(X, (1.0,), (0.5, 0.3), (1.0, 40.0 - 3j))
+    np.testing.assert_allclose(effective_compliance(X, (0.3, 0.7), (0.5, 0.5, 0.3), (1, 1, 40 - 3j)), once, rtol=1e-12)
+
+
+def test_effective_compliance__of_long_and_short_waves_is_that_of_base_and_layer():
+    found = effective_compliance(np.array([1e-9, 50.0]), (1.0,), (0.3, 0.5), (2.0, 7.0))
+    np.testing.assert_allclose(found, [0.25 * 7.0, 0.35 * 2.0], rtol=1e-8)
+
+
+def test_effective_compliance__of_a_stiff_film_on_a_soft_base_bends_as_a_plate():
+    h, x, ratio = 1.0, 0.02, 1e4  # shear modulus of the film over the base's, both incompressible
+    bending = h**3 / (6 * (1 - 0.5))
+    stiffness = 2 / ratio * x / h + bending * (x / h) ** 4
+    found = float(effective_compliance(x / h, (h,), (0.5, 0.5), (1.0, ratio)))
+    assert 2 * found / x == pytest.approx(1 / stiffness, rel=2e-3)
+
+
+@pytest.mark.parametrize("compliances", [(1.0, 0.02), (1.0, 50.0)])
+def test_layered__its_kernel_in_free_space_is_the_transform_of_its_response(compliances):
+    kernel, side = Layered((1.0,), (0.5, 0.3), compliances), 0.05
+    found, love = kernel.influence((61, 2), (side, side)), love_kernel((61, 2), (side, side))
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    ends = np.concatenate([[0], np.geomspace(1e-8, 1e-2, 200), np.linspace(1e-2, 30, 600)[1:]])
+    halves = np.diff(ends)[:, None] / 2
+    q, weights = (ends[:-1, None] + halves * (nodes + 1)).ravel(), (halves * weights).ravel()
+    for cell in (20, 60):
+        rest = weights @ ((kernel.factor(q) - 1) * j0(q * cell * side)) / math.pi * side**2
+        # a cell's mean differs from its centre by the square of the cell
+        assert found[cell, 0] - love[cell, 0] == pytest.approx(rest, abs=1e-4 * love[cell, 0], rel=2e-4)
+
+
+@pytest.mark.parametrize("side", [0.3, 4.0])
+def test_layered__displacement_by_a_cell_is_that_by_its_nine_parts(side):
+    kernel = Layered((0.5, 0.5), (0.5, 0.1, 0.3), (1.0, 0.1, 8.0))
+    whole = kernel.influence((15, 17), (side, 1.3 * side))
+    parts = kernel.influence((50, 50), (side / 3, 1.3 * side / 3))
+    for i, j in ((0, 0), (2, 1), (14, 5), (3, 15)):
+        near = [abs(np.arange(3 * at - 1, 3 * at + 2)) for at in (i, j)]
+        assert parts[np.ix_(*near)].sum() == pytest.approx(whole[i, j], rel=1e-7)
+
+
+def test_layered__far_away_is_the_half_space_below():
+    kernel = Layered((1.0,), (0.5, 0.3), (1.0, 0.02))
+    found = kernel.influence((401, 1), (1.0, 1.0))[-1, 0]
+    assert found == pytest.approx(0.7 / 0.5 * 0.02 * love_kernel((401, 1), (1.0, 1.0))[-1, 0], rel=1e-3)
+
+
+def test_layer__of_elastic_materials_is_pressed_as_one_of_its_kernel():
+    layer = rv.layer(rv.elastic(2e6, poisson=0.3), "0.1 mm", on=rv.elastic(1e8))
+    assert layer.kernel == Layered((1e-4,), (0.3, 0.5), (1.0, 0.02))
+    assert len(layer.terms()) == 1
+
+
+def test_layer__lies_on_another_one():
+    soft, hard, base = rv.elastic(1e6), rv.elastic(1e8), rv.elastic(1e7)
+    both = rv.layer(soft, 1e-4, on=rv.layer(hard, 2e-4, on=base))
+    assert both.thicknesses == (1e-4, 2e-4)
+    np.testing.assert_allclose(both.kernel.compliances, (1.0, 0.01, 0.1))
+    assert rv.layer(soft, math.inf, on=base) == rv.Body(soft)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("speed", [2e-3, 0.1])
+def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, turned):
+    layer, base = rv.zener(3e6, 1e6, 1e5, poisson=0.3), rv.PowerLaw(1e-8, 3e-7, 0.4, poisson=0.45)
+    thickness, period, amplitude, pressure = 2e-4, 1e-3, 1e-7, 1e5
+    height = rv.wavy(amplitude=amplitude, wavelength=period, size=period, shape=(45, 3), waves=1)
+    direction = "x"
+    if turned:
+        height, direction = height.rename(x="y", y="x").transpose("x", "y"), "-y"
+    body = rv.layer(layer, thickness, on=base)
+    found = rv.friction(height, body, pressure=pressure, speeds=[speed], direction=direction, tolerance=1e-6)
+    k = 2 * math.pi / period
+    shear = [2 / (1 - one.poisson) * complex_compliance(one, k * speed) for one in (layer, base)]
+    modulus = 1 / complex(effective_compliance(k, (thickness,), (0.3, 0.45), shear))
+    expected = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
+    assert float(found["friction_coefficient"][0]) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "expected"),
+    [
+        (lambda: rv.layer(rv.elastic(1e6), 0.0, on=rv.elastic(1e6)), "thickness is 0.0: expected a positive number"),
+        (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=rv.sheet(rv.elastic(1e6), 1e-3)), "expected a material or a layer"),
+        (lambda: rv.layer(rv.Body(rv.elastic(1e6)), 1e-3, on=rv.elastic(1e6)), "material is the body .*: expected a"),
+        (lambda: rv.layer(rv.elastic(1e6, poisson=-0.2), 1e-3, on=rv.elastic(1e6)), "Poisson's ratio -0.2"),
+        (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=rv.pair(rv.elastic(1e6), rv.elastic(1e7))), "on is .*: expected"),
+        (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=2e6), "expected one of roughvisc's materials"),
+    ],
+)
+def test_layer__refuses(wrong, expected):
+    with pytest.raises(InputError, match=expected):
+        wrong()
+
+
+def test_body__a_layer_far_thicker_than_the_surface_is_its_half_space_in_sliding():
+    rubber, height = rv.zener(3e6, 1e6, 1e5), rv.wavy(amplitude=1e-6, wavelength=1e-3, size=1e-3, shape=(33, 31))
+    thick = rv.layer(rubber, 1e-2, on=rv.elastic(1e3))
+    found, half_space = (
+        rv.friction(height, body, pressure=2e3, speeds=[0.01], tolerance=1e-5) for body in (thick, rv.Body(rubber))
+    )
+    np.testing.assert_allclose(found["friction_coefficient"], half_space["friction_coefficient"], rtol=1e-4)
+
+
+def test_simulate__refuses_materials_that_creep_differently():
+    body = rv.layer(rv.zener(3e6, 1e6, 1e5), 1e-4, on=rv.elastic(1e6))
+    ball = rv.sphere(radius=1e-3, size=2e-4, shape=9)
+    with pytest.raises(InputError, match="whose materials creep differently: expected"):
+        rv.simulate(ball, body, rv.Program().load(1e-4, over=1), progress=False)
