@@ -1,4 +1,4 @@
-"""Error of the grid, from the same history on cells two and four times as long and from the contact edge.
+"""Error of the grid, one for each quantity, from the same on cells two and four times as long and the contact edge.
 
 Three grids show how fast a history settles (:func:`grid_uncertainty`). They may agree by
 chance, and do so where the contact is too small for any of them to see its shape. Therefore no error is stated that is
@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -20,28 +21,32 @@ from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser, pressure_distance
 from roughvisc.mechanics.contact.neighbours import bounds_with_grid, neighbours
 from roughvisc.topography.indenters import grown
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.grid_errors import GRID_ERROR
 
 Array = NDArray[np.float64]
 #: Powers of the cell's side with which the error of a quantity vanishes: no lower one is believed, and no higher one
-#: expected. Measured: of the pressure's L1 norm; the mean gap follows the displacements, the counted area the cells at
-#: its edge; of the contact area the scatter of the count is left. Friction shows the power 2 or more; with 1.5 what is
-#: stated is 1.1 times the true error or more on 24 rough surfaces, and 10 times that in the median. The area of a
-#: sliding contact settles more slowly than that of one at rest.
+#: expected. Measured: of the pressure's L1 norm; the mean gap follows the displacements, but in free space more slowly;
+#: the counted area the cells at its edge; of the contact area the scatter of the count is left. Friction shows the
+#: power 2 or more; with 1.5 what is stated is 1.1 times the true error or more on 24 rough surfaces, and 10 times that
+#: in the median.
 ORDERS = {
     "pressure": (1.0, 1.5),
+    "force": (1.0, 1.5),
     "approach": (1.0, 2.0),
     "contact_area": (1.5, 1.5),
     "contact_area_counted": (0.5, 1.0),
-    "mean_gap": (1.0, 2.0),
-    "friction": (1.0, 1.5),
-    "sliding_area": (1.0, 1.0),
+    "mean_gap": (1.0, 1.5),
+    "friction_force": (1.0, 1.5),
+    "friction_coefficient": (1.0, 1.5),
 }
+#: The area of a sliding contact settles more slowly than that of one at rest.
+_MOVING = {"contact_area": (1.0, 1.0)}
 #: Roache's safety factors: with three grids, and with two.
 _THREE, TWO_GRIDS = 1.25, 3.0
 
 
-def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -> Array:
+def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *, moving: bool = False) -> Array:
     """What the grid leaves unknown of a quantity, from the runs on three grids.
 
     Parameters
@@ -53,6 +58,8 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -
         may be missing.
     ratio : float
         How many times longer the cells are from one grid to the next.
+    moving : bool
+        Whether the surface slides.
 
     Notes
     -----
@@ -67,7 +74,7 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -
     .. [1] P. J. Roache, Annu. Rev. Fluid Mech. 29 (1997) 123.
     """
     near, far = np.asarray(near, dtype=float), np.asarray(far, dtype=float)
-    lowest, expected = ORDERS[name]
+    lowest, expected = _MOVING.get(name, ORDERS[name]) if moving else ORDERS[name]
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.log(far / near) / math.log(ratio)
     order = np.where(np.isnan(seen), expected, np.clip(seen, lowest, expected))
@@ -75,6 +82,29 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float) -
     # a missing near makes it missing, a missing far does not
     difference = np.maximum(near, np.where(np.isnan(far), 0.0, far) / ratio**expected)
     return np.asarray(factor * difference / (ratio**order - 1))
+
+
+def grid_uncertainties(
+    runs: Sequence[Mapping[str, ArrayLike]], ratio: float, *, moving: bool = False
+) -> dict[str, Array]:
+    """The same of several quantities, relative to the largest value of the first run.
+
+    Parameters
+    ----------
+    runs : sequence of mapping
+        Quantity -> values over the rows, on two or three grids, the finest first.
+    ratio, moving
+        As :func:`grid_uncertainty` has them.
+    """
+    found = {}
+    for name, first in runs[0].items():
+        unit = float(np.fmax.reduce(np.abs(np.atleast_1d(first)), initial=1e-300))
+        values = [np.asarray(run[name], dtype=float) for run in runs]
+        near, *more = (np.abs(other - one) / unit for one, other in pairwise(values))
+        found[name] = grid_uncertainty(
+            name, near, more[0] if more else np.full_like(near, math.nan), ratio, moving=moving
+        )
+    return found
 
 
 log = logging.getLogger("roughvisc")
@@ -93,7 +123,7 @@ _GIVEN = 1e-12
 def with_grid_error(
     dataset: xr.Dataset, height: xr.DataArray, press_again: Callable[[xr.DataArray, list[float]], xr.Dataset]
 ) -> xr.Dataset:
-    """A result with ``grid_error``, ``grid_error_area`` and bounds on the contact area in its rows.
+    """A result with the errors of its grid, one for each quantity, and bounds on the contact area in its rows.
 
     Parameters
     ----------
@@ -106,73 +136,59 @@ def with_grid_error(
 
     Notes
     -----
-    ``grid_error`` is the larger one of the errors of the pressure (L1, over the largest force, so that the error of
-    the force is in it) and of the approach (over the largest), ``grid_error_area`` that of the contact area. All
-    runs have an error in time within the tolerance, so that these are no estimates much below it. Missing where
-    there is no coarser solution; where there is one but no third grid, the safety factor is larger. The coarser grids
-    have all waves that they can hold: see :func:`~roughvisc.experiment.coarser.coarser`.
+    Errors are relative to the largest value, that of the pressure (L1) to the largest force; ``grid_error`` is the
+    larger one of pressure and approach. All runs have an error in time within the tolerance, so that these are no
+    estimates much below it. Missing where there is no coarser solution; where there is one but no third grid, the
+    safety factor is larger. The coarser grids have all waves that they can hold: see
+    :func:`~roughvisc.experiment.coarser.coarser`.
     """
     places = [float(one) for one in dataset[axis_of(dataset.variables)].values]
+    histories = [name for name in GRID_ERROR if name in dataset and name != "pressure"]
     try:
         few = coarser(height, 2.0, dataset.attrs["boundary"])
         if few.size == height.size:
             raise RoughviscError(f"{height.shape[0]} x {height.shape[1]} cells cannot be coarsened")
-        second = press_again(few, places)
+        runs = [dataset, press_again(few, places)]
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)
-        nothing = np.full(len(places), math.nan)
-        return _with_errors(dataset, nothing, nothing)
-    third = None
+        return _with_errors(dataset, {name: np.full(len(places), math.nan) for name in ("pressure", *histories)})
     try:
         fewest = coarser(height, 4.0, dataset.attrs["boundary"])
-        third = press_again(fewest, places) if fewest.size < few.size else None
+        if fewest.size < few.size:
+            runs.append(press_again(fewest, places))
     except RoughviscError as error:
         log.info("grid error from two grids: the third solve failed: %s", error)
-    ratio = math.sqrt(height.size / few.size)
-    runs = (dataset, second, third)
-    edge = [_left_open(dataset, number) for number in range(len(places))]
-    from_edge, from_counting = (np.array(column) for column in zip(*edge, strict=True))
-    near_approach, far_approach = _differences(runs, _histories("approach"))
-    found = {
-        "pressure": grid_uncertainty("pressure", *_differences(runs, _pressures), ratio),
-        "approach": grid_uncertainty("approach", near_approach, far_approach, ratio),
-        "area": grid_uncertainty("contact_area", *_differences(runs, _histories("contact_area")), ratio),
-    }
-    from_peak, from_force, from_area = _from_peak(dataset, _peak(height), near_approach < _GIVEN)
-    error = np.max([found["pressure"], found["approach"], from_edge, from_peak, from_force], axis=0)
-    area = np.max([found["area"], from_counting, from_area], axis=0)
-    return _with_errors(dataset, error, area)
+    ratio, moving = math.sqrt(height.size / few.size), "friction_force" in dataset
+    found = grid_uncertainties([{name: run[name].values for name in histories} for run in runs], ratio, moving=moving)
+    apart = [pressure_distance(coarse, fine) / _largest(dataset, "force") for fine, coarse in pairwise(runs)]
+    found["pressure"] = grid_uncertainty("pressure", apart[0], apart[1] if len(apart) > 1 else math.nan, ratio)
+    left_open = [_left_open(dataset, number) for number in range(len(places))]
+    from_edge, from_counting, from_outline = (np.array(column) for column in zip(*left_open, strict=True))
+    off = np.abs(runs[1]["approach"].values - dataset["approach"].values)
+    given = off < _GIVEN * _largest(dataset, "approach")
+    peak = _from_peak(dataset, _peak(height), given)
+    outline = {"force": np.where(given, from_outline, 0.0), "approach": np.where(given, 0.0, from_outline)}
+    edge = {"pressure": np.maximum(from_edge, peak["force"]), "contact_area": from_counting}
+    for name, error in (*peak.items(), *outline.items(), *edge.items()):
+        if name in found:  # a result over an axis of its own may do without
+            found[name] = np.maximum(found[name], error)
+    return _with_errors(dataset, found)
 
 
-def _with_errors(dataset: xr.Dataset, error: Array, area: Array) -> xr.Dataset:
+def _with_errors(dataset: xr.Dataset, found: Mapping[str, Array]) -> xr.Dataset:
     """A result with errors of the grid, and bounds on the contact area that hold them."""
+    axis = axis_of(dataset.variables)
     bounds = (f"contact_area_solver_{end}" for end in ("lower", "upper"))
     solver = (dataset[name if name in dataset else "contact_area"].values for name in bounds)
-    lower, upper = bounds_with_grid(*solver, area * _largest(dataset, "contact_area"))
-    found = {"grid_error": error, "grid_error_area": area, "contact_area_lower": lower, "contact_area_upper": upper}
-    return dataset.assign({name: (axis_of(dataset.variables), values) for name, values in found.items()})
-
-
-Runs = tuple[xr.Dataset, xr.Dataset, xr.Dataset | None]
-
-
-def _differences(runs: Runs, between: Callable[[xr.Dataset, xr.Dataset, xr.Dataset], Array]) -> tuple[Array, Array]:
-    """Between the first two runs and the last two, the latter missing without a third; in units of the first."""
-    first, second, third = runs
-    near = between(second, first, first)
-    return near, np.full_like(near, math.nan) if third is None else between(third, second, first)
-
-
-def _pressures(found: xr.Dataset, wanted: xr.Dataset, unit: xr.Dataset) -> Array:
-    return pressure_distance(found, wanted) / _largest(unit, "force")
-
-
-def _histories(name: str) -> Callable[[xr.Dataset, xr.Dataset, xr.Dataset], Array]:
-    return lambda found, wanted, unit: np.abs(found[name].values - wanted[name].values) / _largest(unit, name)
+    lower, upper = bounds_with_grid(*solver, found["contact_area"] * _largest(dataset, "contact_area"))
+    columns = {GRID_ERROR[name]: error for name, error in found.items() if GRID_ERROR[name] in AXES[axis].variables}
+    columns |= {"contact_area_lower": lower, "contact_area_upper": upper}
+    columns["grid_error"] = np.maximum(found["pressure"], found["approach"])
+    return dataset.assign({name: (axis, values) for name, values in columns.items()})
 
 
 def _largest(dataset: xr.Dataset, name: str) -> float:
-    return max(float(np.max(np.abs(dataset[name].values))), 1e-300)
+    return float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300))
 
 
 def _peak(height: xr.DataArray) -> float:
@@ -189,26 +205,31 @@ def _peak(height: xr.DataArray) -> float:
     return float(sum(values[at] - low for low in lowest)) / 2
 
 
-def _from_peak(dataset: xr.Dataset, peak: float, given: Mask) -> tuple[Array, Array, Array]:
-    """Errors of approach, force and area if the peak is so much higher [m], relative to the largest.
+def _from_peak(dataset: xr.Dataset, peak: float, given: Mask) -> dict[str, Array]:
+    """Errors by quantity if the peak is so much higher [m], relative to the largest.
 
-    Where the approach is given, force and area follow from it; under a cone both with its square, under a ball with
-    lower powers.
+    Where the approach is given, the gap is wider by as much, and force and area follow from it; under a cone both with
+    its square, under a ball with lower powers.
     """
     approach = np.abs(dataset["approach"].values)
     part = np.where(given & (approach > 0), 2 * peak / np.maximum(approach, peak or 1.0), 0.0)
-    follow = [part * dataset[name].values / _largest(dataset, name) for name in ("force", "contact_area")]
-    return np.where(given, 0.0, peak / _largest(dataset, "approach")), follow[0], follow[1]
+    found = {name: part * dataset[name].values / _largest(dataset, name) for name in ("force", "contact_area")}
+    found["approach"] = np.where(given, 0.0, peak / _largest(dataset, "approach"))
+    found["mean_gap"] = np.where(given, peak / _largest(dataset, "mean_gap"), 0.0) if "mean_gap" in dataset else part
+    return found
 
 
-def _left_open(dataset: xr.Dataset, row: int) -> tuple[float, float]:
-    """Errors of pressure and contact area, relative to the largest, that the edge of a contact may hide."""
+def _left_open(dataset: xr.Dataset, row: int) -> tuple[float, float, float]:
+    """Errors of pressure and contact area, relative to the largest, that the edge of a contact may hide.
+
+    And of approach or force, by the cells of the outline where the material ends: a wider punch sinks in less.
+    """
     pressure = dataset["pressure"].values[row]
     contact = pressure > 0
     if not contact.any():
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     present = np.isfinite(dataset["height"].values)
-    at_edge, at_end, faces = _edge(contact, present & ~contact, dataset.attrs["boundary"] == "periodic")
+    at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"] == "periodic")
     counted = counting_error(contact, faces)
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
@@ -216,21 +237,22 @@ def _left_open(dataset: xr.Dataset, row: int) -> tuple[float, float]:
     hidden += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
     force = float(dataset["force"][row]) / _largest(dataset, "force")
     area = float(dataset["contact_area_counted"][row]) / _largest(dataset, "contact_area")
-    return hidden * force, counted * area
+    return hidden * force, counted * area, counting_error(contact, ends)
 
 
 def counting_error(contact: Mask, faces: int) -> float:
-    """Relative error of an area that is counted, from the number of faces to cells out of contact."""
+    """Relative error of an area that is counted, from the number of faces at its edge."""
     images = math.prod(2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis)))
     return _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
 
 
-def _edge(contact: Mask, free: Mask, periodic: bool) -> tuple[Mask, Mask, int]:
-    """Cells in contact beside present cells out of contact, and beside none at all; faces to the former."""
-    at_edge, at_end, faces = np.zeros_like(contact), np.zeros_like(contact), 0
+def _edge(contact: Mask, free: Mask, periodic: bool) -> tuple[Mask, Mask, int, int]:
+    """Cells in contact beside present cells out of contact, and beside none at all; faces to either."""
+    at_edge, at_end, faces, ends = np.zeros_like(contact), np.zeros_like(contact), 0, 0
     for beside, material in zip(neighbours(free, periodic), neighbours(free | contact, periodic), strict=True):
         here = contact & beside
         faces += int(np.count_nonzero(here))
         at_edge |= here
         at_end |= contact & ~material
-    return at_edge, at_end, faces
+        ends += int(np.count_nonzero(contact & ~material))
+    return at_edge, at_end, faces, ends

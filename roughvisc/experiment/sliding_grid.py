@@ -5,20 +5,20 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.grid_error import counting_error, grid_uncertainty
+from roughvisc.experiment.grid_error import counting_error, grid_uncertainties
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.topography.spectrum import without_last_octave
+from roughvisc.variables.grid_errors import GRID_ERROR
 
 Array = NDArray[np.float64]
 # A profile that changes across the motion by less than this part of its range does not change there.
@@ -149,7 +149,8 @@ log = logging.getLogger("roughvisc")
 #: the stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the
 #: powers of an area at rest it was less than 0.8 in 15 of these 216.
 _COUNTING_CAUTION = 1.5
-_NOTHING = {"grid_error_friction": math.nan, "grid_error_area": math.nan}
+#: What is compared of one grid and another.
+_QUANTITIES = ("friction_force", "contact_area", "approach", "mean_gap")
 
 
 class CoarserFaces:
@@ -162,7 +163,7 @@ class CoarserFaces:
     """
 
     def __init__(self, face: SlidingGrid) -> None:
-        self._spacing = face.spacing
+        self._face = face
         self.faces = [coarse for coarse in (face.coarser(2.0), face.coarser(4.0)) if coarse is not None]
         if not self.faces:
             log.warning("no grid error: %d x %d cells cannot be coarsened", *face.gap.shape)
@@ -172,7 +173,7 @@ class CoarserFaces:
             del self.faces[1:]
 
     def errors(self, found: SteadyState, speed: float, law: Body, force: float, tolerance: float) -> dict[str, float]:
-        """Relative errors of friction and contact area at a speed, missing where no coarser copy has a solution.
+        """Relative errors of friction, area, approach and gap at a speed, missing where no coarser copy has a solution.
 
         Parameters
         ----------
@@ -187,25 +188,23 @@ class CoarserFaces:
         tolerance : float
             Of the coarser solutions too.
         """
-        runs = [_friction_and_area(found, self._spacing)]
+        runs = [_numbers(found, self._face)]
         for face in self.faces:
-            runs.append(_friction_and_area(face.slide(face.sliding(speed, law), force, tolerance), face.spacing))
-        if len(self.faces) == 0 or not runs[0][0] > 0:
-            return dict(_NOTHING)
-        runs += [(math.nan, math.nan)] * (3 - len(runs))
-        near, far = (
-            [abs(b - a) / first for a, b, first in zip(one, other, runs[0], strict=True)]
-            for one, other in pairwise(runs)
-        )
-        friction = float(grid_uncertainty("friction", near[0], far[0], self._ratio))
-        area = float(grid_uncertainty("sliding_area", near[1], far[1], self._ratio))
+            runs.append(_numbers(face.slide(face.sliding(speed, law), force, tolerance), face))
+        if len(self.faces) == 0 or not runs[0]["friction_force"] > 0:
+            return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
+        errors = {name: float(one) for name, one in grid_uncertainties(runs, self._ratio, moving=True).items()}
         contact = found.pressure > 0
         counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
-        return {"grid_error_friction": friction, "grid_error_area": float(np.maximum(area, counting))}  # NaN stays
+        errors["contact_area"] = float(np.maximum(errors["contact_area"], counting))  # NaN stays
+        return {GRID_ERROR[name]: error for name, error in errors.items()}
 
 
-def _friction_and_area(state: SteadyState, spacing: tuple[float, float]) -> tuple[float, float]:
-    """Friction force [N] and contact area [m2] of a steady state; missing where it did not converge."""
+def _numbers(state: SteadyState, face: SlidingGrid) -> dict[str, float]:
+    """Friction force [N], contact area [m2], approach and mean gap [m] of a steady state; missing if not converged."""
     if not state.converged:
-        return math.nan, math.nan
-    return state.power_force, areas(state.pressure > 0, spacing)[1]
+        return dict.fromkeys(_QUANTITIES, math.nan)
+    contact = state.pressure > 0
+    gap = np.where(contact, 0.0, np.maximum(face.gap + state.displacement - state.approach, 0.0))
+    numbers = (state.power_force, areas(contact, face.spacing)[1], state.approach, float(gap.mean()))
+    return dict(zip(_QUANTITIES, numbers, strict=True))

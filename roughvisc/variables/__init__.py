@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from roughvisc.variables.entry import Variable as Variable
+from roughvisc.variables.grid_errors import grid_errors
 from roughvisc.variables.slides import SLIDES
 from roughvisc.variables.spots import SPOTS
 from roughvisc.variables.transport import TRANSPORT
@@ -84,7 +85,7 @@ VARIABLES: dict[str, Variable] = {
         "Pa",
         "contact pressure",
         "zero outside the contact and where the profile is absent",
-        ancillary=("pressure_error",),
+        ancillary=("pressure_error", "grid_error_pressure"),
         short="pressure",
         cell_methods="x: y: mean",
     ),
@@ -110,7 +111,7 @@ VARIABLES: dict[str, Variable] = {
         "N",
         "normal force",
         "prescribed under load control, found under approach control",
-        ancillary=("force_error",),
+        ancillary=("force_error", "grid_error_force"),
         short="force",
         every_step=True,
         in_table="last",
@@ -125,7 +126,7 @@ VARIABLES: dict[str, Variable] = {
         "absent; while the contact is open: the value at which it would just close; first touch is at the highest "
         "cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while mean_gap "
         "(periodic) and mean_plane_separation (free space) do",
-        ancillary=("approach_error",),
+        ancillary=("approach_error", "grid_error_approach"),
         short="approach",
         every_step=True,
         in_table="last",
@@ -212,7 +213,7 @@ VARIABLES: dict[str, Variable] = {
         "mean gap",
         "over the present cells; "
         "with periodic boundaries and no cells absent: the separation of the mean planes of both surfaces",
-        ancillary=("approach_error",),
+        ancillary=("approach_error", "grid_error_gap"),
         every_step=True,
         may_be_missing=True,
         in_table="last",
@@ -348,23 +349,12 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "1",
         "error due to the grid",
-        "bound in practice on the relative error of pressure (L1) and approach: "
-        "from the same history on cells twice and four times as long (grid convergence index), and from the force on "
-        "cells at the contact's edge; the pressure over the largest force; of a scan it holds what roughness its "
-        "coarser copies have lost",
+        "the larger one of grid_error_pressure and grid_error_approach, as stated_error is of the errors on this grid",
         group="accuracy",
         may_be_missing=True,
-        in_table="largest",
+        short="grid error",
     ),
-    "grid_error_area": Variable(
-        _SERIES,
-        "1",
-        "error of the contact area due to the grid",
-        "bound in practice, over the largest contact area: "
-        "as grid_error, and from the number of faces at the contact's edge",
-        group="accuracy",
-        may_be_missing=True,
-    ),
+    **grid_errors("time", "the largest value of all rows", in_table="largest"),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8", every_step=True, meanings=STATUS_MEANINGS),
     "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run", group="cost"),
     # derived from a result: see roughvisc.observables

@@ -22,7 +22,7 @@ SLIDES: dict[str, Variable] = {
         "against the motion; "
         "of pressure on inclined faces alone, by the slope of the body's surface; in a hold against the last slide, "
         "before the first one against that",
-        ancillary=("friction_force_error",),
+        ancillary=("friction_force_error", "grid_error_friction"),
         every_step=True,
         in_table="last",
     ),

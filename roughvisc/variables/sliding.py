@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roughvisc.variables import Variable, over_axis
+from roughvisc.variables.grid_errors import grid_errors
 
 #: What steady sliding has in common with a history over time.
 _SHARED = (
@@ -100,24 +101,11 @@ SLIDING: dict[str, Variable] = {
     "persson_contact_fraction": Variable(
         ("speed",), "1", "contact fraction, Persson", "contact area over nominal area, by Persson's theory"
     ),
-    "grid_error_friction": Variable(
-        ("speed",),
-        "1",
-        "error of the friction due to the grid",
-        "bound in practice, relative: "
-        "from the same speed on cells twice and four times as long (grid convergence index); of a scan it holds what "
-        "roughness its coarser copies have lost",
-        group="accuracy",
-        may_be_missing=True,
+    **grid_errors(
+        "speed",
+        "the value at the speed",
+        ("grid_error_friction", "grid_error_area", "grid_error_approach", "grid_error_gap"),
         in_table="last",
-    ),
-    "grid_error_area": Variable(
-        ("speed",),
-        "1",
-        "error of the contact area due to the grid",
-        "bound in practice, relative: as grid_error_friction, and from the number of faces at the contact's edge",
-        group="accuracy",
-        may_be_missing=True,
     ),
     "last_octave_friction": Variable(
         ("speed",),

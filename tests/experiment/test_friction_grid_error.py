@@ -18,13 +18,14 @@ NOISE = 5e-4
 
 
 def judged(scan, fine, pressure):
-    """Stated and true errors of friction, and of area."""
+    """Stated and true errors of friction, of area, and of the mean gap."""
     asked = {"pressure": pressure, "speeds": SPEEDS, "tolerance": 1e-4, "progress": False}
     found, exact = friction_whole(scan, RUBBER, **asked, grid_error=True), friction_whole(fine, RUBBER, **asked)
     true = abs(found / exact - 1)
     return (
         (found.grid_error_friction.values, true.friction_coefficient.values),
         (found.grid_error_area.values, true.contact_area.values),
+        (found.grid_error_gap.values, true.mean_gap.values),
     )
 
 

@@ -27,6 +27,33 @@ def test_grid_error__bounds_the_true_one_and_is_of_its_size(shape):
     assert true_area < float(ds.grid_error_area.max()) < 10 * true_area
 
 
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_grid_error__is_one_for_each_quantity(control):
+    """Under a ball; that of the approach is much smaller than that of the pressure, and of what is given it is zero."""
+    exact = closed_forms.hertz(RADIUS, 4e6, LOAD)
+    program = getattr(rv.Program(), control)(LOAD if control == "load" else exact.approach, over=0)
+    ds = simulate_whole(rv.sphere(RADIUS, SIZE, (47, 60)), rv.elastic(1e6), program, grid_error=True, progress=False)
+    found, given = ("approach", "force") if control == "load" else ("force", "approach")
+    off = abs(float(ds[found][0]) / {"approach": exact.approach, "force": LOAD}[found] - 1)
+    assert off < float(ds[f"grid_error_{found}"][0]) < 0.2 * float(ds.grid_error_pressure[0])
+    assert float(ds[f"grid_error_{given}"][0]) == 0
+    assert float(ds.grid_error[0]) == max(float(ds.grid_error_pressure[0]), float(ds.grid_error_approach[0]))
+
+
+def test_grid_error__of_the_gap_of_a_rough_surface_is_small():
+    """Against cells a third as long, with the same waves: far below that of the approach, which hangs on the peak."""
+    made = {"hurst": 0.8, "rms_slope": 0.1, "shortcut": 2e-4, "rolloff": 5e-4, "seed": 4}
+    few, many = (rv.self_affine(1e-3, n, **made) for n in ((33, 30), (99, 90)))
+    settings = {"boundary": "periodic", "tolerance": 1e-4, "progress": False}
+    program = rv.Program().pressure(2e4, over=0)
+    ds = simulate_whole(few, rv.elastic(1e6), program, grid_error=True, **settings)
+    exact = simulate_whole(many, rv.elastic(1e6), program, **settings)
+    for name, most in (("approach", 1.0), ("mean_gap", 0.05)):
+        stated = float(ds["grid_error_approach" if name == "approach" else "grid_error_gap"][0])
+        assert abs(float(exact[name][0] / ds[name][0]) - 1) < stated < most
+    assert 5 * float(ds.grid_error_gap[0]) < float(ds.grid_error_approach[0])
+
+
 def test_grid_error__falls_with_the_grid():
     coarse, fine = (float(pressed(n, fields=("pressure",)).grid_error.max()) for n in (32, 96))
     assert coarse / fine > 3  # first order at least
@@ -95,15 +122,15 @@ def test_edge__of_a_contact_beside_absent_cells_by_hand():
     share, alone = 19 / 21, 2 / 21
     faces = 2 + 1 + 1 + 1 + 2
     hidden = 0.45 * share / (1 - 0.55 * share) + 0.9 * alone
-    counted = 0.5 * np.sqrt(faces) / 6
+    counted, outline = 0.5 * np.sqrt(faces) / 6, 0.5 * np.sqrt(3) / 6
     for time, (force, area) in enumerate([(1 / 2, 6 / 5), (1.0, 5.5 / 5)]):
-        assert grid_error._left_open(ds, time) == pytest.approx((hidden * force, counted * area), rel=1e-12)
+        assert grid_error._left_open(ds, time) == pytest.approx((hidden * force, counted * area, outline), rel=1e-12)
 
 
 @pytest.mark.parametrize("given", [True, False], ids=["approach", "load"])
 def test_peak_between_the_cells__errs_in_the_approach_or_in_force_and_area(given, monkeypatch):
     """Where nothing else is left open: the grids agree, and the edge hides nothing."""
-    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0))
+    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0, 0.0))
     ds, height = pressed_by_hand(), rv.from_array(-np.hypot(np.arange(6)[:, None] - 2, np.arange(5) - 1.0), 1.0)
     other = ds if given else pressed_by_hand((1.0 + 1e-9, 2.0 - 1e-9))
     found = grid_error.with_grid_error(ds, height, lambda *_: other)
@@ -144,8 +171,8 @@ def test_grid_error__counts_faces_as_the_corrected_area_does():
     for periodic in (False, True):
         present = rng.random((7, 6)) < 0.8
         contact = present & (rng.random((7, 6)) < 0.6)
-        at_edge, at_end, faces = grid_error._edge(contact, present & ~contact, periodic)
-        counted = 0
+        at_edge, at_end, faces, ends = grid_error._edge(contact, present & ~contact, periodic)
+        counted = absent = 0
         for i, j in np.argwhere(contact):
             near = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
             if periodic:
@@ -153,9 +180,10 @@ def test_grid_error__counts_faces_as_the_corrected_area_does():
             there = [0 <= k < 7 and 0 <= m < 6 and present[k, m] for k, m in near]
             open_ = [here and not contact[cell] for here, cell in zip(there, near, strict=True)]
             counted += sum(open_)
+            absent += 4 - sum(there)
             assert at_edge[i, j] == any(open_)
             assert at_end[i, j] == (not all(there))
-        assert faces == counted
+        assert (faces, ends) == (counted, absent)
         assert not (at_edge | at_end)[~contact].any()
 
 

@@ -17,8 +17,6 @@ from roughvisc.study.trade.ladder import Setting
 from roughvisc.study.trade.reference import relative
 from roughvisc.variables.axes import AXES, axis_of
 
-#: How the errors of a grid vanish where something slides, as :mod:`~roughvisc.experiment.grid_convergence` knows them.
-_MOVING = {"friction_coefficient": "friction", "contact_area": "sliding_area"}
 #: The reference's tolerance is the sharpest measured one over this.
 _SHARPER = 5.0
 #: How many times longer the cells are on which it is run again.
@@ -127,9 +125,9 @@ class ReferenceRun:
             self._coarser[_THIRD * setting.coarsening] = self.errors(third)
         fine = self.run.dataset
         ratio = math.sqrt(fine.sizes["x"] * fine.sizes["y"] / (second.sizes["x"] * second.sizes["y"]))
-        orders = _MOVING if "friction_coefficient" in fine else {}
+        moving = "friction_coefficient" in fine
         return in_time, {
-            name: float(grid_uncertainty(orders.get(name, name), near[name], far[name], ratio))
+            name: float(grid_uncertainty(name, near[name], far[name], ratio, moving=moving))
             for name in bench.quantities
         }
 

@@ -11,6 +11,7 @@ from rich.console import Group
 
 from roughvisc.observables.leakage import closing_times
 from roughvisc.variables.axes import AXES, Axis, axis_of
+from roughvisc.variables.grid_errors import GRID_ERROR
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.console.tables import NOTES, accuracy_rows, number, readable, two_columns
 
@@ -25,13 +26,8 @@ _BESIDE = {
     "contact_area_upper",
     "contact_area_solver_lower",
     "contact_area_solver_upper",
-    "grid_error_friction",
+    *GRID_ERROR.values(),
     "last_octave_friction",
-}
-_GRID_ERRORS = {
-    "grid_error": "grid error",
-    "grid_error_area": "grid error of area",
-    "grid_error_friction": "grid error of friction",
 }
 _COSTS = {
     "convolutions": "convolutions",
@@ -53,9 +49,9 @@ def result_table(dataset: xr.Dataset) -> Group:
         *_across(row, where),
         *accuracy_rows([dataset], dataset.attrs.get("tolerance")),
         *(
-            (f"Accuracy: worst {label}", number(dataset[name]))
-            for name, label in _GRID_ERRORS.items()
-            if name in dataset
+            (f"Accuracy: worst {axis.variables[name].short}", number(dataset[name]))
+            for name in (*GRID_ERROR.values(), *(["grid_error"] if "grid_error_pressure" not in dataset else []))
+            if name in dataset and (dataset[name] != 0).any()
         ),
         *([("Shortest octave of waves", _octave(dataset))] if "last_octave_friction" in dataset else []),
         *((label, dataset.attrs[note]) for note, label in NOTES.items() if note in dataset.attrs),

@@ -15,9 +15,11 @@ from roughvisc.groups import whole_of
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
+    GREEN,
     ORANGE,
     PURPLE,
     SKY,
+    VERMILION,
     RowAxis,
     legend_over,
     letter_panels,
@@ -34,8 +36,13 @@ _ERRORS = (
     ("stated_error", "stated", "k", 1.6),
     ("time_error", "time steps", ORANGE, 1.0),
     ("residual", "contact solver (estimate)", PURPLE, 1.0),
-    ("grid_error", "grid", SKY, 1.0),
+    ("grid_error_pressure", "grid, pressure", SKY, 1.0),
+    ("grid_error_area", "grid, area", GREEN, 1.0),
+    ("grid_error_approach", "grid, approach", BLUE, 1.0),
+    ("grid_error_gap", "grid, gap", VERMILION, 1.0),
 )
+#: Of results of earlier versions, which state one for pressure and approach.
+_FORMER = ("grid_error", "grid", SKY, 1.0)
 _COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
@@ -71,7 +78,7 @@ def diagnostics(dataset: xr.Dataset) -> Figure:
     drawn = [
         (_draw_cost, any(name in dataset for name, _, _ in _COSTS)),
         (_draw_steps, steps.size > 1 and f"step_{over}" in dataset),
-        (_draw_accuracy, any(name in dataset for name, _, _, _ in _ERRORS)),
+        (_draw_accuracy, any(name in dataset for name, _, _, _ in (*_ERRORS, _FORMER))),
     ]
     chosen = [draw for draw, known in drawn if known]
     if not chosen:
@@ -120,7 +127,7 @@ def _draw_steps(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArra
 def _draw_accuracy(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArray) -> None:
     """What the rows state of themselves."""
     floor, ceiling = math.inf, 0.0
-    for name, label, colour, width in _ERRORS:
+    for name, label, colour, width in (*_ERRORS, *([] if "grid_error_pressure" in dataset else [_FORMER])):
         if name not in dataset:
             continue
         rows, values = axis.unit(rows_of(dataset)), dataset[name].values.astype(float)
