@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.study.budget.quantities import Observable, known_quantity
 from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
+from roughvisc.study.budget.stated import stated_by
 from roughvisc.study.budget.variants import Variants, check_share, with_rows
 from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import result_folder
@@ -142,7 +143,7 @@ def budgets(
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
     """Name of each of some quantities -> its :func:`budget`, all from the same solves."""
-    case, folder = case_of(case, out)
+    kept, (case, folder) = _kept(case), case_of(case, out)
     if not names:
         raise InputError("quantity is empty: expected at least one")
     experiment = case.experiment()
@@ -162,8 +163,11 @@ def budgets(
         check_share("time_scale_error", time_scale_error),
         shortest,
         population,
+        stated_by(kept or result_path(result_folder(case), case.key), quantities, axis.name, places),
     )
     solves = asked.solves()
+    if asked.stated.result is not None:
+        del solves["own"]
     outcomes = run_cases(list(solves.values()), folder, watch=watcher(progress), client=client, workers=workers)
     for name, one in solves.items():
         outcome = outcomes[one.key]
@@ -172,6 +176,8 @@ def budgets(
         if outcome.kind != "done":
             log.warning("budget: the solve %r: %s: %s", name, outcome.kind, outcome.message)
     results = {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
+    if asked.stated.result is not None:
+        results["own"] = asked.stated.result
     try:
         rows = _rows_at(results["own"], experiment.axis, places)
         aligned = {name: _rows_at(one, experiment.axis, rows) for name, one in results.items()}
@@ -192,6 +198,12 @@ def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tup
         stated = case if isinstance(case, Case) else read_study(case)
         beside = result_folder(stated)
     return stated, Path(out).expanduser() if out is not None else beside / FOLDER
+
+
+def _kept(case: Case | str | Path | xr.Dataset) -> Path | None:
+    """The file of a result that is given."""
+    source = case.encoding.get("source") if isinstance(case, xr.Dataset) else None
+    return Path(source) if source else None
 
 
 def _rows_at(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:

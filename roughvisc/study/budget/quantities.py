@@ -15,10 +15,13 @@ from roughvisc.observables.conductance import conductance
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.variables.axes import AXES
+from roughvisc.variables.grid_errors import GRID_ERROR
 
 Array = NDArray[np.float64]
 #: Keyword arguments of the observables, as ``[observe]`` of a study states them.
 Observe = Mapping[str, Mapping[str, Any]]
+#: Quantity -> that whose error of the grid is its own: the load does not depend on the grid.
+_ERROR_OF = {"friction_coefficient": "friction_force"}
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class Observable:
         What the next octave of waves changes at most, over what the last one did.
     of_longest_waves : bool
         Whether the longest waves of the height rule it.
+    octave : str
+        Variable that states what the shortest octave of waves adds to it; empty where there is none.
     stated : callable, optional
         Error that the rows of a result state of it, in its unit. Default: the stated error of the row over the largest
         value, which holds for any quantity that follows pressure or approach in proportion.
@@ -52,6 +57,7 @@ class Observable:
     grid_factor: float = 1.5
     octave_factor: float = 1.1
     of_longest_waves: bool = False
+    octave: str = ""
     stated: Callable[[xr.Dataset, Array], Any] | None = None
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
@@ -61,6 +67,26 @@ class Observable:
             error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log1p(np.asarray(error, dtype=float) / np.abs(values))
+
+    def stated_grid(self, result: xr.Dataset, axis: str) -> Array | None:
+        """What the grid leaves of its logarithm, as all rows of a result state it; None if they do not. [-]"""
+        variable = GRID_ERROR.get(_ERROR_OF.get(self.name, self.name), "")
+        if variable not in result:
+            return None
+        error, values = result[variable].values, np.abs(result[self.name].values)
+        if axis != "speed":  # relative to the largest of a history, at a speed to the value there
+            error = error * np.fmax.reduce(values, initial=0.0)
+        else:
+            error = error * values
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.log1p(error / values), dtype=float)
+
+    def stated_octave(self, result: xr.Dataset) -> Array | None:
+        """Logarithm of its value over that without the shortest octave, as all rows state it; None if they do not."""
+        if self.octave not in result:
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(-np.log1p(-result[self.octave].values), dtype=float)
 
     def of(self, result: xr.Dataset, observe: Observe) -> Array:
         """Its values in a whole result, over the axis."""
@@ -118,11 +144,25 @@ def _of_gap(result: xr.Dataset, values: Array) -> Any:
 QUANTITIES = {
     one.name: one
     for one in (
-        Observable("contact_area", "m^2", _stored("contact_area"), octave_factor=1.6, stated=_of_area),
+        Observable(
+            "contact_area",
+            "m^2",
+            _stored("contact_area"),
+            octave_factor=1.6,
+            octave="last_octave_area",
+            stated=_of_area,
+        ),
         Observable("mean_gap", "m", _stored("mean_gap"), grid_factor=1.0, of_longest_waves=True, stated=_of_approach),
         Observable("approach", "m", _stored("approach"), of_longest_waves=True, stated=_of_approach),
         Observable("force", "N", _stored("force"), stated=_of_force),
-        Observable("friction_coefficient", "1", _stored("friction_coefficient"), grid_factor=1.0, octave_factor=1.8),
+        Observable(
+            "friction_coefficient",
+            "1",
+            _stored("friction_coefficient"),
+            grid_factor=1.0,
+            octave_factor=1.8,
+            octave="last_octave_friction",
+        ),
         Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), of_longest_waves=True, stated=_of_gap),
         Observable("thermal_conductance", "W/K", _thermal, ("pressure",), 2.5, 2.5, stated=_of_area),
         Observable("incremental_stiffness", "N/m", _stiffness, ("pressure",), 2.5, 2.5, stated=_of_area),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.study.budget.quantities import Observable
+from roughvisc.study.budget.stated import Stated
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
 from roughvisc.study.statement.case import Case
 from roughvisc.units import unit_for
@@ -50,6 +51,8 @@ class Asked:
         Wavelength of the shortest waves that the real surface has. [m]
     population : {"patch", "ensemble"}
         Whether the number is of this patch, or of the roughness that it is a sample of.
+    stated : Stated
+        What a result of the case states already.
     """
 
     variants: Variants
@@ -58,19 +61,24 @@ class Asked:
     time_scale_error: float | None = None
     cutoff: float | None = None
     population: Population = "patch"
+    stated: Stated = field(default_factory=Stated)
 
     def solves(self) -> dict[str, Case]:
         """Name -> case of every solve that the sources need; ``own`` is the case itself."""
         variants, found = self.variants, {"own": self.variants.case, "coarse": self.variants.on_cells(2.0)}
+        compared = found[self.compared]
         if self.sharp:
             found["fine"] = variants.on_cells(0.5)
+        elif self.stated.grid:
+            if not (variants.is_rough and (self.modulus_error or self.time_scale_error)):
+                del found["coarse"]
         elif not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
             found["coarsest"] = variants.on_cells(4.0)
         if self.modulus_error:
-            found["stiffer"] = stiffer(found[self.compared])
+            found["stiffer"] = stiffer(compared)
         if self.time_scale_error:
-            found["slower"] = slower(found[self.compared])
-        if self.octaves > 0:
+            found["slower"] = slower(compared)
+        if self.octaves > 0 and (self.sharp or not self.stated.octave):
             found["smooth"] = variants.without_last_octave(found["fine" if self.sharp else "own"])
         if self.population == "ensemble" and variants.is_rough:
             found |= {f"patch {number}": variants.other_patch(number) for number in range(1, PATCHES + 1)}
@@ -146,6 +154,8 @@ def _time_and_solver(asked: Asked, quantity: Observable, values: Values, stated:
 
 
 def _grid(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    if asked.stated.grid and not asked.sharp:
+        return Found(asked.stated.grid[quantity.name], "cells twice and four times as long, as the result states")
     coarse = np.abs(_apart(values, "own", "coarse"))
     if not asked.sharp:
         solves, words = ("coarse",), "cells twice as long"
@@ -173,19 +183,24 @@ def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -
     return Found(_SAMPLE * scatter, words, solves=names)
 
 
-def _next_octave(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array) -> Found:
     if not asked.variants.is_rough:
         return Found(_nothing(values), "the surface is no sample of a roughness", counts=False)
     if asked.cutoff is None:
         return Found(None, "state cutoff, the shortest wavelength that the real surface has")
     if not asked.octaves:
         return Found(_nothing(values), f"the grid holds all waves down to {_length(asked.cutoff)}")
-    change = _apart(values, "fine" if asked.sharp else "own", "smooth")
+    stated = asked.stated.octave and not asked.sharp
+    change = (
+        asked.stated.octave[quantity.name] if stated else _apart(values, "fine" if asked.sharp else "own", "smooth")
+    )
     factor = quantity.octave_factor
     if asked.variants.case.experiment().largest_speed > 0 and quantity.name == "contact_area":
         factor = _SLIDING_OCTAVE
-    words = f"without the shortest octave; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
-    return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), ("smooth",))
+    words = "what the shortest octave adds, as the result states" if stated else "without the shortest octave"
+    words += f"; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
+    solves = () if stated else ("smooth",)
+    return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), solves)
 
 
 def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:

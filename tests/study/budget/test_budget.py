@@ -57,6 +57,9 @@ times = [0.01, 1.0]
 """
 
 
+QUIET = {"workers": 0, "progress": False}
+
+
 def case(text, tmp_path, **changes):
     path = tmp_path / "study.toml"
     path.write_text(text)
@@ -257,6 +260,42 @@ def test_budget__of_a_result_and_at_a_time(tmp_path):
     assert found["time"].values.tolist() == [1.0]
     assert (tmp_path / "results" / "budget").is_dir()
     assert float(found["value"][0]) == pytest.approx(float(result["contact_area"][-1]), rel=1e-6)
+
+
+def test_budget__reads_what_a_result_states_of_its_grid(tmp_path):
+    """No other grid is solved, and of a history the error is that of the largest value."""
+    study = case(BALL, tmp_path, **{"solve.grid_error": True, "program.0.over": "1 s", "keep.times": [0.5, 1.0, 2.0]})
+    result = rv.run(study, out=tmp_path / "results", progress=False)
+    found = budgets(result, ["contact_area", "approach"], at=[0.5, 2.0], workers=0, progress=False)
+    accuracy = result.roughvisc.accuracy
+    for name, variable in (("contact_area", "grid_error_area"), ("approach", "grid_error_approach")):
+        part = accuracy[variable].values * float(result[name].max()) / result[name].values
+        stated_width = found[name]["half_width"].sel(source="grid")
+        np.testing.assert_allclose(stated_width, np.log1p(part)[[0, 2]], rtol=1e-6)
+        np.testing.assert_array_equal(found[name]["value"], result[name].values[[0, 2]])
+        assert (found[name]["cost"] == 0).all()
+    assert not list((tmp_path / "results" / "budget").glob("*.nc"))
+    sharp = rv.budget(result, sharp=True, workers=0, progress=False)
+    assert float(sharp["cost"].sel(source="grid")) > 0
+
+
+def test_budget__reads_the_last_octave_that_a_curve_states(tmp_path):
+    text = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\nspeeds = [1e-3, 1e-2]\npressure = "50 kPa"\n'
+    plain = case(text + '[solve]\nboundary = "periodic"\n', tmp_path)
+    solved = budgets(plain, ["friction_coefficient", "contact_area"], out=tmp_path / "b", cutoff="18 um", **QUIET)
+    study = rv.vary(plain, {"friction.last_octave": True, "solve.grid_error": True})
+    result = rv.run(study, out=tmp_path / "results", progress=False)
+    found = budgets(result, ["friction_coefficient", "contact_area"], cutoff="18 um", **QUIET)
+    assert not list((tmp_path / "results" / "budget").glob("*.nc"))
+    octave = {"source": "next octave of waves"}
+    for name, one in found.items():
+        np.testing.assert_allclose(one["half_width"].sel(octave), solved[name]["half_width"].sel(octave), rtol=0.1)
+        assert (one["direction"].sel(octave) == solved[name]["direction"].sel(octave)).all()
+        assert "as the result states" in str(one["method"].sel(octave).values)
+    stated_grid = np.log1p(result.roughvisc.accuracy["grid_error_friction"].values)
+    np.testing.assert_allclose(found["friction_coefficient"]["half_width"].sel(source="grid"), stated_grid, rtol=1e-6)
+    other = rv.budget(result, "leak_rate", **QUIET)  # which the result states nothing of
+    assert float(other["cost"].sel(source="grid")) > 0
 
 
 def test_budget__of_several_quantities_states_their_units(tmp_path):
