@@ -45,12 +45,26 @@ def irfft2(x: Field, s: tuple[int, int], overwrite_x: bool = False, workers: int
     return _real(x, (0, 1), s[1], overwrite_x, workers)
 
 
-def dct(x: Field, axis: int, n: int | None = None, overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _cosine(_lengthened(x, n, axis), (axis,), 2, overwrite_x, workers)
+def dct(
+    x: Field,
+    axis: int,
+    n: int | None = None,
+    overwrite_x: bool = False,
+    workers: int | None = None,
+    out: Field | None = None,
+) -> Field:
+    return _cosine(_lengthened(x, n, axis), (axis,), 2, overwrite_x, workers, out)
 
 
-def idct(x: Field, axis: int, n: int | None = None, overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _cosine(_lengthened(x, n, axis), (axis,), 3, overwrite_x, workers)
+def idct(
+    x: Field,
+    axis: int,
+    n: int | None = None,
+    overwrite_x: bool = False,
+    workers: int | None = None,
+    out: Field | None = None,
+) -> Field:
+    return _cosine(_lengthened(x, n, axis), (axis,), 3, overwrite_x, workers, out)
 
 
 def dctn(x: Field, workers: int | None = None) -> Field:
@@ -75,9 +89,11 @@ def _real(
     return ducc0.fft.c2r(x, axes=axes, lastsize=n, out=out, **given)
 
 
-def _cosine(x: Field, axes: tuple[int, ...], kind: int, overwrite: bool, workers: int | None) -> Field:
+def _cosine(
+    x: Field, axes: tuple[int, ...], kind: int, overwrite: bool, workers: int | None, out: Field | None = None
+) -> Field:
     norm = 0 if kind == 2 else 2
-    out = x if overwrite else None
+    out = x if overwrite else out
     return ducc0.fft.dct(x, type=kind, axes=axes, inorm=norm, out=out, nthreads=_threads(workers))
 
 

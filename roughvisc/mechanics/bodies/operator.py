@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, lru_cache
-from queue import SimpleQueue
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +37,15 @@ _LINE = 64
 _BLOCKED = 1024**2
 # Cells a side of a block.
 _BLOCK = 8
+
+
+class _Work(NamedTuple):
+    """A room for the transforms along y, one for some rows or columns of each thread, and which go together."""
+
+    spectrum: NDArray[Any]
+    rooms: list[NDArray[np.uint8]]
+    rows: tuple[slice, ...]
+    columns: tuple[slice, ...]
 
 
 class Operator:
@@ -84,6 +92,8 @@ class Operator:
         self.kernel = kernel
         self.workers = workers
         self._transforms = transforms(mirrored)
+        #: Area that one cell stands for, its mirror images included. [m2]
+        self.cell_area = self._transforms.images**2 * spacing[0] * spacing[1]
         #: Number of cells of the surface, mirror images included.
         self.surface_shape = (self._transforms.images * shape[0], self._transforms.images * shape[1])
         if boundary == "free":
@@ -96,6 +106,7 @@ class Operator:
         #: Whether every pressure displaces the surface, a uniform one too.
         self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
+        self._work: dict[tuple[tuple[int, int], np.dtype[Any]], _Work] = {}
 
     def on(self, shape: tuple[int, int]) -> Operator:
         """The same body, boundary, symmetry and extent on another number of cells."""
@@ -112,11 +123,6 @@ class Operator:
     def coarse(self) -> Operator:
         """The same body on blocks of some cells a side, of the same period."""
         return self.on((-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK)))
-
-    @property
-    def cell_area(self) -> float:
-        """Area that one cell stands for, its mirror images included. [m2]"""
-        return self._transforms.images**2 * self.spacing[0] * self.spacing[1]
 
     @cached_property
     def largest_influence(self) -> float:
@@ -226,20 +232,21 @@ class Operator:
         """
         along, nx, (mx, my), kind = self._transforms, self.shape[0], points, symbol[0].dtype
         threads = self.threads
-        spectrum, rooms = self._working_memory(points, kind, threads)
-        number, own = spectrum.dtype, mx == nx  # columns stay where they are unless there are more points of them
+        work = self._work_on(points, kind)
+        spectrum, rooms = work.spectrum, work.rooms[:threads]  # each thread takes a room, and puts it back
+        own = mx == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:
-            room = rooms.get()
+            room = rooms.pop()
             along.rows_into(spectrum[rows], _rows_of(field, rows), _as(room, kind, (rows.stop - rows.start, my)))
-            rooms.put(room)
+            rooms.append(room)
 
         def across(number_of_block: int) -> None:
-            block = columns_of[number_of_block]
-            room = rooms.get()
+            block = work.columns[number_of_block]
+            room = rooms.pop()
             columns = there = spectrum[:, block]
             if not own:
-                columns = _as(room, number, (mx, block.stop - block.start))
+                columns = _as(room, spectrum.dtype, (mx, block.stop - block.start))
                 columns[:nx] = there
                 columns[nx:] = 0
             changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
@@ -247,30 +254,29 @@ class Operator:
             changed = along.columns_back(changed, axis=0, overwrite_x=True, workers=1)
             if changed is not there:
                 there[...] = changed[:nx]
-            rooms.put(room)
+            rooms.append(room)
 
         def back(rows: slice) -> None:
-            room = rooms.get()
+            room = rooms.pop()
             here = _as(room, kind, (rows.stop - rows.start, my))
             keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
-            rooms.put(room)
+            rooms.append(room)
 
-        rows = list(blocks(nx, _rows_together(my)))
-        columns_of = _column_blocks(spectrum.shape[1], mx, number)
-        parallel_map(forward, rows, threads)
-        parallel_map(across, range(len(columns_of)), threads)
-        parallel_map(back, rows, threads)
+        parallel_map(forward, work.rows, threads)
+        parallel_map(across, range(len(work.columns)), threads)
+        parallel_map(back, work.rows, threads)
 
-    def _working_memory(
-        self, points: tuple[int, int], kind: np.dtype[Any], threads: int
-    ) -> tuple[NDArray[Any], SimpleQueue[NDArray[np.uint8]]]:
-        """For transforms along y, and rooms for some rows or columns of each thread, which puts its own back."""
-        number = np.result_type(kind, np.complex64) if self._transforms.is_complex else kind
-        spectrum, own = self._memory
-        rooms: SimpleQueue[NDArray[np.uint8]] = SimpleQueue()
-        for room in own[:threads]:
-            rooms.put(room)
-        return _as(spectrum, number, (self.shape[0], self._transforms.width(points[1]))), rooms
+    def _work_on(self, points: tuple[int, int], kind: np.dtype[Any]) -> _Work:
+        """What transforms of so many points in one precision work in."""
+        work = self._work.get((points, kind))
+        if work is None:
+            number = np.result_type(kind, np.complex64) if self._transforms.is_complex else kind
+            memory, rooms = self._memory
+            spectrum = _as(memory, number, (self.shape[0], self._transforms.width(points[1])))
+            rows = tuple(blocks(self.shape[0], _rows_together(points[1])))
+            work = _Work(spectrum, rooms, rows, _column_blocks(spectrum.shape[1], points[0], number))
+            self._work[points, kind] = work
+        return work
 
     @cached_property
     def _memory(self) -> tuple[NDArray[np.uint8], list[NDArray[np.uint8]]]:

@@ -104,5 +104,5 @@ _SCIPY = (
 )
 _DUCC0 = (
     Transforms(1, ducc.rfft, ducc.cfft, ducc.irfft, ducc.cifft, ducc.rfft2, ducc.irfft2, True, True),
-    Transforms(2, ducc.dct, ducc.dct, ducc.idct, ducc.idct, ducc.dctn, ducc.idctn, False),
+    Transforms(2, ducc.dct, ducc.dct, ducc.idct, ducc.idct, ducc.dctn, ducc.idctn, False, True),
 )

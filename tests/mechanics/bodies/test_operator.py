@@ -155,9 +155,9 @@ def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines
     """Blocks of 32 columns share no line, and columns do not all fall on the same places of the cache."""
     operator = Operator(shape, (1.0, 1.0), "periodic", workers=2)
     for kind in (np.float32, np.float64):
-        spectrum, rooms = operator._working_memory(shape, np.dtype(kind), 2)
-        rows = operators._as(rooms.get(), np.dtype(kind), (2, shape[1]))
-        for memory in (spectrum, rows):
+        work = operator._work_on(shape, np.dtype(kind))
+        rows = operators._as(work.rooms[0], np.dtype(kind), (2, shape[1]))
+        for memory in (work.spectrum, rows):
             assert memory.ctypes.data % 64 == 0
             assert memory.strides[0] % 128 == 64
 
