@@ -92,14 +92,14 @@ def over_cells(work: Callable[[slice, slice], Found], size: int, cells: Cells, t
 
 def weighted(terms: Sequence[tuple[float, Array]], out: Array, threads: int) -> Array:
     """Sum of fields times their factors, in their order; ``out`` may be the first of them."""
-    factors = [factor for factor, _ in terms]
+    (first, *factors), fields = zip(*terms, strict=True)
 
-    def add_up(*fields: Array, out: Array) -> None:
-        np.multiply(fields[0], factors[0], out=out)
-        for factor, field in zip(factors[1:], fields[1:], strict=True):
-            out += factor * field
+    def add_up(field: Array, *others: Array, out: Array) -> None:
+        np.multiply(field, first, out=out)
+        for factor, other in zip(factors, others, strict=True):
+            out += factor * other
 
-    blockwise(add_up, *(field for _, field in terms), out=out, threads=threads)
+    blockwise(add_up, *fields, out=out, threads=threads)
     return out
 
 
@@ -118,7 +118,7 @@ def cut_at_zero(out: Array, threads: int) -> bool:
     """``out = max(out, 0)``, and whether that has changed anything."""
 
     def cut(found: Array) -> bool:
-        below = bool(found.min(initial=0.0) < 0)
+        below = bool(np.minimum.reduce(found, axis=None, initial=0.0) < 0)
         if below:
             np.maximum(found, 0, out=found)
         return below
@@ -134,7 +134,7 @@ def l1_distance(a: Array, b: Array, threads: int) -> float:
 def any_positive(field: Array) -> bool:
     """Whether any cell is: asked block by block, since one of the first mostly says so."""
     values = field.reshape(-1)
-    return any(bool((values[part] > 0).any()) for part in blocks(field.size, _BLOCK))
+    return any(np.logical_or.reduce(values[part] > 0) for part in blocks(field.size, _BLOCK))
 
 
 def lowest(field: Array, present: Mask | None, threads: int) -> float:
@@ -234,11 +234,15 @@ def summed(values: Array) -> float:
 
 def total(vector: Array, threads: int) -> float:
     """Sum of a vector."""
+    if vector.size <= _BLOCK:
+        return summed(vector)
     return sum(blockwise(summed, vector, threads=threads))
 
 
 def inner(field: NDArray[Any], cells: Cells, values: Array, threads: int) -> float:
     """Inner product of a field with another, which has values at some cells and is zero elsewhere."""
+    if cells.size <= _BLOCK:
+        return summed(values * field.take(cells))
     return sum(blockwise(lambda few, there: summed(there * field.take(few)), cells, values, threads=threads))
 
 

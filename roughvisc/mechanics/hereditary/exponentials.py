@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.arrays import Cells, empty, inner, threads_of, weighted
+from roughvisc.mechanics.arrays import Cells, empty, inner, summed, threads_of, weighted
 from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
 from roughvisc.mechanics.materials.models import Prony, one_less_mean_decay
 
@@ -67,7 +67,7 @@ class Modes:
     def start(self, shape: tuple[int, int]) -> ModesState:
         """State at rest."""
         field = (2, *shape) if self.acts_on == "both" else shape
-        return ModesState(np.zeros((len(self._weights), *field)), np.zeros(field))
+        return ModesState(np.zeros((len(self.weights), *field)), np.zeros(field))
 
     def predict(self, state: ModesState, step: float, rule: Rule) -> tuple[float, Array]:
         """``alpha`` [1/Pa] and the carried field of a step ahead. [s]"""
@@ -77,10 +77,10 @@ class Modes:
     def terms(self, state: ModesState, step: float, rule: Rule) -> tuple[float, list[tuple[float, Array]]]:
         """The same, the carried field as the terms of which it is the sum."""
         own, earlier, before, after = self.coefficients(state, step, rule)
-        weights = self._weights
-        alpha = self.factor * self.material.glassy + float(np.sum(weights * after))
-        terms = [(float(np.sum(weights * before)), state.field), *zip(weights * own, state.modes, strict=True)]
-        if state.earlier is not None and np.any(earlier):
+        weights = self.weights
+        alpha = self.factor * self.material.glassy + summed(weights * after)
+        terms = [(summed(weights * before), state.field), *zip(weights * own, state.modes, strict=True)]
+        if rule == "bdf2" and state.earlier is not None:
             terms += zip(weights * earlier, state.earlier, strict=True)
         return alpha, terms
 
@@ -129,7 +129,7 @@ class Modes:
         earlier = None if state.earlier is None else moved(state.earlier)
         return ModesState(moved(state.modes), moved(state.field), earlier, state.step)
 
-    @property
+    @cached_property
     def factor(self) -> float:
         """Contact compliance over shear compliance. [-]"""
         return 0.5 * (1 - self.material.poisson)
@@ -145,8 +145,8 @@ class Modes:
         displaced, threads = fields[:, 1] if self.acts_on == "both" else fields, threads_of(displacement.size)
         return np.array([inner(field, cells, pressure, threads) for field in displaced])
 
-    @property
-    def _weights(self) -> Array:
+    @cached_property
+    def weights(self) -> Array:
         """Contact compliance of each mode, [1/Pa]; a fluidity, [1/(Pa s)], comes last."""
         fluidity = [self.material.fluidity] if self.material.fluidity else []
         return self.factor * np.array([*self.material.compliances, *fluidity])
@@ -161,7 +161,7 @@ class Modes:
 @lru_cache(maxsize=8)
 def _coefficients(material: Prony, step: float, last: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
     """Of a step after another: a trial, the state after it and its energies ask for the same ones."""
-    x = step / np.array(material.times) if material.times else np.zeros(0)
+    x = step / np.array(material.times)
     found = _step_coefficients(x, step, last, rule)
     if material.fluidity:
         flowing = _flow_coefficients(step, last, rule)

@@ -98,7 +98,7 @@ class Prony:
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""
         t = np.asarray(t, dtype=float)
-        retarded = np.sum(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
+        retarded = np.add.reduce(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
         flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
 
@@ -120,7 +120,7 @@ class Prony:
         compliances, times = self._terms
         age, x = s[..., None] / times, h[..., None] / times
         # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
-        retarded = np.sum(compliances * (np.exp(-age) * one_less_mean_decay(x) - np.expm1(-age)), axis=-1)
+        retarded = np.add.reduce(compliances * (np.exp(-age) * one_less_mean_decay(x) - np.expm1(-age)), axis=-1)
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
 
     @cached_property
@@ -160,7 +160,7 @@ class Prony:
 
 
 # (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding
-_POWERS = np.arange(1, 14)
+_POWERS = np.arange(1.0, 14)
 _SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
 
 
@@ -168,10 +168,11 @@ def one_less_mean_decay(x: ArrayLike) -> Array:
     """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
     x = np.asarray(x, dtype=float)
     small = x < 0.3
-    if not small.any():
+    count = np.count_nonzero(small)
+    if count == 0:
         return np.asarray(1 + np.expm1(-x) / x)
-    series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
-    if small.all():
+    series = np.add.reduce(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
+    if count == small.size:
         return np.asarray(series)
     large = np.maximum(x, 0.3)
     return np.where(small, series, 1 + np.expm1(-large) / large)

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.arrays import inner
+from roughvisc.mechanics.arrays import inner, summed
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
@@ -122,51 +122,52 @@ def after_step(
     load or the approach is held.
     """
     cells, pressure = end[0].not_zero()
-    both = area * inner(start, cells, pressure, end[0].threads)
-    last = area * inner(end[1], cells, pressure, end[0].threads)
+    both, last = (area * inner(field, cells, pressure, end[0].threads) for field in (start, end[1]))
     glassy = 0.5 * memory.factor * memory.material.glassy
     if step == 0:
         stored = energy.stored + glassy * (last - energy.pressure)
         crossing = area * memory.products(state.modes, end[1], cells, pressure)
         return replace(energy, stored=stored, pressure=last, beside=crossing)
-    weights = memory.factor * np.array(memory.material.compliances)
-    first = energy.pressure
-    own, earlier, before, after = (c[: weights.size] for c in memory.coefficients(state, step, rule))
+    count, first = len(memory.material.times), energy.pressure
+    weights, *coefficients = (c[:count] for c in (memory.weights, *memory.coefficients(state, step, rule)))
+    own, earlier, before, after = coefficients
     ahead = area * memory.products(state.modes, end[1], cells, pressure)  # <p_n+1, z_n>
     behind = np.zeros_like(ahead)
-    if state.earlier is not None and np.any(earlier):
+    if rule == "bdf2" and state.earlier is not None:
         behind = area * memory.products(state.earlier, end[1], cells, pressure)
     # z_n+1 = own z_n + earlier z_n-1 + before p_n + after p_n+1
     beside = own * ahead + earlier * behind + before * both + after * last
     crossed = own * energy.own + earlier * energy.crossed + before * energy.beside + after * ahead
     squared = own * crossed + after * beside + before * (own * energy.beside + before * first + after * both)
-    if np.any(earlier):  # this rule takes nothing from p_n
+    if rule == "bdf2":  # it takes nothing from p_n
         squared = squared + earlier * (own * energy.crossed + earlier * energy.earlier + after * behind)
     flowed = step * (first + both + last) / 3
-    # the work of the mean pressure on the change of an element, less what it stores: <(p_n + p_n+1) / 2, z_n+1 - z_n>
-    held = own * energy.beside + earlier * energy.lagged + before * first + after * both  # <p_n, z_n+1>
-    worked = 0.5 * (beside - ahead + held - energy.beside)
-    lost = weights * (worked - 0.5 * (squared - energy.own))
     unresolved = energy.unresolved
-    if rule == "linear" or fresh:
+    if fresh or rule != "linear":
+        # work of the mean pressure on the change of an element, less what it stores: <(p_n + p_n+1) / 2, z_n+1 - z_n>
+        held = own * energy.beside + earlier * energy.lagged + before * first + after * both  # <p_n, z_n+1>
+        worked = 0.5 * (beside - ahead + held - energy.beside)
+        lost = weights * (worked - 0.5 * (squared - energy.own))
+    if fresh or rule == "linear":
         lag = first - 2 * energy.beside + energy.own  # <w, w> with w = p_n - z_n; d = p_n+1 - p_n
         drift = both - first - ahead + energy.beside  # <w, d>
         change = last - 2 * both + first  # <d, d>
         of_lag, of_drift, of_change = _lost(memory.material, step)
         exact = weights * (of_lag * lag + of_drift * drift + of_change * change)
-        quick = np.array(memory.material.times) < step
         if fresh:
+            quick = np.array(memory.material.times) < step
             unresolved += _PATH * float(np.sum(np.abs(lost - exact), where=quick))
-        if rule == "linear":
-            lost = np.where(fresh & quick, lost, exact)
+            lost = np.where(quick, lost, exact) if rule == "linear" else lost
+        else:
+            lost = exact
     if rule == "right":
         lost = weights * _lost(memory.material, step)[0] * (last - 2 * ahead + energy.own)
         flowed = step * last
     elif jumped and rule != "linear":
         lost = weights * (beside - ahead - 0.5 * (squared - energy.own))
         flowed = step * last
-    stored = glassy * last + 0.5 * float(np.sum(weights * squared))
-    dissipated = float(np.sum(lost)) + memory.factor * memory.material.fluidity * flowed
+    stored = glassy * last + 0.5 * summed(weights * squared)
+    dissipated = summed(lost) + memory.factor * memory.material.fluidity * flowed
     if work is not None:
         dissipated, unresolved = work - (stored - energy.stored), energy.unresolved
     return Energy(stored, energy.dissipated + dissipated, unresolved, last, beside, ahead, squared, crossed, energy.own)
@@ -181,8 +182,8 @@ def _lost(material: Prony, step: float) -> tuple[Array, Array, Array]:
 
 
 # (-1)^(k+1) (2 - 2^k) / (k+1)! for k >= 2: up to 0.3 the next term is below rounding
-_ORDERS = np.arange(2, 18)
-_SERIES = (-1.0) ** (_ORDERS + 1) * (2 - 2.0**_ORDERS) / np.cumprod(np.append(6.0, _ORDERS[1:] + 1))
+_ORDERS = np.arange(2.0, 18)
+_SERIES = (-1.0) ** (_ORDERS + 1) * (2 - 2**_ORDERS) / np.cumprod(np.append(6.0, _ORDERS[1:] + 1))
 
 
 def _both_rises(x: Array, mean: Array, twice: Array) -> Array:
@@ -193,5 +194,5 @@ def _both_rises(x: Array, mean: Array, twice: Array) -> Array:
     x, mean, twice : ndarray, shape (m,)
         Steps over retardation times, and one less the mean decay over one of these and over two.
     """
-    series = np.sum(_SERIES * np.minimum(x, 0.3)[..., None] ** (_ORDERS - 1), axis=-1)
+    series = np.add.reduce(_SERIES * np.minimum(x, 0.3)[..., None] ** (_ORDERS - 1), axis=-1)
     return np.where(x < 0.3, series, (2 * mean - twice) / np.maximum(x, 0.3))
