@@ -85,10 +85,6 @@ class Checkpoint:
     wall_time: float = 0.0
     transforms: str = field(default_factory=transform_library)
 
-    def after(self, state: Any, done: float, recorded: bool, wall_time: float) -> Checkpoint:
-        """How far it has come a step farther on, recorded as a row or not."""
-        return replace(self, state=state, done=done, rows=self.rows + recorded, wall_time=wall_time)
-
     def with_current_transforms(self) -> Checkpoint:
         """The same, to be gone on from with the transforms that are here."""
         before = self.transforms.split(_THEN)

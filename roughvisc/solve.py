@@ -22,7 +22,7 @@ from roughvisc.mechanics.arrays import reused
 from roughvisc.mechanics.bodies.body import separability_error
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.problem import Problem
-from roughvisc.recorder import MemoryRecorder, Recorder, RowStore
+from roughvisc.recorder import Checkpoint, MemoryRecorder, Recorder, RowStore
 from roughvisc.topography.grid import TAPER, checked, nominal_area
 from roughvisc.variables import RESULT_FORMAT, STEPPED, of_step
 
@@ -108,17 +108,18 @@ def _solve_once(
         rows = experiment.rows(problem, reached.state, in_memory=recorder.in_memory)
         if reached.state is not None:
             log.info("resumes after %s", experiment.progress(reached.done, rows.end))
-            reached = replace(reached, state=None)
+        count, transforms = reached.rows, reached.transforms
+        del reached  # its fields are not needed beyond the first row
         with reused(), reporting(progress, experiment.doing, at=experiment.progress) as report:
             for row in rows:
-                reached = reached.after(row.state, row.done, bool(row.values), spent + time.perf_counter())
+                took = spent + time.perf_counter()
                 if row.values:
-                    values = {experiment.axis: row.at, **row.values, "wall_time": reached.wall_time}
+                    values = {experiment.axis: row.at, **row.values, "wall_time": took}
                     recorder.rows.append({"row": values, "kept": row.kept, "facts": row.facts}, row.fields)
+                    count += 1
                 report(row.done, rows.end)
                 if row.state is not None:
-                    recorder.update(reached)
-                reached = replace(reached, state=None)  # the recorder holds it if it is needed
+                    recorder.update(Checkpoint(row.state, row.done, count, took, transforms))
                 del row  # its fields are not needed while the next one is computed
         if not rows.order(recorder.rows):
             raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")

@@ -254,31 +254,31 @@ class LoadingRows(Rows):
         steps = march(scene, None if start is None else start.march) if fast else march_seed(scene)
         del start
         for step in steps:
-            self._watch_border(step)
+            # when contact comes to the border of a free-space domain, in a step that is kept or not
+            if self._border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
+                self._border = float(step.shown.time)
             converged = converged and step.converged
             # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-            if step.shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error)):
-                row = self.row(step, converged)
-                converged = True
-            elif not every and is_end_value(step):
-                row = self.row(step, step.converged, kept=False)
-            else:
-                row = Row(step.shown.time, done=step.shown.time)
+            kept = step.shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error))
+            state = None
             if fast:
-                state = LoadingState(step.state, converged, self.profile.growths, self._border)
-                row = replace(row, state=state)
-                del state
-            del step  # its fields are not needed while the next one is computed
+                state = LoadingState(step.state, converged or kept, self.profile.growths, self._border)
+            if kept:
+                row = self.row(step, converged, state=state)
+            elif not every and is_end_value(step):
+                row = self.row(step, step.converged, kept=False, state=state)
+            else:
+                row = Row(step.shown.time, state=state, done=step.shown.time)
+            converged = converged or kept
+            del step, state  # their fields are not needed while the next one is computed
             yield row
             del row
 
-    def _watch_border(self, step: Step) -> None:
-        """Note when contact comes to the border of a free-space domain, in a step that is kept or not."""
-        if self._border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
-            self._border = float(step.shown.time)
+    def row(self, step: Step, converged: bool, kept: bool = True, state: LoadingState | None = None) -> Row:
+        """Row of an accepted step, from which the rows go on by a state.
 
-    def row(self, step: Step, converged: bool, kept: bool = True) -> Row:
-        """Row of an accepted step; ``converged``: all of those since the last one that is kept."""
+        ``converged``: all of those since the last one that is kept.
+        """
         if not is_wide(step.scene.gap.size):
             step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
         shown, window = step.shown, self.profile.window
@@ -319,7 +319,7 @@ class LoadingRows(Rows):
             "shape": window.shape,
             "domain": window.domain,
         }
-        return Row(shown.time, row, _copy_views(arrays), kept, facts=facts, done=shown.time)
+        return Row(shown.time, row, _copy_views(arrays), kept, state, facts, shown.time)
 
     def columns(self, columns: dict[str, Array]) -> dict[str, Array]:
         """What each row has cost, from the sums till then; and the nominal pressure."""

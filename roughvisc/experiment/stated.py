@@ -129,7 +129,7 @@ def meets_tolerance(step: Step, series_error: float) -> bool:
     most = _AT_MOST * scene.tolerance
     if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
         return False
-    if not scene.lacks_instantaneous_compliance(scene.program.duration):
+    if not scene.is_soft:
         return not found["stated_error"] > scene.tolerance
     since = state.now.time - state.began
     if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +130,7 @@ class Sparse:
         cells = _not_zero(self.values)
         return cells, self.values.take(cells)
 
-    @property
+    @cached_property
     def count(self) -> int:
         """How many cells are not zero."""
         return int(np.count_nonzero(self.values)) if self.cells is None else self.cells.size

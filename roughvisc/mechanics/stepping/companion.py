@@ -8,6 +8,7 @@ Energies are sums over the steps, whose error follows the second order closely: 
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import (
-    NO_CONTACT,
+    ControllerState,
     Guess,
     Held,
     Instant,
@@ -32,12 +33,11 @@ from roughvisc.mechanics.stepping.scene import (
 )
 from roughvisc.mechanics.stepping.step import (
     advance_trajectory,
+    cost_after,
     displacement_after,
     is_outgrown,
     segment_number,
     trial_step,
-    with_cost,
-    without_past,
 )
 from roughvisc.mechanics.stepping.tangential import tangential_force
 
@@ -63,19 +63,13 @@ _ENTERED, _ENTERING = 0.3, 2.5
 _USED_BY_WORK, _USED_BY_SOFT_WORK = 0.5, 0.25
 
 
-def behind(state: State, accepted: State) -> State:
-    """An accepted state whose companion waits where it was, at the state before if they were one till then."""
+def behind(state: State) -> dict[str, Any]:
+    """What a companion is after a step that it does not take: where it was, at the state if they were one till then."""
     companion = state.companion
     if companion is None:
-        companion = _bare(Trajectory(**{part.name: getattr(state, part.name) for part in fields(Trajectory)}))
-    return replace(accepted, companion=companion, behind=1)
-
-
-def _bare(companion: Trajectory) -> Trajectory:
-    """Without what a companion is never asked for, so that it holds few fields."""
-    before = companion.before
-    before = None if before is None else replace(before, contact=NO_CONTACT, unit_displacement=None)
-    return replace(companion, before=before)
+        own = {part.name: getattr(state, part.name) for part in fields(Trajectory)}
+        companion = Trajectory(**own | {"before": state.before and state.before.without_fields()})
+    return {"companion": companion, "behind": 1}
 
 
 def coarse_initial_guess(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
@@ -134,7 +128,7 @@ def difference(
     area = scene.operator.cell_area
     inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
     (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
-    entered, soft = 0.0, scene.lacks_instantaneous_compliance(scene.program.duration)
+    entered, soft = 0.0, scene.is_soft
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))
         if companion.before is None or scene.lacks_instantaneous_compliance(coarse.time - companion.before.time):
@@ -157,8 +151,10 @@ def difference(
     )
 
 
-def adapt_tolerance_share(scene: Scene, before: State, state: State, ahead: float, left: float) -> State:
-    """State whose steps take from here on the part of the tolerance's share that what they have come to leaves them.
+def adapt_tolerance_share(
+    scene: Scene, before: State, state: State, ahead: float, left: float, unknown: Uncertainty
+) -> ControllerState:
+    """From here on steps take the part of the tolerance's share that what they have come to leaves them.
 
     Parameters
     ----------
@@ -170,27 +166,20 @@ def adapt_tolerance_share(scene: Scene, before: State, state: State, ahead: floa
         What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
     left : float
         Part of the error of the pressure that is left at the next kept time; that of the work does not fade.
+    unknown : Uncertainty
+        What is stated of the state.
     """
-    # the work goes about as the square of what is prescribed
-    used, earlier = (
-        max(left * _used(scene, one) / ahead, _used_by_work(scene, one) / ahead**2) for one in (state, before)
-    )
-    return replace(state, pace=state.pace.adapt_sharpness(used, earlier))
 
+    def used(one: State, unknown: Uncertainty) -> float:
+        """Part of the tolerance; the work goes about as the square of what is prescribed."""
+        part = _USED_BY_SOFT_WORK if scene.is_soft else _USED_BY_WORK
+        by_work = part * unknown.work / one.largest_work / scene.tolerance if one.largest_work > 0 else 0.0
+        if scene.is_soft:  # pressure and force jump with every cell that enters
+            unknown = replace(unknown, pressure=0.0, force=0.0)
+        relative = unknown.relative(one.largest_force, one.largest_approach) / scene.tolerance
+        return max(left * relative / ahead, by_work / ahead**2)
 
-def _used(scene: Scene, state: State) -> float:
-    """What is stated of a state, over the tolerance."""
-    unknown = state.uncertainty
-    # pressure and force jump with every cell that enters
-    if scene.lacks_instantaneous_compliance(scene.program.duration):
-        unknown = replace(unknown, pressure=0.0, force=0.0)
-    return unknown.relative(state.largest_force, state.largest_approach) / scene.tolerance
-
-
-def _used_by_work(scene: Scene, state: State) -> float:
-    """A part of what is stated of the work, over the tolerance."""
-    part = _USED_BY_SOFT_WORK if scene.lacks_instantaneous_compliance(scene.program.duration) else _USED_BY_WORK
-    return part * state.uncertainty.work / state.largest_work / scene.tolerance if state.largest_work > 0 else 0.0
+    return state.pace.adapt_sharpness(used(state, unknown), used(before, before.uncertainty))
 
 
 def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Array) -> float:
@@ -251,8 +240,10 @@ def coarse_step(scene: Scene, state: State, companion: Trajectory, trial: Trial)
     """State whose companion has accepted a step to the same instant."""
     changes = advance_trajectory(scene, companion, trial)
     if companion.unresolved:
-        changes |= without_past(scene, replace(companion, **changes))
-    return replace(with_cost(state, trial), companion=_bare(replace(companion, **changes)), behind=0)
+        changes |= {"before": None, "memory": scene.memory.restart(changes["memory"])}
+    # no field of the instant before is ever asked for
+    changes["before"] = changes["before"] and changes["before"].without_fields()
+    return replace(state, companion=replace(companion, **changes), behind=0, **cost_after(state, trial))
 
 
 def with_error_estimate(
@@ -266,9 +257,9 @@ def with_error_estimate(
     return with_uncertainty(step, difference(scene, step, companion, moved, earlier, asked))
 
 
-def with_uncertainty(step: Step, uncertainty: Uncertainty) -> Step:
-    """The step, with what is stated of it."""
-    return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty))
+def with_uncertainty(step: Step, uncertainty: Uncertainty, **more: Any) -> Step:
+    """The step, with what is stated of it; ``more`` is what else is other of its state."""
+    return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty, **more))
 
 
 def in_pairs(steps: Held) -> Through:

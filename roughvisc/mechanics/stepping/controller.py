@@ -164,7 +164,7 @@ def _fading(scene: Scene) -> Fading | None:
 
 def is_gentle(scene: Scene) -> bool:
     """Whether the material follows at once so far that no cell that enters makes the pressure jump."""
-    return scene.is_viscoelastic and not scene.lacks_instantaneous_compliance(scene.program.duration)
+    return scene.is_viscoelastic and not scene.is_soft
 
 
 def _crept_within(scene: Scene, length: float) -> float:

@@ -13,12 +13,12 @@ from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene, State, Step, Trajectory
 from roughvisc.mechanics.stepping.step import (
     accept,
+    cost_after,
     enlarged,
     is_outgrown,
     step_of,
     trial_at_rest,
     trial_step,
-    with_cost,
     without_past,
 )
 
@@ -115,13 +115,12 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
         return scene, step_of(scene, _defer_jump(scene, state, segment, value), trial_at_rest(scene, state))
     while True:
         trial = trial_step(scene, state, segment.control, value, 0.0, "linear", stated=True)
-        state = with_cost(state, trial)
         if not is_outgrown(scene, trial.instant):
             jumped = accept(scene, state, trial, state.pace.with_pressure_error())
             found = followed(scene, jumped, segment, coarse_initial_guess(trial.instant), "linear")
             if found is not None:
                 break
-        scene, state = enlarged(scene, state, state.now.time)
+        scene, state = enlarged(scene, replace(state, **cost_after(state, trial)), state.now.time)
     state, companion_trial = found
     return scene, with_error_estimate(scene, step_of(scene, start_segment(scene, state), trial), companion_trial)
 

@@ -19,6 +19,7 @@ from roughvisc.mechanics.stepping.companion import (
     adapt_tolerance_share,
     behind,
     coarse_initial_guess,
+    difference,
     followed,
     in_pairs,
     with_error_estimate,
@@ -36,11 +37,13 @@ from roughvisc.mechanics.stepping.controller import (
 )
 from roughvisc.mechanics.stepping.events import closing_time, jump, next_event, start_segment
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_CONTACT, NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
 from roughvisc.mechanics.stepping.step import (
     accept,
     carried_into_step,
+    cost_after,
+    displacement_after,
     enlarged,
     initial_state,
     is_outgrown,
@@ -48,7 +51,6 @@ from roughvisc.mechanics.stepping.step import (
     step_of,
     trial_at_rest,
     trial_step,
-    with_cost,
     without_past,
 )
 
@@ -137,7 +139,6 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
                 yield step
             continue
         trial, error = _tried(scene, state, segment, event, end)
-        state = with_cost(state, trial)
         outgrown = is_outgrown(scene, trial.instant)
         shown = first is not None and scene.keeps(first.shown.time)
         if not outgrown and _too_long(scene, state, segment, trial, error, shown):
@@ -162,7 +163,7 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
             first = None
         if judged is None:  # the grid is too small for this step, or for the companion's
             yield None
-            scene, state = enlarged(scene, state, trial.instant.time)
+            scene, state = enlarged(scene, replace(state, **cost_after(state, trial)), trial.instant.time)
             continue
         base, state = state, judged.state
         if fresh and single:
@@ -216,22 +217,20 @@ def _shortened(
     """State to try again from, with a step shorter than a length. [s]"""
     error = math.nan if _seems_to_open(state, segment, trial) else error
     pace = start.pace.rejected(length, error, error_limit(scene, state, trial.instant.time))
-    return replace(start, pace=pace, iterations=state.iterations, convolutions=state.convolutions)
+    return replace(start, pace=pace, **cost_after(state, trial))
 
 
 def _without_fields(state: State) -> State:
     """Its numbers, and its companion."""
-    now = replace(state.now, contact=NO_CONTACT, unit_displacement=None)
-    return replace(state, now=now, before=None, displacement=NO_FIELD, memory=None)
+    return replace(state, now=state.now.without_fields(), before=None, displacement=NO_FIELD, memory=None)
 
 
 def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
     """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
     time = trial.instant.time
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
-    accepted = accept(scene, state, trial, state.pace.accepted(proposed, error, allowed, fresh=state.before is None))
-    if waits:
-        accepted = behind(state, accepted)
+    pace = state.pace.accepted(proposed, error, allowed, fresh=state.before is None)
+    accepted = accept(scene, state, trial, pace, **behind(state) if waits else {})
     # the first short step stands for a jump
     return restarted(scene, accepted, trial.length) if state.unresolved else accepted
 
@@ -261,13 +260,15 @@ def _step_with_companion(
     if companion_trial is None:
         return step
     assert state.companion is not None
+    assert accepted.companion is not None
     asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
-    step = with_error_estimate(scene, step, companion_trial, state.companion.now.contact, asked)
-    if companion_trial.length > trial.length:
-        ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
-        left = 1.0 if asked else remaining(scene, accepted)
-        return replace(step, state=adapt_tolerance_share(scene, state, step.state, ahead, left))
-    return with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))  # it took the same step
+    moved = displacement_after(scene, accepted.companion, companion_trial)
+    unknown = difference(scene, step, accepted.companion, moved, state.companion.now.contact, asked)
+    if companion_trial.length <= trial.length:  # it took the same step
+        return with_uncertainty(step, unknown.or_worse(state.uncertainty, 0.0))
+    ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
+    left = 1.0 if asked else remaining(scene, accepted)
+    return with_uncertainty(step, unknown, pace=adapt_tolerance_share(scene, state, accepted, ahead, left, unknown))
 
 
 def _touched(scene: Scene, state: State, time: float) -> float:
@@ -286,7 +287,7 @@ def _step_while_open(scene: Scene, state: State, segment: Segment, until: float,
             state = found[0]
     value = segment.value(until - state.began, state.start)
     trial = trial_step(scene, state, segment.control, value, until - state.now.time, "linear", arrival=until)
-    carried = accept(scene, with_cost(state, trial), trial, state.pace.with_pressure_error())
+    carried = accept(scene, state, trial, state.pace.with_pressure_error())
     in_contact = carried.companion is not None and carried.companion.now.force > 0
     found = followed(scene, carried, segment, coarse_initial_guess(carried.now), "right" if in_contact else "linear")
     if found is None:  # the companion is in contact, beyond the grid

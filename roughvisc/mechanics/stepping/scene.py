@@ -122,7 +122,7 @@ class ControllerState:
         """
         ignored = self.shortening_failed(error) and error > allowed
         rejected_error = self.rejected_error if fresh else math.inf
-        return replace(self, suggestion=suggestion, ignore_pressure_error=ignored, rejected_error=rejected_error)
+        return ControllerState(suggestion, self.sharpness, ignored, rejected_error)
 
     def with_pressure_error(self) -> ControllerState:
         """After a step: the next estimate sees the pressure."""
@@ -249,6 +249,11 @@ class Scene:
         return self.glassy < _SOFT * self.compliance(length)
 
     @cached_property
+    def is_soft(self) -> bool:
+        """Whether hardly any of the compliance after all of the program is there at once."""
+        return self.lacks_instantaneous_compliance(self.program.duration)
+
+    @cached_property
     def motions(self) -> tuple[Slide, ...]:
         """What friction is against in each segment: its slide, the last one, or the first; empty if none slides."""
         slides = [segment.slide for segment in self.program.segments]
@@ -296,6 +301,10 @@ class Instant:
     def pressure(self) -> Array:
         """Pressure on all cells, not to be changed; had anew each time where the contact is sparse. [Pa]"""
         return self.contact.field()
+
+    def without_fields(self) -> Instant:
+        """Its numbers."""
+        return Instant(self.time, NO_CONTACT, self.force, self.approach)
 
 
 @dataclass(frozen=True)
@@ -480,6 +489,8 @@ class Step:
 
     def with_fields(self) -> Step:
         """The same with all its fields at hand, for what asks for them again and again."""
+        if self.shown.contact.cells is None and self.moved.is_whole:
+            return self
         shown = replace(self.shown, contact=Sparse.whole(self.shown.pressure))
         return replace(self, shown=shown, moved=Sum.whole(self.displacement))
 

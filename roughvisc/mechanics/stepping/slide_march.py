@@ -26,7 +26,7 @@ from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.events import start_segment
 from roughvisc.mechanics.stepping.program import Segment, Slid, Slide, instant
 from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial, Uncertainty
-from roughvisc.mechanics.stepping.step import accept, restarted, step_of, trial_step, with_cost
+from roughvisc.mechanics.stepping.step import accept, restarted, step_of, trial_step
 
 # Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
 # friction is a small part of it.
@@ -72,14 +72,13 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, coarse_initial_guess(state.now))
     moved = _moved(scene, state, segment.slide, 1)
     # the step before is kept as the profile saw it
-    accepted = accept(scene, with_cost(moved, trial), trial, moved.pace.with_pressure_error())
-    accepted = replace(accepted, before=state.now)
+    accepted = accept(scene, moved, trial, moved.pace.with_pressure_error(), before=state.now)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
     if state.unresolved:
         accepted = restarted(scene, accepted, 0.0)
     companion_trial, earlier = None, state.companion
     if scene.is_viscoelastic and state.behind == 0 and arrival < end:
-        accepted = behind(state, accepted)
+        accepted = replace(accepted, **behind(state))
     elif earlier is not None:
         cells = state.behind + 1
         guess = coarse_initial_guess(accepted.now, earlier.now, state.before if state.behind else None)

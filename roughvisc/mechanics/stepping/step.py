@@ -150,11 +150,11 @@ def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[st
     assert now.unit_displacement is not None
     acts_on = scene.memory.acts_on
     field = now.unit_displacement if acts_on == "displacement" else now.pressure
-    if acts_on == "both":
-        field = np.stack([field, now.unit_displacement])
-    memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
     if acts_on == "both":  # held once
-        now = replace(now, contact=Sparse.of(field[0]), unit_displacement=field[1])
+        both = np.empty((2, *field.shape))
+        both[0], both[1] = field, now.unit_displacement
+        field, now = both, Instant(now.time, Sparse.of(both[0]), now.force, now.approach, both[1])
+    memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
     spent = energy_after(scene, state, trial)
     if spent is None:
         assert trial.displacement is not None
@@ -173,18 +173,19 @@ def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[st
     }
 
 
-def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState) -> State:
-    """State after an accepted trial; ``pace`` tells how long the next step may be."""
+def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState, **more: Any) -> State:
+    """State after an accepted trial; ``pace`` tells how long the next step may be, ``more`` what else is other."""
     changes = advance_trajectory(scene, state, trial)
     now, work = changes["now"], changes["work"]
     return replace(
         state,
-        **changes,
+        **changes | more,
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
         largest_work=max(state.largest_work, abs(work)),
         contact_since=state.contact_since if now.force > 0 and state.now.force > 0 else state.now.time,
         pace=pace,
+        **cost_after(state, trial),
     )
 
 
@@ -237,30 +238,30 @@ def work_between(scene: Scene, state: Trajectory, pressure: Array, displacement:
     return float(np.sum(mean * (displacement - state.displacement))) * scene.operator.cell_area
 
 
-def with_cost(state: State, trial: Trial) -> State:
-    return replace(
-        state,
-        iterations=state.iterations + trial.iterations,
-        convolutions=state.convolutions + trial.convolutions,
-    )
+def cost_after(state: State, trial: Trial) -> dict[str, Any]:
+    """Iterations and convolutions so far, those of a trial included."""
+    return {
+        "iterations": state.iterations + trial.iterations,
+        "convolutions": state.convolutions + trial.convolutions,
+    }
 
 
 def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
-    shown, converged, moved = trial, trial.converged, displacement_after(scene, state, trial)
-    contact, level = state.now.contact, state.now.approach
+    shown, converged, moved, now = trial, trial.converged, displacement_after(scene, state, trial), state.now
+    level = now.approach
     kept = trial.length > 0 and not trial.is_open and scene.keeps(state.now.time)
     if kept and scene.lacks_instantaneous_compliance(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
         alone = replace(state, before=None)
         shown = trial_step(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
-        state = with_cost(state, shown)
+        state = replace(state, **cost_after(state, shown))
         converged = converged and shown.converged
         moved = displacement_after(scene, alone, shown, shown.length, shown.rule)
-        contact, level = shown.instant.contact, shown.instant.approach
+        now, level = replace(now, contact=shown.instant.contact), shown.instant.approach
     return Step(
-        shown=replace(state.now, contact=contact),
+        shown=now,
         moved=moved,
         effective=shown.effective,
         level=level,

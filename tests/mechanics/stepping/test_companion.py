@@ -248,16 +248,20 @@ def test_work_in_doubt__shortens_steps_that_are_not_shown_too():
     scene, state = last.scene, replace(last.state, pace=ControllerState())
 
     def doubtful(part):
-        return replace(state, uncertainty=Uncertainty(work=part * TOLERANCE * state.largest_work))
+        return Uncertainty(work=part * TOLERANCE * state.largest_work)
 
-    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(4.0), 1.0, left=0.01).pace.sharpness == 0.5
-    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(1.0), 1.0, left=0.01).pace.sharpness == 1.0
-    assert companion.adapt_tolerance_share(scene, doubtful(0.5), doubtful(4.0), 2.0, left=0.01).pace.sharpness == 1.0
+    def sharpness(part, ahead):
+        before = replace(state, uncertainty=doubtful(0.5))
+        return companion.adapt_tolerance_share(scene, before, state, ahead, 0.01, doubtful(part)).sharpness
+
+    assert sharpness(4.0, 1.0) == 0.5
+    assert sharpness(1.0, 1.0) == 1.0
+    assert sharpness(4.0, 2.0) == 1.0
 
 
 def test_what_fades__shortens_steps_where_it_is_shown():
     *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
     state = replace(last.state, pace=ControllerState())
-    far_off = replace(state, uncertainty=Uncertainty(pressure=2 * TOLERANCE * state.largest_force))
-    assert companion.adapt_tolerance_share(last.scene, state, far_off, 1.0, left=1.0).pace.sharpness == 0.5
-    assert companion.adapt_tolerance_share(last.scene, state, far_off, 1.0, left=0.01).pace.sharpness == 1.0
+    far_off = Uncertainty(pressure=2 * TOLERANCE * state.largest_force)
+    for left, sharpness in ((1.0, 0.5), (0.01, 1.0)):
+        assert companion.adapt_tolerance_share(last.scene, state, state, 1.0, left, far_off).sharpness == sharpness

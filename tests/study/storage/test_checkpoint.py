@@ -20,14 +20,19 @@ import pytest
 import xarray as xr
 from support import run_whole
 
+import roughvisc as rv
 from roughvisc.errors import InUseError
 from roughvisc.experiment.loading import Loading, LoadingState
+from roughvisc.mechanics.bodies.body import body_of
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.scene import ControllerState, Instant, State
-from roughvisc.recorder import Checkpoint
+from roughvisc.problem import Problem
+from roughvisc.recorder import Checkpoint, MemoryRecorder
+from roughvisc.settings import Settings
+from roughvisc.solve import solve
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
@@ -275,10 +280,24 @@ def last_saved(folder):
 
 
 def test_rows__are_counted_with_and_without_values():
-    reached = Checkpoint(rows=4, wall_time=1.0)
-    noted, passed = reached.after("a", 0.5, True, 2.0), reached.after("b", 0.25, False, 3.0)
-    assert (noted.rows, noted.state, noted.done, noted.wall_time) == (5, "a", 0.5, 2.0)
-    assert (passed.rows, passed.state, passed.done, passed.wall_time) == (4, "b", 0.25, 3.0)
+    """Under a given approach, steps of a soft material that are not kept leave no row."""
+    seen = []
+
+    class Noting(MemoryRecorder):
+        def update(self, reached):
+            seen.append((reached.rows, 4 + len(self.rows.plain), reached.done, reached.wall_time))
+
+    recorder = Noting()
+    recorder.latest = Checkpoint(rows=4, wall_time=1.0)
+    ball, soft = rv.sphere(1e-3, 3e-4, (9, 11)), rv.kelvin_voigt(1e6, 1e5)
+    press, settings = Loading(rv.Program().approach(1e-6, over=1.0)), Settings(times=3, tolerance=1e-2)
+    solve(Problem(ball, body_of(soft), settings), press, recorder)
+    counted, held, done, wall_times = (np.array(each) for each in zip(*seen, strict=True))
+    assert np.array_equal(counted, held)
+    assert set(np.diff(counted)) == {0, 1}
+    assert np.all(np.diff(done) > 0)
+    assert done[-1] == 1.0
+    assert np.all(np.diff([1.0, *wall_times]) > 0)
 
 
 def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
