@@ -70,6 +70,13 @@ def blockwise(
     return over_blocks(on_block, size, threads)
 
 
+def sum_over(work: Callable[..., float], *fields: NDArray[Any], threads: int) -> float:
+    """Sum of what some work gives of each block of cells, as :func:`blockwise` gives them."""
+    if fields[0].size <= _BLOCK:
+        return work(*fields)
+    return sum(blockwise(work, *fields, threads=threads))
+
+
 def over_blocks(work: Callable[[slice], Found], size: int, threads: int) -> list[Found]:
     """What some work gives of each block of so many flat cells, in their order."""
     if size <= _BLOCK:
@@ -128,7 +135,7 @@ def cut_at_zero(out: Array, threads: int) -> bool:
 
 def l1_distance(a: Array, b: Array, threads: int) -> float:
     """Sum of the magnitudes of ``a - b``."""
-    return sum(blockwise(lambda x, y: summed(np.abs(x - y)), a.reshape(-1), b.reshape(-1), threads=threads))
+    return sum_over(lambda x, y: summed(np.abs(x - y)), a.reshape(-1), b.reshape(-1), threads=threads)
 
 
 def any_positive(field: Array) -> bool:
@@ -234,16 +241,12 @@ def summed(values: Array) -> float:
 
 def total(vector: Array, threads: int) -> float:
     """Sum of a vector."""
-    if vector.size <= _BLOCK:
-        return summed(vector)
-    return sum(blockwise(summed, vector, threads=threads))
+    return sum_over(summed, vector, threads=threads)
 
 
 def inner(field: NDArray[Any], cells: Cells, values: Array, threads: int) -> float:
     """Inner product of a field with another, which has values at some cells and is zero elsewhere."""
-    if cells.size <= _BLOCK:
-        return summed(values * field.take(cells))
-    return sum(blockwise(lambda few, there: summed(there * field.take(few)), cells, values, threads=threads))
+    return sum_over(lambda few, there: summed(there * field.take(few)), cells, values, threads=threads)
 
 
 # ------------------------------------------------------------------------------------------------------- threads

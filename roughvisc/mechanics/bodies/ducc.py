@@ -20,29 +20,34 @@ Field = NDArray[Any]
 
 
 def rfft(x: Field, n: int, axis: int, workers: int | None = None, out: Field | None = None) -> Field:
-    return ducc0.fft.r2c(_lengthened(x, n, axis), axes=(axis,), out=out, nthreads=_threads(workers))
+    return ducc0.fft.r2c(_lengthened(x, n, axis), axes=(axis,), out=out, nthreads=workers or fft.get_workers())
 
 
 def irfft(
     x: Field, n: int, axis: int, overwrite_x: bool = False, workers: int | None = None, out: Field | None = None
 ) -> Field:
-    return _real(x, (axis,), n, overwrite_x, workers, out)
+    given = {"forward": False, "inorm": 2, "allow_overwriting_input": overwrite_x}
+    return ducc0.fft.c2r(x, axes=(axis,), lastsize=n, out=out, nthreads=workers or fft.get_workers(), **given)
 
 
 def cfft(x: Field, axis: int, n: int | None = None, overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _complex(_lengthened(x, n, axis), axis, True, overwrite_x, workers)
+    x = _lengthened(x, n, axis)
+    out = x if overwrite_x else None
+    return ducc0.fft.c2c(x, axes=(axis,), out=out, nthreads=workers or fft.get_workers())
 
 
 def cifft(x: Field, axis: int, overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _complex(x, axis, False, overwrite_x, workers)
+    out = x if overwrite_x else None
+    return ducc0.fft.c2c(x, axes=(axis,), forward=False, inorm=2, out=out, nthreads=workers or fft.get_workers())
 
 
 def rfft2(x: Field, workers: int | None = None) -> Field:
-    return ducc0.fft.r2c(x, axes=(0, 1), nthreads=_threads(workers))
+    return ducc0.fft.r2c(x, axes=(0, 1), nthreads=workers or fft.get_workers())
 
 
 def irfft2(x: Field, s: tuple[int, int], overwrite_x: bool = False, workers: int | None = None) -> Field:
-    return _real(x, (0, 1), s[1], overwrite_x, workers)
+    given = {"forward": False, "inorm": 2, "allow_overwriting_input": overwrite_x}
+    return ducc0.fft.c2r(x, axes=(0, 1), lastsize=s[1], nthreads=workers or fft.get_workers(), **given)
 
 
 def dct(
@@ -53,7 +58,9 @@ def dct(
     workers: int | None = None,
     out: Field | None = None,
 ) -> Field:
-    return _cosine(_lengthened(x, n, axis), (axis,), 2, overwrite_x, workers, out)
+    x = _lengthened(x, n, axis)
+    out = x if overwrite_x else out
+    return ducc0.fft.dct(x, type=2, axes=(axis,), out=out, nthreads=workers or fft.get_workers())
 
 
 def idct(
@@ -64,37 +71,19 @@ def idct(
     workers: int | None = None,
     out: Field | None = None,
 ) -> Field:
-    return _cosine(_lengthened(x, n, axis), (axis,), 3, overwrite_x, workers, out)
+    x = _lengthened(x, n, axis)
+    out = x if overwrite_x else out
+    return ducc0.fft.dct(x, type=3, axes=(axis,), inorm=2, out=out, nthreads=workers or fft.get_workers())
 
 
 def dctn(x: Field, workers: int | None = None) -> Field:
-    return _cosine(x, (0, 1), 2, False, workers)
+    return ducc0.fft.dct(x, type=2, axes=(0, 1), nthreads=workers or fft.get_workers())
 
 
 def idctn(x: Field, s: tuple[int, int], overwrite_x: bool = False, workers: int | None = None) -> Field:
     assert x.shape == s
-    return _cosine(x, (0, 1), 3, overwrite_x, workers)
-
-
-def _complex(x: Field, axis: int, forward: bool, overwrite: bool, workers: int | None) -> Field:
-    norm = 0 if forward else 2
-    out = x if overwrite else None
-    return ducc0.fft.c2c(x, axes=(axis,), forward=forward, inorm=norm, out=out, nthreads=_threads(workers))
-
-
-def _real(
-    x: Field, axes: tuple[int, ...], n: int, overwrite: bool, workers: int | None, out: Field | None = None
-) -> Field:
-    given = {"forward": False, "inorm": 2, "allow_overwriting_input": overwrite, "nthreads": _threads(workers)}
-    return ducc0.fft.c2r(x, axes=axes, lastsize=n, out=out, **given)
-
-
-def _cosine(
-    x: Field, axes: tuple[int, ...], kind: int, overwrite: bool, workers: int | None, out: Field | None = None
-) -> Field:
-    norm = 0 if kind == 2 else 2
-    out = x if overwrite else out
-    return ducc0.fft.dct(x, type=kind, axes=axes, inorm=norm, out=out, nthreads=_threads(workers))
+    out = x if overwrite_x else None
+    return ducc0.fft.dct(x, type=3, axes=(0, 1), inorm=2, out=out, nthreads=workers or fft.get_workers())
 
 
 def _lengthened(x: Field, n: int | None, axis: int) -> Field:
@@ -106,7 +95,3 @@ def _lengthened(x: Field, n: int | None, axis: int) -> Field:
     longer = np.zeros(shape, x.dtype)
     longer[tuple(slice(length) for length in x.shape)] = x
     return longer
-
-
-def _threads(workers: int | None) -> int:
-    return fft.get_workers() if workers is None else workers

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -113,8 +112,7 @@ def approach_under_load(
 _ROUNDING = 8 * float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
-class Certificate:
+class Certificate(NamedTuple):
     """What is known of a pressure.
 
     Attributes
@@ -294,5 +292,6 @@ def _of_next_step(problem: ContactProblem, pressure: Array, contact: Cells, disp
     residual -= level
     amiss = 0.0 if problem.load is not None else abs(float(residual.sum())) / separation.size
     uniform = stiffness(problem, contact, separation) * amiss if amiss else 0.0
-    step = float(np.abs(problem.preconditioned(residual, free_set)).sum()) / problem.influence.scale
+    change = problem.influence.approximate_pressure(residual, free_set)
+    step = float(np.abs(change - problem.excess(change)).sum()) / problem.influence.scale
     return (step + uniform) / load

@@ -100,8 +100,12 @@ class ContactProblem:
             assert approach is not None
             length = approach - lowest
             unit = length / (operator.self_influence or operator.spacing[0])
-        blockwise(np.subtract, gap, lowest, out=gap, threads=operator.threads)
-        blockwise(np.divide, gap, length, out=gap, threads=operator.threads)
+
+        def over_length(here: Array) -> None:
+            here -= lowest
+            here /= length
+
+        blockwise(over_length, gap, threads=operator.threads)
         target = math.nan if approach is None else 1.0
         known = load is None and not operator.definite and present is None
         return cls(
@@ -197,28 +201,20 @@ class ContactProblem:
         # the parts go as they are joined
         return FreeSet(*(concatenate(parts.pop(0), threads) for _ in range(3)))
 
-    def tangent(self, vector: Array) -> Array:
-        """Part of a vector on the free set that keeps a given load, in its place."""
-        if self.load is not None:
-            threads = self.influence.threads
-            mean = total(vector, threads) / vector.size
-            blockwise(np.subtract, vector, mean, out=vector, threads=threads)
-        return vector
-
-    def preconditioned(self, residual: Array, free_set: Cells) -> Array:
-        """About the change of pressure that a residual asks for, but for the scale; keeps a given load."""
-        return self.tangent(self.influence.approximate_pressure(residual, free_set))
+    def excess(self, vector: Array) -> float:
+        """What to take off each value of a vector on the free set, so that it keeps a given load."""
+        return 0.0 if self.load is None else total(vector, self.influence.threads) / vector.size
 
     def precondition(self, residual: Array, free_set: Cells, pressure: Array, energy: float) -> tuple[Array, float]:
-        """The same by both levels of the preconditioner where the second pays, and how cautious to be of its size.
+        """About the change of pressure that a residual asks for, but for the scale, and how cautious to be of its size.
 
-        ``pressure`` is that on the free set so far, and ``energy`` is ``p.Kp``.
+        By both levels of the preconditioner where the second pays. ``pressure`` is that on the free set so far, and
+        ``energy`` is ``p.Kp``.
         """
         waves = LongWaves.of(self.influence, free_set, pressure, energy)
         if waves is None:
-            return self.preconditioned(residual, free_set), 1.0
-        cells = partial(self.influence.approximate_pressure, cells=free_set)
-        return self.tangent(waves.preconditioned(residual, cells)), CAUTION
+            return self.influence.approximate_pressure(residual, free_set), 1.0
+        return waves.preconditioned(residual, partial(self.influence.approximate_pressure, cells=free_set)), CAUTION
 
     def initial_iterate(self, start: Array | None, displacement: Array | None) -> tuple[Array, Array | None]:
         """Admissible pressure near a first guess, and its displacement where that of the guess is known."""
@@ -229,8 +225,12 @@ class ContactProblem:
                 pressure = np.where(self.gap < self.target, self.target - self.gap, 0.0)
         else:
             pressure = start
-            blockwise(np.maximum, pressure, 0.0, out=pressure, threads=threads)
-            blockwise(np.divide, pressure, self.unit, out=pressure, threads=threads)
+
+            def over_unit(here: Array) -> None:
+                np.maximum(here, 0, out=here)
+                here /= self.unit
+
+            blockwise(over_unit, pressure, threads=threads)
         if self.present is not None:
             pressure = np.where(self.present, pressure, 0.0)
         factor = 1.0 if self.load is None else self.load / total(pressure.reshape(-1), threads)

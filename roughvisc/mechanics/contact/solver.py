@@ -34,8 +34,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,7 @@ from roughvisc.mechanics.arrays import (
     regather,
     reused,
     scatter,
+    sum_over,
     summed,
     total,
 )
@@ -205,7 +206,8 @@ def solve_contact(
             None if start_displacement is None else np.array(start_displacement, dtype=float, order="C")
         )
     with reused():
-        if load is not None and present is None and (start is None or not any_positive(start)):
+        wide = min(gap.shape) >= _COARSE_FROM
+        if wide and load is not None and present is None and (start is None or not any_positive(start)):
             start, start_displacement = coarse_guess(operator, gap, load), None
         problem = ContactProblem.scaled(
             operator, gap, load=load, approach=approach, tolerance=tolerance, present=present
@@ -259,7 +261,7 @@ def pcg(
             continue
         if iteration == 0:
             far = certificate.duality_gap > _FAR * problem.tolerance * certificate.energy
-            search = replace(search, single=far and problem.gap.size >= _SINGLE_FROM)
+            search = search._replace(single=far and problem.gap.size >= _SINGLE_FROM)
         search = search.after(certificate.duality_gap)
 
         # 2. Choose a trial on the cells in contact or penetrating: a conjugate one, or the projected gradient.
@@ -300,11 +302,10 @@ def pcg(
     if estimate_error:
         error = estimated_error(problem, iterate.pressure, iterate.contact, iterate.displacement, certificate, asked)
     converged = certificate.converged or (settled and not certificate.hopeless)
-    return in_own_units(problem, iterate, replace(certificate, converged=converged), iteration, error)
+    return in_own_units(problem, iterate, certificate._replace(converged=converged), iteration, error)
 
 
-@dataclass(frozen=True)
-class Iterate:
+class Iterate(NamedTuple):
     """A pressure on the way.
 
     Attributes
@@ -323,8 +324,7 @@ class Iterate:
     approximate: bool
 
 
-@dataclass(frozen=True)
-class Search:
+class Search(NamedTuple):
     """How the next step is chosen.
 
     Attributes
@@ -354,8 +354,7 @@ class Search:
         return Search(self.step_length, self.spacer, self.single, self.best, self.since + 1)
 
 
-@dataclass(frozen=True)
-class SearchTrial:
+class SearchTrial(NamedTuple):
     """A pressure to try on the free set.
 
     Attributes
@@ -379,8 +378,7 @@ class SearchTrial:
     asked: float = math.nan
 
 
-@dataclass(frozen=True)
-class SearchStep:
+class SearchStep(NamedTuple):
     """A trial whose displacement is known.
 
     Attributes
@@ -443,8 +441,8 @@ def forget(
 ) -> tuple[Iterate, Search]:
     """After a trial that does not descend: drop what is not exact, then the history, then the preconditioner too."""
     if iterate.approximate:
-        return with_exact_displacement(problem, iterate), replace(search, single=False)
-    return iterate, replace(search, spacer=previous is None, step_length=1 / problem.influence.scale)
+        return with_exact_displacement(problem, iterate), search._replace(single=False)
+    return iterate, search._replace(spacer=previous is None, step_length=1 / problem.influence.scale)
 
 
 def conjugate_gradient(
@@ -476,18 +474,35 @@ def conjugate_gradient(
     measured : bool
         Whether to measure the change that the preconditioner asks for.
     """
-    threads = problem.influence.threads
+    influence, threads = problem.influence, problem.influence.threads
     free_set, residual, held = free
     reference = level if problem.load is None else total(residual, threads) / residual.size
     blockwise(np.subtract, residual, reference, out=residual, threads=threads)
     direction, caution = problem.precondition(residual, free_set, held, energy)
-    asked = (
-        caution * sum(blockwise(lambda here: summed(np.abs(here)), direction, threads=threads))
-        if measured
-        else math.nan
-    )
+    excess = problem.excess(direction)
+
+    def keep_load(here: Array, cells: Cells) -> tuple[float, float]:
+        here -= excess
+        along = 0.0 if previous is None else summed(here * (response.take(cells) * unit))
+        return summed(np.abs(here)) if measured else math.nan, along
+
     if previous is not None:
-        direction = _conjugate(problem, direction, residual, free_set, previous)
+        response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
+    size, beta = map(sum, zip(*blockwise(keep_load, direction, free_set, threads=threads), strict=True))
+
+    # Conjugate to the previous step, if the direction descends still.
+    if previous is not None and beta > 0:
+        former = regather(previous.change, previous.free_set, free_set, influence.size, threads)
+        mean = problem.excess(former)
+
+        def conjugate(here: Array, there: Array, downhill: Array) -> float:
+            here -= mean
+            here *= beta
+            np.subtract(there, here, out=here)
+            return summed(downhill * here)
+
+        if sum_over(conjugate, former, direction, residual, threads=threads) > 0:
+            direction = former
     trial = direction  # in whose memory the trial is made
 
     def move(here: Array, before: Array) -> float:
@@ -496,7 +511,7 @@ def conjugate_gradient(
         np.maximum(here, 0, out=here)  # in the manner of Polonsky and Keer: cut at zero, then scaled to the load
         return summed(here)
 
-    carried = sum(blockwise(move, trial, held, threads=threads))
+    carried = sum_over(move, trial, held, threads=threads)
     scale = 1.0 if problem.load is None else problem.load / carried
     change = np.empty_like(trial)
 
@@ -505,34 +520,8 @@ def conjugate_gradient(
         np.subtract(here, before, out=by)
         return summed(by * downhill)
 
-    slope = sum(blockwise(scale_to_load, trial, held, change, residual, threads=threads))
-    return SearchTrial(free_set, held, trial, change, slope, asked)
-
-
-def _conjugate(
-    problem: ContactProblem, direction: Array, residual: Array, free_set: Cells, previous: SearchStep
-) -> Array:
-    """Search direction conjugate to the previous step, if it descends still."""
-    influence, threads = problem.influence, problem.influence.threads
-    response, unit = previous.displacement.reshape(-1), previous.unit / previous.curvature
-
-    def product(here: Array, cells: Cells) -> float:
-        return summed(here * (response.take(cells) * unit))
-
-    beta = sum(blockwise(product, direction, free_set, threads=threads))
-    if beta > 0:
-        former = regather(previous.change, previous.free_set, free_set, influence.size, threads)
-        mean = 0.0 if problem.load is None else total(former, threads) / former.size
-
-        def conjugate(here: Array, there: Array, downhill: Array) -> float:
-            here -= mean
-            here *= beta
-            np.subtract(there, here, out=here)
-            return summed(downhill * here)
-
-        if sum(blockwise(conjugate, former, direction, residual, threads=threads)) > 0:
-            return former
-    return direction
+    slope = sum_over(scale_to_load, trial, held, change, residual, threads=threads)
+    return SearchTrial(free_set, held, trial, change, slope, caution * size)
 
 
 def projected_gradient(problem: ContactProblem, pressure: Array, displacement: Array, level: float) -> SearchTrial:
@@ -589,7 +578,7 @@ def take_step(
     add_scaled(displacement, response, fraction * unit, threads)
     stepped = Iterate(iterate.pressure, displacement, contact, approximate=search.single)
     if search.spacer:
-        return stepped, replace(search, spacer=False), None
+        return stepped, search._replace(spacer=False), None
     factor = min(max(minimum, _SHRINKAGE), _GROWTH_IF_CUT if cut else _GROWTH)
     search = Search(search.step_length * factor, False, search.single, search.best, search.since)
     return stepped, search, SearchStep(free_set, trial.change, response, unit, curvature) if curvature > 0 else None
@@ -631,9 +620,12 @@ def in_own_units(
     load, approach = total(pressure.reshape(-1), problem.influence.threads), certificate.level
     if problem.load is not None:
         approach = approach_under_load(problem, pressure, iterate.contact, displacement, certificate.level)
-    threads = problem.influence.threads
-    blockwise(np.multiply, pressure, problem.unit, out=pressure, threads=threads)
-    blockwise(np.multiply, displacement, problem.length, out=displacement, threads=threads)
+
+    def unscale(pressure: Array, displacement: Array) -> None:
+        pressure *= problem.unit
+        displacement *= problem.length
+
+    blockwise(unscale, pressure, displacement, threads=problem.influence.threads)
     return ContactState(
         pressure=pressure,
         displacement=displacement,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import Cells, empty, inner, summed, threads_of, weighted
 from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
-from roughvisc.mechanics.materials.models import Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.prony import Prony, by_size, one_less_mean_decay
 
 Array = NDArray[np.float64]
 
@@ -155,15 +155,16 @@ class Modes:
         """``z_n = own z_(n-1) + earlier z_(n-2) + before field_(n-1) + after field_n``, a fluidity last."""
         if rule == "bdf2" and state.earlier is None:
             raise ValueError("the two-step rule needs two states: start with 'linear' or 'euler'")
-        return _coefficients(self.material, step, state.step, rule)
+        return _coefficients(self.material.times, self.material.fluidity, step, state.step, rule)
 
 
 @lru_cache(maxsize=8)
-def _coefficients(material: Prony, step: float, last: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+def _coefficients(
+    times: tuple[float, ...], fluidity: float, step: float, last: float, rule: Rule
+) -> tuple[Array, Array, Array, Array]:
     """Of a step after another: a trial, the state after it and its energies ask for the same ones."""
-    x = step / np.array(material.times)
-    found = _step_coefficients(x, step, last, rule)
-    if material.fluidity:
+    found = _step_coefficients(step / np.array(times), step, last, rule)
+    if fluidity:
         flowing = _flow_coefficients(step, last, rule)
         own, earlier, before, after = (np.append(mode, flow) for mode, flow in zip(found, flowing, strict=True))
         found = own, earlier, before, after
@@ -177,9 +178,8 @@ def _step_coefficients(x: Array, step: float, last: float, rule: Rule) -> tuple[
     zero = np.zeros_like(x)
     if rule == "linear":
         after = one_less_mean_decay(x)
-        large = np.maximum(x, 0.3)
         # the two forms of (1 - (1 + x) exp(-x)) / x each cancel on the other's side
-        before = np.where(x < 0.3, -np.expm1(-x) - after, (1 - (1 + large) * np.exp(-large)) / large)
+        before = by_size(x, 0.3, lambda x: -np.expm1(-x) - after, lambda x: (1 - (1 + x) * np.exp(-x)) / x)
         return np.exp(-x), zero, before, after
     if rule == "right":
         return np.exp(-x), zero, zero, -np.expm1(-x)

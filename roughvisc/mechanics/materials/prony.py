@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -166,13 +167,20 @@ _SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
 
 def one_less_mean_decay(x: ArrayLike) -> Array:
     """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
-    x = np.asarray(x, dtype=float)
-    small = x < 0.3
-    count = np.count_nonzero(small)
+    return by_size(
+        np.asarray(x, dtype=float),
+        0.3,
+        lambda x: np.add.reduce(_SERIES * x[..., None] ** _POWERS, axis=-1),
+        lambda x: 1 + np.expm1(-x) / x,
+    )
+
+
+def by_size(x: Array, limit: float, small: Callable[[Array], Array], large: Callable[[Array], Array]) -> Array:
+    """One form of a function below a limit and another one from there on, each where it is asked for alone."""
+    below = x < limit
+    count = np.count_nonzero(below)
+    if count == below.size:
+        return np.asarray(small(x))
     if count == 0:
-        return np.asarray(1 + np.expm1(-x) / x)
-    series = np.add.reduce(_SERIES * np.minimum(x, 0.3)[..., None] ** _POWERS, axis=-1)
-    if count == small.size:
-        return np.asarray(series)
-    large = np.maximum(x, 0.3)
-    return np.where(small, series, 1 + np.expm1(-large) / large)
+        return np.asarray(large(x))
+    return np.where(below, small(np.minimum(x, limit)), large(np.maximum(x, limit)))

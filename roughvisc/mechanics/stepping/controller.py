@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.arrays import l1_distance
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import STIFF, Rule
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.prony import Prony, by_size
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
 
@@ -81,8 +81,7 @@ class Fading:
         """
         mean = float(np.interp(left, self._ages, self._weights))
         x = step / self._times
-        small, large = np.minimum(x, 0.1), np.maximum(x, 0.1)
-        kick = np.where(x < 0.1, small / 6 * (1 - small / 2), ((large - 2) + (large + 2) * np.exp(-large)) / large**2)
+        kick = by_size(x, 0.1, lambda x: x / 6 * (1 - x / 2), lambda x: ((x - 2) + (x + 2) * np.exp(-x)) / x**2)
         if self._flows:
             kick = np.append(kick, step / 6)
         end = 6 * float(self._driven * np.exp(-self._decays * max(left - step, 0.0)) @ (self._read @ kick))

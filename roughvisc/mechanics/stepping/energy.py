@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.arrays import inner, summed
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import Rule
-from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.prony import by_size, one_less_mean_decay
 from roughvisc.mechanics.sparse import Sparse
 
 Array = NDArray[np.float64]
@@ -128,9 +128,10 @@ def after_step(
         stored = energy.stored + glassy * (last - energy.pressure)
         crossing = area * memory.products(state.modes, end[1], cells, pressure)
         return replace(energy, stored=stored, pressure=last, beside=crossing)
-    count, first = len(memory.material.times), energy.pressure
-    weights, *coefficients = (c[:count] for c in (memory.weights, *memory.coefficients(state, step, rule)))
-    own, earlier, before, after = coefficients
+    weights, (own, earlier, before, after) = memory.weights, memory.coefficients(state, step, rule)
+    if memory.material.fluidity:  # it comes last
+        weights, own, earlier, before, after = (each[:-1] for each in (weights, own, earlier, before, after))
+    first = energy.pressure
     ahead = area * memory.products(state.modes, end[1], cells, pressure)  # <p_n+1, z_n>
     behind = np.zeros_like(ahead)
     if rule == "bdf2" and state.earlier is not None:
@@ -152,7 +153,7 @@ def after_step(
         lag = first - 2 * energy.beside + energy.own  # <w, w> with w = p_n - z_n; d = p_n+1 - p_n
         drift = both - first - ahead + energy.beside  # <w, d>
         change = last - 2 * both + first  # <d, d>
-        of_lag, of_drift, of_change = _lost(memory.material, step)
+        of_lag, of_drift, of_change = _lost(memory.material.times, step)
         exact = weights * (of_lag * lag + of_drift * drift + of_change * change)
         if fresh:
             quick = np.array(memory.material.times) < step
@@ -161,7 +162,7 @@ def after_step(
         else:
             lost = exact
     if rule == "right":
-        lost = weights * _lost(memory.material, step)[0] * (last - 2 * ahead + energy.own)
+        lost = weights * _lost(memory.material.times, step)[0] * (last - 2 * ahead + energy.own)
         flowed = step * last
     elif jumped and rule != "linear":
         lost = weights * (beside - ahead - 0.5 * (squared - energy.own))
@@ -174,9 +175,9 @@ def after_step(
 
 
 @lru_cache(maxsize=8)
-def _lost(material: Prony, step: float) -> tuple[Array, Array, Array]:
+def _lost(times: tuple[float, ...], step: float) -> tuple[Array, Array, Array]:
     """What elements lose in a step, over their compliance: factors of ``<w, w>``, ``<w, d>`` and ``<d, d>``."""
-    x = step / np.array(material.times)
+    x = step / np.array(times)
     mean, twice = one_less_mean_decay(x), one_less_mean_decay(2 * x)
     return x * (1 - twice), 2 * (twice - mean), _both_rises(x, mean, twice)
 
@@ -194,5 +195,9 @@ def _both_rises(x: Array, mean: Array, twice: Array) -> Array:
     x, mean, twice : ndarray, shape (m,)
         Steps over retardation times, and one less the mean decay over one of these and over two.
     """
-    series = np.add.reduce(_SERIES * np.minimum(x, 0.3)[..., None] ** (_ORDERS - 1), axis=-1)
-    return np.where(x < 0.3, series, (2 * mean - twice) / np.maximum(x, 0.3))
+    return by_size(
+        x,
+        0.3,
+        lambda x: np.add.reduce(_SERIES * x[..., None] ** (_ORDERS - 1), axis=-1),
+        lambda x: (2 * mean - twice) / x,
+    )

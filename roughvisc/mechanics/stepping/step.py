@@ -88,9 +88,9 @@ def trial_step(
         raise InputError(f"at {time:g} s a {control} jumps, and the material has no instantaneous compliance")
     area = scene.operator.cell_area
     start, start_displacement = state.first_guess(length) if guess is None else guess
-    blockwise(np.multiply, start, alpha, out=start, threads=threads)
-    if start_displacement is not None:
-        blockwise(np.multiply, start_displacement, alpha, out=start_displacement, threads=threads)
+    for known in (start, start_displacement):
+        if known is not None:
+            blockwise(np.multiply, known, alpha, out=known, threads=threads)
     contact = solve_contact(
         scene.operator,
         gap,
@@ -106,12 +106,10 @@ def trial_step(
     )
     del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
-    if carried is not None:
-        blockwise(np.add, carried, displacement, out=carried, threads=threads)
-    if effective is not None:
-        effective += pressure
-    blockwise(np.divide, pressure, alpha, out=pressure, threads=threads)
-    blockwise(np.divide, displacement, alpha, out=displacement, threads=threads)
+    for found, past in ((pressure, effective), (displacement, carried)):
+        if past is not None:
+            blockwise(np.add, past, found, out=past, threads=threads)
+        blockwise(np.divide, found, alpha, out=found, threads=threads)
     instant = Instant(
         time,
         Sparse.of(pressure),
