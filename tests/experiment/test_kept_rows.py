@@ -104,8 +104,7 @@ def judged(*, soft=False, fixed=None, since=1.0, step=0.5, entered=False, contro
         tolerance=0.1,
         time_step=fixed,
         motions=(),
-        program=SimpleNamespace(duration=7.0),
-        lacks_instantaneous_compliance=lambda length: soft and length == 7.0,
+        is_soft=soft,
     )
     return meets_tolerance(stood(state=state, scene=scene, control=control, **changes), 0.0)
 
