@@ -1,37 +1,31 @@
-"""Leak rates a second, and the direct solver against algebraic multigrid.
+"""Time and memory of a leak rate, by each solver and by the independent program reynoldsflow.
 
     python workflows/benchmarks/leakage.py [CELLS ...]
 
 The gap of a rough surface on an elastic body, out of contact and with a few parts of the area in contact, on 512
-squared cells unless other numbers are given. In processor time of one thread: a frame from gap to certified leak rate;
-the equations alone by SciPy's direct solver; and by conjugate gradients on a multigrid hierarchy, Ruge-Stueben and
-smoothed aggregation, to the same residual, where pyamg is installed (`pip install pyamg`).
+squared cells unless other numbers are given, between walls. Each solver has a process of its own, which goes from the
+gap to the conductance: `factors` and `dissection` of this package, with bounds that close; and reynoldsflow
+(`pip install reynoldsflow`), without. Printed are processor and wall time, the memory that it took beyond what was
+there before. Conductances of the two agree to rounding; reynoldsflow has whole cells between its sides and the first
+centres, where this package has half ones.
 """
 
+import multiprocessing
+import resource
 import sys
 import time
-from functools import partial
 
 import numpy as np
-from scipy import sparse
-
-import roughvisc as rv
-from roughvisc.mechanics.transport import flow as solver
-from roughvisc.mechanics.transport.network import faces_of, network_of
-
-try:
-    import pyamg
-except ImportError:
-    pyamg = None
 
 SIDE, SLOPE, SHEAR_MODULUS = 1e-3, 0.1, 1e6
 #: Nominal pressure over contact modulus and slope -> about twice the part of the area in contact.
 PRESSURES = (0.0, 0.05, 0.12, 0.2)
-RESIDUAL, MOST = 1e-12, 300
 
 
 def gaps(cells):
     """Part of the area in contact, and the gap. [m]"""
+    import roughvisc as rv
+
     shape = {"hurst": 0.8, "rms_slope": SLOPE, "rolloff": SIDE / 4, "shortcut": 8 * SIDE / cells, "seed": 1}
     height = rv.self_affine(SIDE, cells, **shape)
     yield 0.0, height.values.max() + 1e-7 - height.values
@@ -43,60 +37,60 @@ def gaps(cells):
         yield float(ds.contact_fraction[-1]), ds.gap[-1].values
 
 
-def seconds(work):
-    """Processor time of a piece of work, and what it gives."""
-    began = time.process_time()
+def by_this_package(gap, solver):
+    """Conductance by one of the two solvers. [m3]"""
+    from roughvisc.mechanics.transport import flow
+
+    flow._LARGE, flow._OPEN = (0, 0.0) if solver == "dissection" else (np.inf, 1.0)
+    spacing = (SIDE / gap.shape[0], SIDE / gap.shape[1])
+    return lambda: flow.flow(gap, spacing).conductance
+
+
+def by_reynoldsflow(gap):
+    """The same by reynoldsflow, whose numba functions are compiled before."""
+    from reynoldsflow import transport
+
+    def solve(gap):
+        open_, _, flux = transport.solve_fluid_problem(gap, p_west=1.0, p_east=0.0)
+        return transport.compute_total_flux(open_, flux, len(gap))[0] / 12
+
+    gap = np.maximum(gap, 0.0)
+    solve(np.ones((16, 16)))
+    return lambda: solve(gap)
+
+
+def measure(gap, solver, sender):
+    """Send what a solver finds, its times [s] and its memory [MB]."""
+    try:
+        work = by_reynoldsflow(gap) if solver == "reynoldsflow" else by_this_package(gap, solver)
+    except ImportError:
+        sender.send(None)
+        return
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    wall, processor = time.perf_counter(), time.process_time()
     found = work()
-    return time.process_time() - began, found
-
-
-def multigrid(hierarchy, matrix, source):
-    """Iterations to the residual; as many as were allowed where it was not reached."""
-    residuals = []
-    hierarchy(matrix).solve(source, tol=RESIDUAL, accel="cg", maxiter=MOST, residuals=residuals)
-    return len(residuals) - 1
-
-
-def solvers(network):
-    """Name -> processor time [s] and iterations of the equations alone."""
-    scale, _ = solver._factorised(network)
-    matrix = sparse.csr_matrix(equations(network, scale))
-    source = scale * network.entrance
-    took, _ = seconds(lambda: solver._factorised(network)[1].solve(source))
-    yield "direct", took, 0
-    if pyamg is not None:
-        near = (1 / scale)[:, None]
-        kinds = {
-            "Ruge-Stueben": pyamg.ruge_stuben_solver,
-            "smoothed aggregation": partial(pyamg.smoothed_aggregation_solver, B=near),
-        }
-        for name, hierarchy in kinds.items():
-            took, iterations = seconds(partial(multigrid, hierarchy, matrix, source))
-            yield name, took, iterations
-
-
-def equations(network, scale):
-    """The matrix that is factorised."""
-    between = -network.conductance * scale[network.first] * scale[network.second]
-    places = (np.r_[network.first, network.second], np.r_[network.second, network.first])
-    size = (len(scale), len(scale))
-    return sparse.coo_array((np.r_[between, between], places), shape=size) + sparse.eye_array(len(scale))
+    wall, processor = time.perf_counter() - wall, time.process_time() - processor
+    sender.send((found, processor, wall, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e3))
 
 
 def main(*sizes):
+    """Print a row for each gap and solver."""
+    context = multiprocessing.get_context("spawn")
     rows = []
     for cells in sizes or (512,):
         for fraction, gap in gaps(cells):
-            spacing = (SIDE / cells, SIDE / cells)
-            took, found = seconds(partial(solver.flow, gap, spacing, wrap=True))
-            row = {"cells": cells, "contact": fraction, "frame": took, "closed": found.is_closed}
-            if not found.is_closed:
-                row["closes"] = found.upper / found.lower - 1
-                network = network_of(faces_of(gap, spacing, True))
-                row["decades"] = float(np.ptp(np.log10(network.conductance)))
-                row |= {name: (took, iterations) for name, took, iterations in solvers(network)}
-            print(row, flush=True)
-            rows.append(row)
+            for solver in ("factors", "dissection", "reynoldsflow"):
+                receiver, sender = context.Pipe(duplex=False)
+                process = context.Process(target=measure, args=(gap, solver, sender))
+                process.start()
+                found = receiver.recv()
+                process.join()
+                if found is None:
+                    continue
+                row = {"cells": cells, "contact": round(fraction, 3), "solver": solver}
+                row |= dict(zip(("conductance", "processor", "wall", "memory"), found, strict=True))
+                print(row, flush=True)
+                rows.append(row)
     return rows
 
 

@@ -6,11 +6,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from roughvisc.mechanics.transport import dissection
+from roughvisc.mechanics.transport import flow as solvers
 from roughvisc.mechanics.transport.bounds import bounds
 from roughvisc.mechanics.transport.flow import flow, fluxes
 from roughvisc.mechanics.transport.network import faces_of, network_of
 
 CELL = (2e-6, 3e-6)
+
+
+@pytest.fixture(autouse=True, scope="module", params=["factors", "dissection"])
+def solver(request):
+    """Each of the two solvers of the equations; of tiles that small maps too have many of."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solvers, "_LARGE", 0 if request.param == "dissection" else np.inf)
+        patch.setattr(solvers, "_OPEN", 0.0)
+        patch.setattr(dissection, "_LEAF", 2)
+        yield request.param
 
 
 def random_gap(shape, seed=0, open_part=0.7, decades=4.0):
