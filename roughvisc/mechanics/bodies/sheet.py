@@ -174,6 +174,15 @@ class Sheet(Kernel):
         return slope * self.thickness
 
     @property
+    def long_wave_factor(self) -> float:
+        """``S`` of the longest waves: none of them displaces a surface above a rigid base."""
+        return 0.0
+
+    def complement(self, x: ArrayLike) -> Array:
+        """``1 - S`` of waves of so many wave numbers times the thickness, of which nothing is lost."""
+        return complement(x, self.poisson, self.base)
+
+    @property
     def relief(self) -> float:
         """What the base takes off the displacement far inside the thickness, over load and compliance. [1/m]
 

@@ -45,6 +45,7 @@ from roughvisc.mechanics.closed_forms.growing_contact import (
     power_law_ramp,
 )
 from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
+from roughvisc.mechanics.closed_forms.layer import ElasticLayer
 from roughvisc.mechanics.closed_forms.reduction import ContactHistory, reduced_contact
 from roughvisc.mechanics.closed_forms.sheet import OnSheet, PunchOnSheet
 from roughvisc.mechanics.closed_forms.ting import SingleMaximum, ting
@@ -63,6 +64,7 @@ __all__ = [
     "Cone",
     "ContactHistory",
     "ContactRelaxation",
+    "ElasticLayer",
     "FlatPunchContact",
     "GrowingContact",
     "Indenter",

@@ -1,12 +1,12 @@
-r"""Axisymmetric contact with a sheet on a rigid base, by a Fredholm equation.
+r"""Axisymmetric contact with a sheet on a rigid base, or with a layer on a half-space, by a Fredholm equation.
 
 With the Hankel transform of the pressure ``p_q = pi E* int_0^a phi(t) cos(q t) dt`` a contact of radius ``a`` obeys
 
     phi(x) + int_0^a M(x, t) phi(t) dt = (2/pi) (d - g(x)),     M = (2/pi) int_0^inf (S(q h) - 1) cos(q x) cos(q t) dq
 
-with the approach ``d``, the factor ``S`` of the sheet, and the one-dimensional profile ``g`` that the indenter has on a
-half-space. The force is ``pi E* int_0^a phi``. The edge of a smooth indenter is free of pressure: ``phi(a) = 0``
-gives ``d``.
+with the approach ``d``, the factor ``S`` of the sheet or layer, and the one-dimensional profile ``g`` that the indenter
+has on a half-space. The force is ``pi E* int_0^a phi``, with the modulus of the layer. The edge of a smooth indenter is
+free of pressure: ``phi(a) = 0`` gives ``d``.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, complement, panels
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, panels
 from roughvisc.mechanics.closed_forms.indenters import Indenter, positive, punch_pressure
+from roughvisc.mechanics.closed_forms.layer import ElasticLayer
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -32,11 +34,13 @@ Array = NDArray[np.float64]
 _NODES, _NODES_PER_THICKNESS = 40, 12
 # Gauss nodes of a panel of waves, and the phase that it may span.
 _IN_PANEL, _PHASE = 16, 10.0
+# Where a contact on a stiff layer is checked: parts of a quarter circle, from its middle to its edge and on to far off.
+_DISC = (np.arange(40) + 0.5) / 40
 
 
 @dataclass(frozen=True)
 class OnSheet:
-    """An indenter on a sheet, for the solutions that follow from elastic contact alone.
+    """An indenter on a sheet or a layer, for the solutions that follow from elastic contact alone.
 
     The growing contact of Lee and Radok holds on a sheet too. So does the single maximum of Ting, which takes minutes:
     it asks for thousands of radii, and each is a solution of the Fredholm equation. The reduction to independent
@@ -46,8 +50,13 @@ class OnSheet:
     ----------
     indenter : Indenter
         The rigid indenter: a :class:`~roughvisc.mechanics.closed_forms.indenters.Paraboloid` or a ``Cone``.
-    sheet : Sheet
+    sheet : Sheet or ElasticLayer
         What it is pressed on.
+
+    Raises
+    ------
+    InputError
+        If a solution is asked for where the contact is not a disc: a stiff layer bends, and a cone leaves it.
 
     Notes
     -----
@@ -66,7 +75,7 @@ class OnSheet:
     """
 
     indenter: Indenter
-    sheet: Sheet
+    sheet: Sheet | ElasticLayer
 
     def height(self, r: ArrayLike) -> Array:
         """Gap ``f(r)`` to the plane it touches. [m]"""
@@ -126,13 +135,13 @@ class OnSheet:
 @quantities(radius="m")
 @dataclass(frozen=True)
 class PunchOnSheet:
-    """A flat round punch on a sheet.
+    """A flat round punch on a sheet or a layer.
 
     Parameters
     ----------
     radius : float or str
         Radius ``a`` of the punch. [m]
-    sheet : Sheet
+    sheet : Sheet or ElasticLayer
         What it is pressed on.
 
     Examples
@@ -143,7 +152,7 @@ class PunchOnSheet:
     """
 
     radius: Quantity
-    sheet: Sheet
+    sheet: Sheet | ElasticLayer
 
     def __post_init__(self) -> None:
         positive("radius", self.radius, "m")
@@ -227,26 +236,46 @@ def _broadcast(r: ArrayLike, radius: ArrayLike) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=4096)
-def _smooth(indenter: Indenter, sheet: Sheet, radius: float) -> _Contact:
+def _smooth(indenter: Indenter, sheet: Sheet | ElasticLayer, radius: float) -> _Contact:
     """A contact whose edge carries no pressure."""
 
     def profile(x: Array) -> Array:
         return indenter.reduced(x * sheet.thickness) / sheet.thickness
 
-    return _solved(profile, radius, sheet)
+    contact = _solved(profile, radius, sheet)
+    if sheet.long_wave_factor > 1:
+        _check_disc(contact, indenter, sheet)
+    return contact
+
+
+def _check_disc(contact: _Contact, indenter: Indenter, layer: Sheet | ElasticLayer) -> None:
+    """Refuse what a stiff layer does to a cone: it bends out of the contact, or meets the indenter again beyond it."""
+    h, a = layer.thickness, contact.radius
+    inside, outside = a * np.sin(math.pi / 2 * _DISC), a / np.cos(math.pi / 2 * _DISC)
+    pressure = indenter.scaled_pressure(inside * h, a * h) + contact.added_pressure(inside)
+    opening = contact.displacement(outside) - contact.approach + indenter.height(outside * h) / h
+    if pressure.min() < 0 or opening.min() < -1e-6 * contact.approach:
+        raise InputError(
+            f"{indenter!r} on {layer!r} does not touch a disc of radius {a * h:.6g} m: the stiff layer bends, and the "
+            "closed form holds for a disc only; expected a contact that is smaller, or a layer less stiff"
+        )
 
 
 @lru_cache(maxsize=64)
-def _flat(sheet: Sheet, radius: float) -> _Contact:
+def _flat(sheet: Sheet | ElasticLayer, radius: float) -> _Contact:
     return _solved(lambda x: np.zeros_like(x), radius, sheet, approach=1.0)
 
 
-def _solved(profile: Callable[[Array], Array], radius: float, sheet: Sheet, approach: float | None = None) -> _Contact:
+def _solved(
+    profile: Callable[[Array], Array], radius: float, sheet: Sheet | ElasticLayer, approach: float | None = None
+) -> _Contact:
     """The Fredholm equation; without an approach the one for which the edge carries no pressure."""
     nodes, weights = panels(1, radius, _NODES + int(_NODES_PER_THICKNESS * radius))
-    count = math.ceil(2 * SHORTEST_WAVE * max(radius, 1.0) / _PHASE)
+    count = math.ceil(2 * SHORTEST_WAVE * max(radius, 2.0) / _PHASE)
     waves, wave_weights = panels(count, SHORTEST_WAVE, _IN_PANEL)
-    lost = 2 / math.pi * wave_weights * complement(waves, sheet.poisson, sheet.base)
+    if sheet.long_wave_factor > 1:  # a stiff layer gives way by x^-3 down to waves that feel the base alone
+        waves, wave_weights = _graded(waves, wave_weights, math.ceil(math.log2(sheet.long_wave_factor)))
+    lost = 2 / math.pi * wave_weights * sheet.complement(waves)
     cosines = np.cos(np.outer(nodes, waves))
     matrix = np.eye(nodes.size) - (cosines * lost) @ cosines.T * weights
     sides = 2 / math.pi * np.stack([np.ones_like(nodes), profile(nodes)], axis=1)
@@ -261,3 +290,12 @@ def _solved(profile: Callable[[Array], Array], radius: float, sheet: Sheet, appr
     density = weights * (approach * of_approach - of_profile)
     force = math.pi * float(density.sum())
     return _Contact(radius, approach, profile, force, waves, lost * (density @ cosines))
+
+
+def _graded(waves: Array, weights: Array, halvings: int) -> tuple[Array, Array]:
+    """The same nodes and weights, their first panel halved towards zero so many times."""
+    at, weight, rest = waves[:_IN_PANEL], weights[:_IN_PANEL], slice(_IN_PANEL, None)
+    side = float(weight.sum())
+    ends = np.append(0.0, side * 0.5 ** np.arange(halvings, -1, -1))[:, None]
+    finer = (ends[:-1] + np.diff(ends, axis=0) * at / side).ravel(), (np.diff(ends, axis=0) * weight / side).ravel()
+    return np.append(finer[0], waves[rest]), np.append(finer[1], weights[rest])

@@ -54,15 +54,24 @@ def settled(matrix, gap, total, active, most):
 
 
 def dense(height, material, speed, load, start=None):
-    """The same equations of a line contact by dense matrices and active sets: pressure of the cells. [Pa]
+    """The same equations of a line contact on a half-space: pressure of the cells. [Pa]"""
 
-    ``g + K p >= delta`` with equality where ``p > 0``. Where the set does not settle at once, the skew part of the
+    def symbol(q):
+        return 2 / np.abs(q) * complex_compliance(material, -q * speed)
+
+    return dense_on_body(height, symbol, load, start)
+
+
+def dense_on_body(height, symbol, load, start=None):
+    """Line contact on any body by dense matrices and active sets: pressure of the cells. [Pa]
+
+    ``g + K p >= delta`` with equality where ``p > 0``, and ``K`` of complex displacements over pressure, `symbol`, of
+    wave numbers along the motion, that of zero left out. Where the set does not settle at once, the skew part of the
     matrix is added in steps, each of which begins with the contact of the one before.
     """
     n = len(height)
     q = 2 * np.pi * np.fft.fftfreq(n, PERIOD / n)
-    symbol = np.zeros(n, complex)
-    symbol[1:] = 2 / np.abs(q[1:]) * complex_compliance(material, -q[1:] * speed)
+    symbol = np.append(0j, symbol(q[1:]))
     if n % 2 == 0:
         symbol[n // 2] = symbol[n // 2].real
     gap, total = height.max() - height, load / (PERIOD / n) ** 2

@@ -1,0 +1,296 @@
+"""A layer on a half-space: the equations of elasticity, published solutions, limits, and contact on it."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from layered import (
+    GrowingOnLayer,
+    creep_of_wave,
+    elastic_factor,
+    inverted,
+    laplace_compliance,
+    layered_compliance,
+    relaxation_of_wave,
+)
+from scipy.special import j0
+
+import roughvisc as rv
+from roughvisc.mechanics.bodies.sheet import reduction
+from roughvisc.mechanics.closed_forms import (
+    Cone,
+    ElasticLayer,
+    OnSheet,
+    Paraboloid,
+    PunchOnSheet,
+    Sheet,
+    StepLoad,
+    full_contact_wave,
+)
+from roughvisc.mechanics.closed_forms import sheet as sheet_module
+from roughvisc.mechanics.closed_forms.layer import layer_complement, layer_factor
+
+POISSON = [(0.0, 0.3), (0.3, 0.3), (0.4, 0.5), (0.5, 0.5), (0.5, 0.0)]
+SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(5e6, 5e6, 3e6, 0.3)
+
+
+@pytest.mark.parametrize(("poisson", "base_poisson"), POISSON)
+@pytest.mark.parametrize("ratio", [1e-4, 0.1, 3.0, 1e4, 0.3 + 0.5j, 20 - 40j])
+def test_factor__solves_the_equations_of_elasticity(poisson, base_poisson, ratio):
+    x = np.array([1e-6, 0.01, 0.3, 0.49, 0.51, 2.0, 7.0])
+    exact = [elastic_factor(one, poisson, base_poisson, ratio) for one in x]
+    np.testing.assert_allclose(layer_factor(x, poisson, base_poisson, ratio), exact, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("poisson", "base_poisson"), POISSON)
+@pytest.mark.parametrize("ratio", [1e-12, 1e-4, 0.5, 3.0, 1e8])
+def test_factor__loses_nothing_to_cancellation(poisson, base_poisson, ratio):
+    """Against the equation as published, at high precision; the base nearly rigid, or the layer nearly a plate."""
+    for x in (1e-9, 1e-3, 0.2, 0.6, 4.0, 30.0):
+        with mp.workdps(60):
+            k, base_k, mu, e = (
+                3 - 4 * mp.mpf(poisson),
+                3 - 4 * mp.mpf(base_poisson),
+                mp.mpf(ratio),
+                mp.exp(-2 * mp.mpf(x)),
+            )
+            l, m = (mu * base_k - k) / (mu * base_k + 1), (mu - 1) / (mu + k)
+            exact = (1 + 4 * m * x * e - l * m * e**2) / (1 - (l + m + 4 * m * mp.mpf(x) ** 2) * e + l * m * e**2)
+        assert float(layer_factor(x, poisson, base_poisson, ratio)) == pytest.approx(float(exact), rel=5e-15)
+        if abs(1 - exact) > 1e-9:
+            assert float(layer_complement(x, poisson, base_poisson, ratio)) == pytest.approx(
+                float(1 - exact), rel=1e-14
+            )
+
+
+def test_factor__of_materials_that_keep_their_volume_is_burmisters():
+    """J. Appl. Phys. 16 (1945) 89: one parameter, N = (1 - n) / (1 + n) with the ratio n of base to layer."""
+    m, n = np.array([0.05, 0.4, 1.0, 3.0]), 0.2
+    big_n, e = (1 - n) / (1 + n), np.exp(-2 * m)
+    burmister = (1 + 4 * big_n * m * e - big_n**2 * e**2) / (1 - 2 * big_n * (1 + 2 * m**2) * e + big_n**2 * e**2)
+    np.testing.assert_allclose(layer_factor(m, 0.5, 0.5, 1 / n), burmister, rtol=1e-13)
+
+
+def test_limits__of_the_factor():
+    x = np.geomspace(1e-6, 30, 40)
+    for nu in (0.0, 0.3, 0.5):
+        np.testing.assert_array_equal(layer_complement(x, nu, nu, 1.0), 0, "equal materials: a half-space")
+        np.testing.assert_allclose(layer_factor(x, nu, nu, 1.0), 1, rtol=1e-15)
+        for base_nu in (0.2, 0.5):
+            np.testing.assert_allclose(layer_factor(x, nu, base_nu, 1e-300), reduction(x, nu, "bonded"), rtol=1e-15)
+            for ratio in (0.01, 100.0):
+                long = ratio * (1 - base_nu) / (1 - nu)
+                assert float(layer_factor(0.0, nu, base_nu, ratio)) == pytest.approx(long, rel=1e-15)
+                assert ElasticLayer(1.0, nu, base_nu, ratio).long_wave_factor == pytest.approx(long, rel=1e-15)
+                assert float(layer_factor(1e9, nu, base_nu, ratio)) == pytest.approx(1, rel=2e-15)
+                assert float(layer_complement(1e9, nu, base_nu, ratio)) == 0
+
+
+def test_stiff_layer__bends_like_a_plate_on_its_base():
+    """p = (D q^4 + 4 (1 - nu2) / (3 - 4 nu2) G2 q) u, a base that cannot spread, with the bending stiffness D.
+
+    Short of the next order in q h.
+    """
+    errors = []
+    for ratio in (1e4, 1e7):
+        x = (2 / ratio) ** (1 / 3)  # where both give way by about as much
+        modulus = 2 * ratio / (1 - 0.3)
+        plate = modulus / 12 * x**4 + 4 * (1 - 0.4) / (3 - 4 * 0.4) * x  # D = E* h^3 / 12
+        errors.append(abs(float(layer_factor(x, 0.3, 0.4, ratio)) * 2 / (modulus * x) * plate - 1))
+    assert errors[0] < 0.1
+    assert math.log(errors[0] / errors[1], 1e3) > 0.3
+
+
+# --------------------------------------------------------------------------------------------------------------
+# contact
+
+
+def gao(thickness_over_radius):
+    """H. Gao, C.-H. Chiu, J. Lee, Int. J. Solids Struct. 29 (1992) 2471: the share of the layer in the stiffness."""
+    x = thickness_over_radius
+    logarithm = math.log((1 + x**2) / x**2)
+
+    def share(nu):
+        bent = (1 - 2 * nu) * x * logarithm - x / (1 + x**2)
+        return 2 / math.pi * math.atan(x) + bent / (2 * math.pi * (1 - nu))
+
+    return share, 2 / math.pi * math.atan(x) + x / math.pi * logarithm
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+@pytest.mark.parametrize("wide", [0.2, 1.0, 5.0])
+def test_punch__on_a_layer_of_nearly_the_bases_modulus_is_gaos(poisson, wide):
+    """Exact in the first order of the difference: what is left is of second order."""
+    share = gao(1 / wide)[0](poisson)
+    left = []
+    for more in (0.02, 0.01):
+        punch = PunchOnSheet(wide, ElasticLayer(1.0, poisson, poisson, 1 + more))
+        stiffness = punch.scaled_stiffness / (2 * wide) * (1 + more)  # over the base's contact modulus
+        left.append(abs(stiffness - 1 - more * share))
+    assert left[0] < 0.1 * 0.02 * share
+    assert math.log2(left[0] / left[1]) == pytest.approx(2, abs=0.05)
+
+
+@pytest.mark.parametrize("wide", [0.3, 1.0, 4.0])
+def test_punch__on_a_layer_of_nearly_the_bases_poissons_ratio_is_gaos(wide):
+    left = []
+    for less in (0.02, 0.01):
+        punch = PunchOnSheet(wide, ElasticLayer(1.0, 0.3 - less, 0.3, 1.0))
+        stiffness = punch.scaled_stiffness / (2 * wide) * (1 - 0.3) / (1 - 0.3 + less)
+        left.append(abs(1 / stiffness - 1 - less * gao(1 / wide)[1] / 0.7))
+    assert left[0] < 0.1 * 0.02
+    assert math.log2(left[0] / left[1]) == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("wide", [0.1, 3.0])
+def test_contact__on_limits_of_a_layer(wide):
+    same, rigid = ElasticLayer(0.7, 0.4, 0.4, 1.0), ElasticLayer(0.7, 0.4, 0.2, 1e-14)
+    a, sheet = 0.7 * wide, Sheet(0.7, 0.4)
+    for indenter in (Paraboloid(10.0), Cone(0.1)):
+        assert float(OnSheet(indenter, same).scaled_force(a)) == pytest.approx(
+            float(indenter.scaled_force(a)), rel=1e-12
+        )
+        assert float(OnSheet(indenter, same).reduced(a)) == pytest.approx(float(indenter.reduced(a)), rel=1e-12)
+        force, depth = OnSheet(indenter, sheet).scaled_force(a), OnSheet(indenter, sheet).reduced(a)
+        assert float(OnSheet(indenter, rigid).scaled_force(a)) == pytest.approx(float(force), rel=1e-10)
+        assert float(OnSheet(indenter, rigid).reduced(a)) == pytest.approx(float(depth), rel=1e-10)
+
+
+@pytest.mark.parametrize("ratio", [0.4, 3.0])
+def test_contact__on_thin_and_thick_layers_tends_to_that_on_one_material(ratio):
+    """First order in the thickness over the radius, nearly, or in the inverse."""
+    ball, a, poisson, base_poisson = Paraboloid(10.0), 0.5, 0.3, 0.4
+    errors = {"thick": [], "thin": []}
+    for far in (8.0, 16.0):
+        thick = OnSheet(ball, ElasticLayer(far * a, poisson, base_poisson, ratio))
+        errors["thick"].append(float(thick.reduced(a) / ball.reduced(a)) - 1)
+        thin = ElasticLayer(a / far, poisson, base_poisson, ratio)
+        of_base = float(ball.scaled_force(a)) / thin.long_wave_factor
+        errors["thin"].append(float(OnSheet(ball, thin).scaled_force(a)) / of_base - 1)
+    for name, (one, other) in errors.items():
+        assert abs(one) < 0.3, name
+        assert 0.6 < math.log2(abs(one / other)) < 1.1, name
+
+
+@pytest.mark.parametrize("ratio", [0.01, 0.3, 100.0])
+@pytest.mark.parametrize("wide", [0.1, 1.0, pytest.param(10.0, marks=pytest.mark.thorough)])
+def test_fredholm__converges_as_gauss_quadrature_does(ratio, wide, monkeypatch):
+    """Faster than any power of the number of nodes, and 1e-10 with those of the package."""
+
+    def solved(nodes, more, in_panel):
+        monkeypatch.setattr(sheet_module, "_NODES", nodes)
+        monkeypatch.setattr(sheet_module, "_NODES_PER_THICKNESS", more)
+        monkeypatch.setattr(sheet_module, "_IN_PANEL", in_panel)
+        for cached in (sheet_module._smooth, sheet_module._flat):
+            cached.cache_clear()
+        layer = ElasticLayer(1.0, 0.5, 0.3, ratio)
+        ball = OnSheet(Paraboloid(10.0), layer)
+        return np.array([ball.scaled_force(wide), ball.reduced(wide), PunchOnSheet(wide, layer).scaled_stiffness])
+
+    settings = (sheet_module._NODES, sheet_module._NODES_PER_THICKNESS, sheet_module._IN_PANEL)
+    exact = solved(80, 24, 32)
+    rough, half, whole = (np.abs(solved(*at) / exact - 1).max() for at in ((5, 3, 4), (10, 6, 8), settings))
+    assert whole < 1e-10
+    assert half < max(1e-2 * rough, 1e-10)
+    for cached in (sheet_module._smooth, sheet_module._flat):
+        cached.cache_clear()
+
+
+@pytest.mark.parametrize("ratio", [0.02, 5.0, 100.0])
+@pytest.mark.parametrize("radius", [0.2, 2.5])
+def test_pressure__carries_the_force_and_displaces(ratio, radius):
+    layer = ElasticLayer(1.0, 0.4, 0.3, ratio)
+    contact = OnSheet(Paraboloid(10.0), layer)
+    nodes, weights = np.polynomial.legendre.leggauss(160)
+    u = (1 - nodes) / 2
+    r, area = radius * (1 - u**2), 2 * np.pi * radius**2 * (1 - u**2) * u * weights
+    pressure = contact.scaled_pressure(r, radius)
+    assert (pressure > 0).all()
+    assert float(pressure @ area) == pytest.approx(float(contact.scaled_force(radius)), rel=1e-5)
+    q = (np.arange(8000) + 0.5) * 0.01 / radius
+    spectrum = np.array([float((pressure * area) @ j0(one * r)) for one in q])
+    at = radius * np.array([0.0, 0.6, 1.2, 3.0])
+    found = [float(np.sum(layer.factor(q) * spectrum * j0(q * one))) * (q[1] - q[0]) / np.pi for one in at]
+    np.testing.assert_allclose(contact.displacement(at, radius), found, atol=1e-3 * found[0])
+
+
+def test_cone__that_a_stiff_layer_leaves_is_refused():
+    """Its bending lifts the surface off the sides; on a ball of the same radius it does not."""
+    layer = ElasticLayer(1.0, 0.5, 0.3, 100.0)
+    OnSheet(Paraboloid(100.0), layer).scaled_force(3.0)
+    OnSheet(Cone(0.1), layer).scaled_force(1.0)
+    for ask in ("scaled_force", "reduced"):
+        with pytest.raises(rv.InputError, match=r"Cone\(slope=0.1\) on ElasticLayer.*not touch a disc of radius 3 m"):
+            getattr(OnSheet(Cone(0.1), layer), ask)(3.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((0.0, 0.3, 0.3, 1.0), "thickness is 0.0: expected a positive number"),
+        ((1.0, 0.6, 0.3, 1.0), "poisson is 0.6: expected 0 to 1/2"),
+        ((1.0, 0.3, -0.1, 1.0), "base_poisson is -0.1: expected 0 to 1/2"),
+        ((1.0, 0.3, 0.3, math.inf), "modulus_ratio is inf: expected a positive number"),
+    ],
+)
+def test_bad_values__are_named(values, message):
+    with pytest.raises(rv.InputError, match=message):
+        ElasticLayer(*values)
+
+
+# --------------------------------------------------------------------------------------------------------------
+# creep: the oracles of the tests of the body
+
+
+def test_inversion__knows_a_pair():
+    t = np.array([0.01, 1.0, 30.0])
+    np.testing.assert_allclose(inverted(lambda s: 1 / (s * (1 + s * 0.4)), t), -np.expm1(-t / 0.4), rtol=1e-8)
+    np.testing.assert_allclose(inverted(lambda s: s**-1.3, t), t**0.3 / math.gamma(1.3), rtol=1e-8)
+
+
+@pytest.mark.parametrize("x", [0.01, 1.0, 10.0])
+def test_inversion__agrees_with_that_of_mpmath(x):
+    def transform(s):
+        return mp.mpmathify(complex(layered_compliance(x, complex(s), SOFT, STIFF, 1.0) / complex(s)))
+
+    for t in (0.02, 0.5, 5.0):
+        exact = float(mp.invertlaplace(transform, t, method="talbot", degree=18))
+        assert float(creep_of_wave(x, SOFT, STIFF, 1.0, t)) == pytest.approx(exact, rel=1e-8)
+
+
+def test_creep_and_relaxation__of_a_wave_on_one_material():
+    t, q = np.array([0.1, 0.5, 2.0]), 3.0
+    compliance = np.asarray(SOFT.contact_compliance(t))
+    np.testing.assert_allclose(creep_of_wave(q, SOFT, SOFT, 1.0, t), 2 / q * compliance, rtol=1e-8)
+    np.testing.assert_allclose(relaxation_of_wave(q, SOFT, SOFT, 1.0, t), full_contact_wave(1.0, q, SOFT, t), rtol=1e-8)
+    assert float(laplace_compliance(SOFT, 1e30)) == SOFT.glassy
+
+
+def profile(x):
+    return np.asarray(x) ** 2 / 100.0
+
+
+def test_growing_contact__on_moduli_that_creep_alike_is_that_of_lee_and_radok():
+    """Of one time function the march is exact, whatever the steps; so is the closed form with the ratio of moduli."""
+    alike, times = rv.zener(4e6, 12e5, 4e5, 0.3), np.append(0, np.geomspace(0.01, 2, 6))
+    for base, layer in ((SOFT, ElasticLayer(1.0, 0.4, 0.4, 1.0)), (alike, ElasticLayer(1.0, 0.4, 0.3, 0.25))):
+        exact = StepLoad(OnSheet(Paraboloid(100.0), layer), SOFT, 3e4)
+        found = GrowingOnLayer(profile, SOFT, base, 3e4, times)
+        np.testing.assert_allclose(found.radius, exact.radius(times), rtol=1e-8)
+        np.testing.assert_allclose(found.approach, exact.approach(times), rtol=1e-8)
+
+
+def test_growing_contact__on_others_converges_with_the_steps_and_ends_relaxed():
+    ends = []
+    for steps in (4, 8, 16):
+        found = GrowingOnLayer(profile, SOFT, STIFF, 3e4, np.append(0, np.geomspace(0.01, 4, steps)))
+        ends.append([found.radius[-1], found.approach[-1]])
+    errors = np.abs(np.array(ends) - np.array(ends[2]))[:2, 0]
+    assert errors[1] < 1e-4
+    assert math.log2(errors[0] / errors[1]) > 1.5
+    relaxed = GrowingOnLayer(profile, SOFT, STIFF, 3e4, np.append(0, np.geomspace(0.01, 100, 8)))
+    whole = [material.glassy + sum(material.compliances) for material in (SOFT, STIFF)]
+    elastic = OnSheet(Paraboloid(100.0), ElasticLayer(1.0, 0.4, 0.3, whole[1] / whole[0]))
+    scaled = 3e4 * (1 - 0.4) / 2 * whole[0]
+    assert relaxed.radius[-1] == pytest.approx(float(elastic.radius_at_scaled_force(scaled)), rel=1e-5)
