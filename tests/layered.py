@@ -80,6 +80,11 @@ def relaxation_of_wave(q, layer, base, thickness, t):
     return inverted(lambda s: 1 / (s * layered_compliance(q, s, layer, base, thickness)), t)
 
 
+def sliding_symbol(qx, speed, layer, base, thickness):
+    """Displacement over pressure of waves along the motion of a profile at a speed, in its frame. [m/Pa]"""
+    return layered_compliance(np.abs(qx), -1j * qx * speed, layer, base, thickness)
+
+
 class GrowingOnLayer:
     r"""An axisymmetric indenter under a load kept from time zero, on a layer and a base that creep as they like.
 

@@ -1,0 +1,91 @@
+"""Layers from the surface to the result, against solutions that are found another way."""
+
+import math
+
+import numpy as np
+import pytest
+from layered_ball import POISSONS, RATIOS, WIDTHS, errors
+from support import simulate_whole
+
+import roughvisc as rv
+from roughvisc.mechanics.closed_forms import Cone, ElasticLayer, OnSheet, Paraboloid, PunchOnSheet, StepLoad
+
+SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(4e6, 12e5, 4e5, 0.3)  # in proportion
+THICKNESS = 1e-4
+
+
+def pressed(height, body, program, **settings):
+    return simulate_whole(height, body, program, **{"progress": False, **settings})
+
+
+@pytest.mark.parametrize("poissons", POISSONS)
+@pytest.mark.parametrize("wide", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("ratio", [0.01, 0.5, 100.0])
+def test_elastic_ball__agrees_with_the_integral_equation(ratio, wide, poissons):
+    assert max(errors(ratio, wide, poissons, 129)) < 1e-3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cells", [128, 129])
+@pytest.mark.parametrize("poissons", [(0.5, 0.3), (0.3, 0.5), (0.0, 0.0), (0.5, 0.5)])
+@pytest.mark.parametrize("wide", [0.03, *WIDTHS, 30.0])
+@pytest.mark.parametrize("ratio", [0.001, *RATIOS, 1000.0])
+def test_elastic_ball__agrees_everywhere(ratio, wide, poissons, cells):
+    assert max(errors(ratio, wide, poissons, cells)) < 3e-3
+
+
+def test_cone_and_punch__agree_with_the_integral_equation():
+    layer, a = ElasticLayer(THICKNESS, 0.5, 0.3, 0.2), 1.5 * THICKNESS
+    body = rv.layer(rv.elastic(1e6), THICKNESS, on=rv.elastic(5e6, 0.3))
+    exact = OnSheet(Cone(0.1), layer)
+    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
+    ds = pressed(rv.cone(0.1, 2.6 * a, 65), body, load)
+    assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
+    load, punch = rv.Program().load(1e-3, over=0), rv.flat_punch(a, 2.6 * a, 65)
+    # of counted cells it has a radius right to half of one, as on a half-space: the ratio of both is closer
+    found = pressed(punch, rv.elastic(1e6), load).approach[0] / pressed(punch, body, load).approach[0]
+    assert float(found) == pytest.approx(PunchOnSheet(a, layer).scaled_stiffness / (2 * a), rel=1.3 / 65)
+
+
+def test_pressure__is_that_of_the_integral_equation_and_converges():
+    a = 1.2 * THICKNESS
+    exact = OnSheet(Paraboloid(20 * a), ElasticLayer(THICKNESS, 0.5, 0.3, 20.0))
+    body = rv.layer(rv.elastic(1e6), THICKNESS, on=rv.elastic(1e6 / 20, 0.3))
+    load, left = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0), []
+    for cells in (33, 65, 129):
+        ds = pressed(rv.sphere(20 * a, 2.6 * a, cells), body, load, tolerance=1e-6)
+        at = np.hypot(ds.x.values[:, None] - 1.3 * a, ds.y.values - 1.3 * a)
+        pressure = exact.scaled_pressure(at, a) * 4e6
+        left.append(np.abs(ds.pressure[0].values - pressure).sum() / pressure.sum())
+    assert left[-1] < 2e-3
+    assert -np.polyfit(np.log([33, 65, 129]), np.log(left), 1)[0] > 1.2  # 1.5 on a half-space
+
+
+def test_creeping_ball__on_moduli_in_proportion_is_that_of_lee_and_radok():
+    exact = StepLoad(OnSheet(Paraboloid(1e-3), ElasticLayer(THICKNESS, 0.4, 0.3, 0.25)), SOFT, 2e-3)
+    ball, times = rv.sphere(1e-3, 2.6 * float(exact.radius(2.0)), 127), [0.0, 0.1, 0.5, 2.0]
+    program, body = rv.Program().load(2e-3, over=0).hold(2.0), rv.layer(SOFT, THICKNESS, on=STIFF)
+    ds = pressed(ball, body, program, times=times, fields=())
+    np.testing.assert_allclose(ds.approach, exact.approach(times), rtol=1e-3)
+    np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=4e-3)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_limits__are_the_half_space_and_the_sheet(boundary):
+    """Equal materials to rounding; a stiff base in proportion to what it gives way."""
+    height = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
+    program = rv.Program().load(0.02, over=0).hold(0.2)
+    edge = {"edge": "accept"} if boundary == "free" else {}
+    settings = {"boundary": boundary, "times": [0.0, 0.2], "tolerance": 1e-4, **edge}
+    half = pressed(height, SOFT, program, **settings)
+    same = pressed(height, rv.layer(SOFT, 1.2e-4, on=SOFT), program, **settings)
+    assert float(abs(same.pressure - half.pressure).sum() / half.pressure.sum()) < 1e-3
+    np.testing.assert_allclose(same.approach, half.approach, rtol=1e-4)
+    sheet = pressed(height, rv.sheet(SOFT, 1.2e-4), program, **settings)
+    left = []
+    for stiffer in (1e3, 1e4):
+        base = rv.zener(1e6 * stiffer, 3e5 * stiffer, 1e5 * stiffer, 0.3)
+        found = pressed(height, rv.layer(SOFT, 1.2e-4, on=base), program, **settings)
+        left.append(float(abs(found.pressure - sheet.pressure).sum() / sheet.pressure.sum()))
+    assert left[0] < 0.02
+    assert left[1] < 0.2 * left[0]
