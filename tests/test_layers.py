@@ -24,7 +24,7 @@ _SOLVE = {
     "progress",
 }
 _STATEMENT = {*_PROBLEM, "mechanics.stepping", "experiment"}
-_STORAGE = {*_STATEMENT, *_MARCH, "recorder", "study.statement"}
+_STORAGE = {*_STATEMENT, *_MARCH, "recorder", "study.statement", "study.ensembles"}
 _EXECUTION = {*_SOLVE, *_STORAGE, "solve", "study.storage"}
 _AUDIT = {*_STORAGE, "mechanics.closed_forms", "study.storage"}
 _COST = {*_EXECUTION, "study.execution", "study.audit"}
@@ -63,8 +63,9 @@ ALLOWED = {
     "study.audit": _AUDIT,
     "study.cost": _COST,
     "study.trade": _TRADE,
-    "study.budget": {*_TRADE, "study.trade", "study.ensembles", "observables"},
+    "study.budget": {*_TRADE, "study.trade", "observables"},
     "study.validation": {*_SOLVE, "solve", "mechanics.closed_forms"},
+    "views.realisation_rows": {"units"},
     "views.figures": {*_LABELS, "study.storage", "study.trade", "topography", "observables"},
     "views.sweep_figures": {
         *_LABELS,
@@ -86,9 +87,11 @@ ALLOWED = {
         "views.figures",
         "views.sweep_figures",
         "views.plot",
+        "views.realisation_rows",
     },
     "views.console": {
         *_LABELS,
+        "views.realisation_rows",
         "topography",
         "study.audit",
         "study.execution",

@@ -155,8 +155,9 @@ def _run_all(
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.execution.task import REFUSED
     from roughvisc.study.storage.failures import LOG
-    from roughvisc.study.storage.table import CASES
-    from roughvisc.views.console.tables import sweep_table
+    from roughvisc.study.storage.index import index_of
+    from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
+    from roughvisc.views.console.tables import realisations_tables, sweep_table
 
     with ExitStack() as stack:
         client = None
@@ -175,8 +176,10 @@ def _run_all(
         with client.as_current() if client is not None else nullcontext():
             missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
+    if (folder / REALISATIONS).exists():
+        console.print(realisations_tables(realisations_table(index_of(folder, warn=False))))
     say(console, "Results", folder)
-    for what, name in (("Table of cases", CASES), ("Log", LOG)):
+    for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
         if (folder / name).exists():
             say(console, what, folder / name)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]

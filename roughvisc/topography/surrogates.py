@@ -99,7 +99,7 @@ def surrogate(
         k_x = row if 2 * row < nx else row - nx
         heights_q[row] = amplitude * np.exp(1j * np.pi * k_x / nx) * centres * waves.row(k_x, q_y.size)
     make_hermitian(heights_q)
-    grid = labelled(synthesised(heights_q, ny), (sides[0], sides[1]))
+    grid = labelled(synthesised(heights_q, ny), (sides[0], sides[1])).assign_coords(x=h["x"], y=h["y"])
     return noted(
         grid, f"surrogate {realisation} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
     )

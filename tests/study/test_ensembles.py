@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.stats
 import xarray as xr
@@ -14,7 +15,7 @@ from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result
-from roughvisc.study.storage.table import to_table
+from roughvisc.study.storage.table import REALISATIONS, to_table
 
 
 def of(values, **coords):
@@ -129,6 +130,17 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
         assert part.roughvisc.cost["case_key"].equals(part["case_key"])
     table = to_table(out)
     assert table["realisation"].tolist() == [1, 2, 3] * 2
+    area = over_realisations(again["contact_area"]).isel(time=-1)
+    told = pd.read_csv(out / REALISATIONS, encoding="utf-8-sig").set_index(["quantity", "program.0.pressure [kPa]"])
+    assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
+    for number, pressure in enumerate((10, 20)):
+        row = told.loc["contact_area", pressure]
+        for name in ("mean", "standard_deviation", "lower", "patch_upper"):
+            assert row[name] == pytest.approx(float(area[name][number]), rel=1e-6), name
+        assert row["case"] == number + 1
+        assert (row["count"], row["unit"], row["where"]) == (3, "m^2", "end")
+    sweep(study('[sweep]\n"program.0.pressure" = ["10 kPa", "20 kPa"]\n'), out, workers=0, progress=False)
+    assert not (out / REALISATIONS).exists(), "it is of the last sweep"
 
 
 def test_open_results__what_is_not_computed_is_missing(study, tmp_path):

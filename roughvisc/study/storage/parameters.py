@@ -103,3 +103,15 @@ def _column(values: Sequence[Any]) -> NDArray[Any]:
     if all(number or v is None for number, v in zip(numbers, values, strict=True)):
         return np.array([np.nan if v is None else v for v in values], dtype=float)
     return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
+
+
+def combinations(columns: Iterable[Sequence[Any] | NDArray[Any]], count: int) -> list[tuple[Any, ...]]:
+    """Values of each of some cases in all columns, by which cases can be grouped: a missing number equals another.
+
+    Examples
+    --------
+    >>> combinations([np.array([1.0, np.nan]), ["a", "b"]], 2)
+    [(1.0, 'a'), (None, 'b')]
+    """
+    lists = [np.asarray(column).tolist() for column in columns]
+    return [tuple(None if column[i] != column[i] else column[i] for column in lists) for i in range(count)]

@@ -18,7 +18,14 @@ from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.realisations import DRAWN, REALISATION
 from roughvisc.study.storage.checksum import warn_once
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
-from roughvisc.study.storage.parameters import CASE_KEY, as_realisation, identifier, labels_of, parameters_of
+from roughvisc.study.storage.parameters import (
+    CASE_KEY,
+    as_realisation,
+    combinations,
+    identifier,
+    labels_of,
+    parameters_of,
+)
 from roughvisc.study.storage.reading import read_variable
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.upkeep import counted_versions, version_of
@@ -181,7 +188,7 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
     if drawn is None or drawn.dtype.kind != "i":
         return flat
     of_case = [key for key in parameters if key not in (REALISATION, *DRAWN)]
-    settings = list(zip(*(parameters[key].tolist() for key in of_case), strict=True)) or [()] * len(drawn)
+    settings = combinations((parameters[key] for key in of_case), len(drawn))
     rows, columns = list(dict.fromkeys(settings)), np.unique(drawn)
     place = np.full((len(rows), len(columns)), -1)
     place[[rows.index(one) for one in settings], np.searchsorted(columns, drawn)] = np.arange(len(drawn))

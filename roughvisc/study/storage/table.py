@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
+from roughvisc.study.ensembles import STANDING, over_realisations
+from roughvisc.study.statement.realisations import DRAWN, REALISATION
 from roughvisc.study.statement.schema.units import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.parameters import as_realisation, parameters_of
+from roughvisc.study.storage.parameters import as_realisation, combinations, parameters_of
 from roughvisc.study.storage.store import atomic_write, no_results
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
@@ -25,7 +28,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
-CASES = "cases.csv"
+CASES, REALISATIONS = "cases.csv", "realisations.csv"
+#: Values that differ by less than this, relative, are prescribed.
+_ALIKE = 1e-9
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
@@ -77,13 +82,63 @@ def write_table(
     held : mapping, optional
         Key -> message, of the cases that another run was at work on.
     """
-    try:
-        with atomic_write(folder / CASES) as temporary:
-            # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
-            settings = {"encoding": "utf-8-sig", "float_format": "%.7g", "lineterminator": "\r\n"}
-            _table(folder, index, cases, held or {}).to_csv(temporary, **settings)
-    except (OSError, InputError) as error:
-        log.warning("%s cannot be written: %s", folder / CASES, error)
+    tables = {CASES: _table(folder, index, cases, held or {})}
+    (folder / REALISATIONS).unlink(missing_ok=True)  # of a sweep before
+    if any(key in index.entries for key in index.realisations):
+        tables[REALISATIONS] = realisations_table(index).set_index("case")
+    for name, table in tables.items():
+        try:
+            with atomic_write(folder / name) as temporary:
+                # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
+                table.to_csv(temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n")
+        except (OSError, InputError) as error:
+            log.warning("%s cannot be written: %s", folder / name, error)
+
+
+def realisations_table(index: Index) -> pd.DataFrame:
+    """Mean, scatter and intervals over the realisations of each case of the last sweep, one row per quantity.
+
+    Parameters
+    ----------
+    index : Index
+        Of the folder.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Number of the case; varied parameters as in :func:`to_table`; the quantity, its unit and the row that it is of;
+        then the variables of :func:`roughvisc.over_realisations`. Prescribed quantities are left out.
+    """
+    import pandas as pd
+
+    keys = [key for key in index.sweep or () if key in index.entries and key in index.realisations]
+    stated = [index.entries[key].case for key in keys]
+    varied = {key: values for key, values in _parameters(stated).items() if key not in (REALISATION, *DRAWN)}
+    groups: dict[Any, list[int]] = {}
+    for place, settings in enumerate(combinations(varied.values(), len(keys))):
+        groups.setdefault(settings, []).append(place)
+    rows = []
+    for number, (settings, places) in enumerate(groups.items(), 1):
+        entries = [index.entries[keys[place]] for place in places]
+        drawn = [index.realisations[keys[place]] for place in places]
+        axis = AXES[entries[0].along]
+        for name in axis.in_table("last"):
+            variable = axis.variables[name]
+            values = np.array(
+                [_summary_row(one, name) if len(one.histories.get(name, ())) else np.nan for one in entries]
+            )
+            known = values[np.isfinite(values)]
+            if name == axis.name or variable.group or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
+                continue
+            found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
+            told = {str(key): one.item() for key, one in found.data_vars.items()}
+            rows.append(
+                {"case": number, **dict(zip(varied, settings, strict=True)), "quantity": name, "unit": variable.units}
+                | {"where": f"largest {axis.telling}" if axis.telling else "end"}
+                | told
+                | ({"standing": STANDING[told["standing"]].replace("_", " ")} if "standing" in told else {})
+            )
+    return pd.DataFrame(rows)
 
 
 def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], held: Mapping[str, str]) -> pd.DataFrame:

@@ -15,8 +15,11 @@ from rich.text import Text
 from roughvisc.errors import printable
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
+from roughvisc.views.realisation_rows import realisation_rows
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from roughvisc.study.execution.profile import TimeProfile
     from roughvisc.study.execution.task import Outcome
     from roughvisc.study.validation.validate import Comparison
@@ -66,6 +69,23 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     if spent:
         rows.append(("Cost: total wall time", readable(sum(spent), "s")))
     return two_columns(rows, title)
+
+
+def realisations_tables(table: pd.DataFrame) -> Group:
+    """What a sweep's realisations scatter; nothing of one without.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Of :func:`roughvisc.study.storage.table.realisations_table`.
+    """
+    headings, rows, notes = realisation_rows(table)
+    shown = Table(box=None, pad_edge=False, collapse_padding=True)
+    for heading in headings:
+        shown.add_column(Text(heading), justify="left" if heading == "quantity" else "right", overflow="fold")
+    for row in rows:
+        shown.add_row(*(Text(printable(cell)) for cell in row))
+    return Group(*([Text(), shown] if rows else []), *(Text(note, style="italic") for note in notes))
 
 
 def plan_tables(costs: xr.Dataset) -> Group:

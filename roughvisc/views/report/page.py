@@ -21,7 +21,9 @@ from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.checksum import verify_checksum
+from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import atomic_write, no_results, result_files, whole_result
+from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.variables.axes import axis_of
@@ -29,6 +31,7 @@ from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
 from roughvisc.views.figures.coarsened import drawn
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
 from roughvisc.views.plot import area_against_load, figures_of, surface
+from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures.case_text import (
@@ -66,6 +69,9 @@ _NOTES = (
     "edge_note",
     "body_note",
 )
+#: Headings, rows and notes of a table.
+Rows = tuple[list[str], list[list[str]], list[str]]
+_NO_ROWS: Rows = ([], [], [])
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -101,15 +107,16 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
             verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
         failures = _failures(source) if source.is_dir() else []
         swept = _swept(source) if len(sources) > 1 else []
+        drawn = realisation_rows(realisations_table(index_of(source))) if source.is_dir() else _NO_ROWS
         out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)
     else:
-        sources, failures, swept = list(results), [], []
+        sources, failures, swept, drawn = list(results), [], [], _NO_ROWS
         if path is None:
             raise InputError("path is None: expected the name of the page, where Datasets are given")
         out = Path(path)
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
-    page = _page(sources, failures, swept)
+    page = _page(sources, failures, swept, drawn)
     with atomic_write(out) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return out
@@ -159,7 +166,7 @@ def _swept(folder: Path) -> list[dict[str, str]]:
     return [{"title": title, "src": figure_uri(figure)} for _, title, figure in found]
 
 
-def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
+def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]], drawn: Rows) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
@@ -185,7 +192,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
             what = row["surface"]
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
-    if len(everything) > 1:
+    if len(everything) > 1 and not drawn[1]:  # realisations of one case are drawn as one
         figures = [_overview(everything), *figures]
     figures = [*swept, *figures] if len(rows) > 1 else figures
     environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
@@ -197,6 +204,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         rows=rows,
         varied=names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
+        realisations=dict(zip(("headings", "rows", "notes"), drawn, strict=True)),
         views=views,
         studies=studies,
         headings=list(dict.fromkeys(row["rows"] for row in rows)) or ["Kept times"],

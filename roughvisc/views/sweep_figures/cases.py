@@ -17,7 +17,7 @@ from roughvisc.groups import whole_of
 from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.realisations import DRAWN, REALISATION
 from roughvisc.study.statement.schema.units import unit_of
-from roughvisc.study.storage.parameters import identifier
+from roughvisc.study.storage.parameters import combinations, identifier
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
@@ -241,7 +241,7 @@ def cases_of(results: Any) -> Cases:
     settings = {key: found for key, found in parameters.items() if key not in (REALISATION, *DRAWN)}
     if not np.isfinite(numbers).any():
         settings = parameters
-    of_case = list(zip(*(values.tolist() for values, _ in settings.values()), strict=True)) or [()] * len(members)
+    of_case = combinations((values for values, _ in settings.values()), len(members))
     groups: dict[Any, list[int]] = {}
     for place, number in enumerate(numbers):
         groups.setdefault(of_case[place] if np.isfinite(number) else place, []).append(place)

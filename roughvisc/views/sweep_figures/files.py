@@ -58,8 +58,9 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
     What the program prescribes alike in all cases, or a parameter says already, is left out.
     """
     cases = cases_of(results)
+    each = "a line a case" if not any(cases.bands) else "mean and band of the realisations"
     if AXES[cases.axis].telling == "friction_coefficient":
-        yield "friction", "Friction and contact area against the speed, a line a case", friction_of_cases(results)
+        yield "friction", f"Friction and contact area against the speed, {each}", friction_of_cases(results)
         if _is_shifted(cases):
             title = "The same against the speed times the shift factor: a master curve"
             yield "master", title, friction_of_cases(results, reduced=True)
@@ -72,7 +73,7 @@ def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str,
             yield _FILES.get(name, name), f"{_word(name)} against what was varied", sweep(results, name)
     for name in (*held[:1], *(one for one in held if one in observed)):
         kind = "histories" if name == held[0] else f"{name}-histories"
-        yield kind, f"{_word(name)} over {cases.axis}, a line a case", histories_of_cases(results, name)
+        yield kind, f"{_word(name)} over {cases.axis}, {each}", histories_of_cases(results, name)
 
 
 def _word(name: str) -> str:

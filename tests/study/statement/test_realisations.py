@@ -76,6 +76,8 @@ def test_realisations__of_two_generated_faces_draw_both(study):
     faces = ROUGH + ROUGH.replace("[surface]", "[surface.second]").replace("seed = 5", "seed = 50")
     cases = read_cases(study(faces, '[solve]\nboundary = "periodic"\n[sweep]\nrealisations = 3\n'))
     assert [(c.settings.surface.seed, c.settings.surface.second.seed) for c in cases] == [(5, 50), (6, 51), (7, 52)]
+    alike = faces.replace("seed = 50", "seed = 5") + '[solve]\nboundary = "periodic"\n'
+    assert len(read_cases(study(alike, "[sweep]\nrealisations = 3\n"))) == 3
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,10 @@ def test_figures__draw_the_mean_the_band_and_the_scan_itself(draw):
 
 def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter():
     ds = patches(1, surface_seed=("realisation", np.arange(7, 12), {"long_name": "surface.seed"}))
-    told = [text.get_text() for text in plot.histories_of_cases(ds).legends[0].get_texts()]
+    figure = plot.histories_of_cases(ds)
+    band = max(one.get_paths()[0].vertices[:, 1].max() for one in figure.axes[0].collections)
+    assert figure.axes[0].get_ylim()[1] > band
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "mean of 5 realisations" in told
     assert "the scan itself" not in told
     assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
