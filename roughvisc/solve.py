@@ -71,6 +71,8 @@ def solve(
     for name, found, why in experiment.unsupported(problem.settings):
         raise InputError(f"{name} is {found!r}: {why}")
     problem.check_cells()
+    if complaint := _complaint(problem):
+        log.warning("%s", complaint)
     height, settings, count = problem.height, problem.settings, threads_for(threads)
     again = settings.grid_error and not experiment.states_grid_error
     needed = ("pressure",) if again and "pressure" not in settings.fields else ()
@@ -189,4 +191,11 @@ def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
         "poisson": "" if separability_error(body.material) else material.poisson,
         "time_scale": experiment.time_scale,
         "recipe": str(height.attrs.get("recipe", "")),
+        "measurement_note": _complaint(problem),
     }
+
+
+def _complaint(problem: Problem) -> str:
+    """What is wrong with the measurements of the materials; empty if nothing is."""
+    fits = (getattr(material, "fit", None) for material in problem.body.materials)
+    return "; ".join(fit.complaint for fit in fits if fit is not None and fit.complaint)

@@ -19,7 +19,7 @@ DETAILS = "details"
 #: Attribute that holds the notes that warn, a line each.
 NOTES = "notes"
 #: Notes that warn of what a result is worth, in the order in which one should read them.
-WARNINGS = ("accuracy_note", "edge_note", "border_note", "slope_note", "wake_note", "octave_note")
+WARNINGS = ("accuracy_note", "edge_note", "border_note", "slope_note", "wake_note", "octave_note", "measurement_note")
 #: Attributes of the root, in the order in which they are read.
 AT_ROOT = (
     "title",

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
+from roughvisc.mechanics.materials.fit import Fit
+from roughvisc.mechanics.materials.kramers_kronig import Disagreement, disagreement
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -123,7 +126,7 @@ def from_relaxation_table(
         shear,
         t,
     )
-    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
+    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson, (float(known[0]), float(known[-1])))
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -170,7 +173,8 @@ def from_dynamic(
     -----
     ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
-    it is smaller.
+    it is smaller. Moduli that no passive material has together are fitted as well as may be, and the ``note`` says how
+    far they are at odds, and where; see :func:`roughvisc.mechanics.materials.kramers_kronig.disagreement`.
     """
     if frequency_unit not in ("rad/s", "Hz"):
         raise InputError(f"frequency_unit is {frequency_unit!r}: expected 'rad/s' or 'Hz'")
@@ -198,18 +202,62 @@ def from_dynamic(
         np.maximum(target, 1e-3 * np.tile(np.hypot(elastic, viscous), 2)),
         np.tile(omega, 2),
     )
-    return spectrum.material(omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", poisson)
+    return spectrum.material(
+        omega.size,
+        f"frequencies {omega.min():g} to {omega.max():g} rad/s",
+        poisson,
+        (1 / float(omega.max()), 1 / float(omega.min())),
+        disagreement(omega, elastic, viscous),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Offer:
+    """Terms that are offered to the rows of a measurement.
+
+    ``at`` tells where a datum was measured: data with the same value are one row. ``steps`` weighs those from term to
+    term beside the misfit.
+    """
+
+    theta: Array
+    columns: Array
+    target: Array
+    scale: Array
+    at: Array
+    steps: float = 0.0
+
+    def moduli(self, kept: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        """Moduli of the terms that come nearest to the data that are kept, the equilibrium modulus first. [Pa]"""
+        matrix = self.columns[kept] / self.scale[kept, None]
+        between = np.diff(np.eye(self.theta.size), axis=0) * (self.steps / np.max(self.target))
+        matrix = np.vstack([matrix, np.column_stack([np.zeros(self.theta.size - 1), between])])
+        wanted = np.append(self.target[kept] / self.scale[kept], np.zeros(self.theta.size - 1))
+        return nonnegative(matrix, wanted, np.ones(wanted.size))
+
+    def spectrum(self) -> _Spectrum:
+        """The moduli for all data."""
+        moduli = self.moduli()
+        return _Spectrum(self, moduli, (self.columns @ moduli - self.target) / self.scale)
+
+    def material(self, moduli: Array, poisson: float) -> Prony:
+        """The material of some moduli."""
+        used = np.flatnonzero(moduli[1:])
+        return from_relaxation(float(moduli[0]), moduli[1:][used].tolist(), self.theta[used].tolist(), poisson)
+
+    def from_rows(self, poisson: float, rows: NDArray[np.bool_]) -> Prony:
+        """The material from some of the rows, in the order of where they were measured."""
+        return self.material(self.moduli(np.isin(self.at, np.unique(self.at)[rows])), poisson)
 
 
 @dataclass(frozen=True)
 class _Spectrum:
-    """Moduli [Pa], the equilibrium modulus first, at relaxation times [s], and the relative misfit of each datum.
+    """Moduli of the terms offered [Pa], the equilibrium modulus first, and the relative misfit of each datum.
 
     ``between`` is the largest error of rows predicted from the others.
     """
 
+    offer: _Offer
     moduli: Array
-    theta: Array
     misfit: Array
     between: float = math.nan
 
@@ -221,52 +269,44 @@ class _Spectrum:
     def rms(self) -> float:
         return float(np.sqrt(np.mean(self.misfit**2)))
 
-    def material(self, rows: int, span: str, poisson: float) -> Prony:
-        used = np.flatnonzero(self.moduli[1:])
-        series = from_relaxation(
-            float(self.moduli[0]), self.moduli[1:][used].tolist(), self.theta[used].tolist(), poisson
-        )
+    def material(
+        self, rows: int, span: str, poisson: float, measured: tuple[float, float], odds: Disagreement | None = None
+    ) -> Prony:
         misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
         if not math.isnan(self.between):
             misfit += f", error between rows up to about {self.between:.2g} (rows predicted from the others)"
-        return dataclasses.replace(series, note=f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}")
+        note = f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}"
+        complaint, off = ("", 0.0) if odds is None else (odds.note, odds.together)
+        fit = Fit(partial(self.offer.from_rows, poisson), np.unique(self.offer.at).size, measured, complaint, off)
+        note = f"{note}; {complaint}" if complaint else note
+        return dataclasses.replace(self.offer.material(self.moduli, poisson), note=note, fit=fit)
 
 
 def _sparsest(
     columns: Callable[[Array], Array], within: tuple[float, float], target: Array, scale: Array, at: Array
 ) -> _Spectrum:
-    """The spectrum of fewest terms among those whose misfit is about the smallest, or a smooth one if rows are few.
+    """The spectrum of fewest terms among those whose misfit is about the smallest, or a smooth one if rows are few."""
 
-    ``at`` tells where a datum was measured: data with the same value are one row.
-    """
+    def offered(per_decade: float, steps: float = 0.0) -> _Spectrum:
+        theta = lattice(*within, per_decade)
+        return _Offer(theta, columns(theta), target, scale, at, steps).spectrum()
 
-    def fitted(theta: Array, steps: float, kept: Array) -> Array:
-        matrix = columns(theta)[kept] / scale[kept, None]
-        between = np.diff(np.eye(theta.size), axis=0) * (steps / np.max(target))
-        matrix = np.vstack([matrix, np.column_stack([np.zeros(theta.size - 1), between])])
-        wanted = np.append(target[kept] / scale[kept], np.zeros(theta.size - 1))
-        return nonnegative(matrix, wanted, np.ones(wanted.size))
-
-    def spectrum(theta: Array, steps: float = 0.0) -> _Spectrum:
-        moduli = fitted(theta, steps, np.ones(at.size, bool))
-        return _Spectrum(moduli, theta, (columns(theta) @ moduli - target) / scale)
-
-    def predicted(one: _Spectrum, steps: float = 0.0) -> _Spectrum:
+    def predicted(one: _Spectrum) -> _Spectrum:
         """With the largest error of rows predicted from the others, those at the ends excepted."""
         inner = np.unique(at)[1:-1]
         if inner.size == 0:
             return one
-        matrix, worst = columns(one.theta), 0.0
+        worst = 0.0
         for row in inner[:: math.ceil(inner.size / _LEFT_OUT)]:
             out = at == row
-            error = (matrix[out] @ fitted(one.theta, steps, ~out) - target[out]) / scale[out]
+            error = (one.offer.columns[out] @ one.offer.moduli(~out) - target[out]) / scale[out]
             worst = max(worst, float(np.abs(error).max()))
         return dataclasses.replace(one, between=worst)
 
-    found = [spectrum(lattice(*within, per_decade)) for per_decade in _PER_DECADE]
+    found = [offered(per_decade) for per_decade in _PER_DECADE]
     enough = max(_ALLOWED * min(one.rms for one in found), _ACCURATE)
     sparse = predicted(min((one for one in found if one.rms <= enough), key=lambda one: one.terms))
     if not sparse.between > _ROUGH:
         return sparse
-    smooth = predicted(spectrum(lattice(*within, _SMOOTH_PER_DECADE), _STEPS), _STEPS)
+    smooth = predicted(offered(_SMOOTH_PER_DECADE, _STEPS))
     return smooth if smooth.rms <= max(2 * enough, _ROUGH / 10) and smooth.between < sparse.between / 2 else sparse

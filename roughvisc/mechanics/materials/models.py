@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.bulk import in_volume
 from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
+from roughvisc.mechanics.materials.fit import PairFit
 from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
 from roughvisc.mechanics.materials.power_law import PowerLaw
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
@@ -277,6 +278,11 @@ class Pair:
         """The notes of both."""
         return _notes(self.a, self.b)
 
+    @property
+    def fit(self) -> PairFit | None:
+        """What the measurements of both leave unknown."""
+        return _fit_of(self.a, self.b)
+
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance of one incompressible body that would make the same contact. [1/Pa]"""
         return 4 * self.contact_compliance(t)
@@ -323,8 +329,20 @@ def pair(a: Material, b: Material) -> Prony | Pair:
         for compliance, time in zip(body.compliances, body.times, strict=True):
             compliances[time] = compliances.get(time, 0.0) + share * compliance
     return Prony(
-        glassy, fluidity, tuple(compliances.values()), tuple(compliances), note=_notes(a, b), stands_for=TWO_BODIES
+        glassy,
+        fluidity,
+        tuple(compliances.values()),
+        tuple(compliances),
+        note=_notes(a, b),
+        stands_for=TWO_BODIES,
+        fit=_fit_of(a, b),
     )
+
+
+def _fit_of(a: Material, b: Material) -> PairFit | None:
+    """What the measurements of both leave unknown; None if neither is a fit."""
+    bodies = tuple((body, getattr(body, "fit", None)) for body in (a, b))
+    return PairFit(bodies) if any(fit is not None for _, fit in bodies) else None
 
 
 def _notes(a: Material, b: Material) -> str:

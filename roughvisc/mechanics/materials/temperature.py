@@ -164,7 +164,8 @@ def shifted(material: Material, factor: float) -> Material:
     times = tuple(factor * time for time in material.times)
     if isinstance(material, Tabulated):
         return dataclasses.replace(material, times=times, remark=_noted(material.remark, factor))
-    return dataclasses.replace(material, fluidity=material.fluidity / factor, times=times, note=note)
+    fit = None if material.fit is None else material.fit.shifted(factor)
+    return dataclasses.replace(material, fluidity=material.fluidity / factor, times=times, note=note, fit=fit)
 
 
 @dataclass(frozen=True)

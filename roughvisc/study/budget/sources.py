@@ -14,6 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.materials.fit import AnyFit
+from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.materials.spectrum import lattice
 from roughvisc.study.budget.quantities import Observable
 from roughvisc.study.budget.stated import Stated
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
@@ -31,6 +34,10 @@ _SAMPLE = 3.3
 _SAME = 1.15
 #: Of the contact area where it slides, what the next octave changes over what the last one did.
 _SLIDING_OCTAVE = 2.0
+#: Instants in a decade at which the error of a fit is looked at, and how far beyond the measured times it is taken.
+_INSTANTS, _BEYOND = 10, 3.0
+#: Of the whole time: what a place at its beginning asks for.
+_AT_ONCE = 1e-9
 #: Fewer waves than these: the number hangs on the few that the patch happens to hold.
 _FEW_WAVES = 30.0
 
@@ -67,14 +74,15 @@ class Asked:
         """Name -> case of every solve that the sources need; ``own`` is the case itself."""
         variants, found = self.variants, {"own": self.variants.case, "coarse": self.variants.on_cells(2.0)}
         compared = found[self.compared]
+        stiffened = bool(self.modulus_error or self.fits)
         if self.sharp:
             found["fine"] = variants.on_cells(0.5)
         elif self.stated.grid:
-            if not (variants.is_rough and (self.modulus_error or self.time_scale_error)):
+            if not (variants.is_rough and (stiffened or self.time_scale_error)):
                 del found["coarse"]
         elif not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
             found["coarsest"] = variants.on_cells(4.0)
-        if self.modulus_error:
+        if stiffened:
             found["stiffer"] = stiffer(compared)
         if self.time_scale_error:
             found["slower"] = slower(compared)
@@ -85,6 +93,12 @@ class Asked:
         if variants.case.settings.surface.taper:
             found["mirrored"] = variants.mirrored()
         return found
+
+    @property
+    def fits(self) -> list[AnyFit]:
+        """Of the materials that were fitted to a measurement, what that leaves unknown."""
+        found = (getattr(material, "fit", None) for material in self.variants.case.body().materials)
+        return [one for one in found if one is not None]
 
     @property
     def compared(self) -> str:
@@ -229,6 +243,58 @@ def _time_scale(asked: Asked, quantity: Observable, values: Values, stated: Arra
     return _of_material(asked, asked.time_scale_error, "slower", "times of the material", values)
 
 
+def _material_fit(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
+    """By the largest error of the modulus over the times that a place asks for, and the change by the modulus."""
+    fits = asked.fits
+    if not fits:
+        return Found(_nothing(values), "the material is given by its parameters", counts=False)
+    intervals = _times(asked.variants, values["own"].size)
+    errors, outside = np.zeros(values["own"].shape), np.zeros(values["own"].shape, bool)
+    of_loss = np.zeros_like(errors)
+    over = [lattice(shortest, longest, _INSTANTS) for shortest, longest in intervals]
+    for fit in fits:  # of a layer and its base: as if each ruled
+        first, last = fit.span()
+        errors = np.maximum(errors, [float(np.max(fit.error(one))) for one in over])
+        if quantity.name == "friction_coefficient":  # in proportion to the loss
+            of_loss = np.maximum(of_loss, [float(np.max(fit.error(one, _loss))) for one in over])
+        outside |= (intervals[:, 0] < first / _BEYOND) | (intervals[:, 1] > last * _BEYOND)
+    if np.isnan(errors).any():
+        return Found(None, "too few rows of the measurement to leave some out: measure more")
+    reach = " to ".join(unit_for(one, "s").text(one, 2) for one in fits[0].span())
+    if outside.all():
+        return Found(None, f"the measurement covers {reach}, and not the times that matter here: extend it")
+    words = f"rows of the measurement left out in turn: {100 * errors.max():.2g} % of the modulus"
+    words += f", {100 * of_loss.max():.2g} % of the loss" if of_loss.any() else ""
+    if outside.any():
+        words += f"; {outside.sum()} of {outside.size} places need times beyond {reach}"
+    slope = np.abs(_apart(values, "stiffer", asked.compared)) / math.log(STEP)
+    return Found(np.hypot(np.log1p(errors) * slope, np.log1p(of_loss)), words, solves=("stiffer",))
+
+
+def _loss(material: Any, times: Array) -> Array:
+    """What a material loses in oscillations of such periods over 2 pi: the imaginary part of its compliance. [1/Pa]"""
+    return -complex_compliance(material, 1 / times).imag
+
+
+def _times(variants: Variants, places: int) -> Array:
+    """First and last of the times that each place of a case asks of its material. [s]
+
+    Nine tenths of what has crept at a time did so within its last decade. At a speed: those in which the waves pass.
+    """
+    case, experiment = variants.case, variants.case.experiment()
+    times, end = case.solving().times, experiment.creep_time(1.0)
+    if experiment.axis == "speed":
+        waves = np.array([variants.shortest_wave, max(float(np.ptp(variants.height[axis].values)) for axis in "xy")])
+        speeds = np.array(getattr(experiment, "asked", experiment.largest_speed), dtype=float)
+        found = waves / (2 * math.pi * np.atleast_1d(speeds)[:, None])
+    else:
+        known = np.maximum(times if isinstance(times, tuple) else [end], _AT_ONCE * end)
+        found = np.column_stack([known / 10, known])
+    if len(found) != places:  # as where all steps are kept
+        found = np.array([[found[:, 0].min(), found[:, 1].max()]])
+    return np.broadcast_to(found, (places, 2))
+
+
 def _of_material(asked: Asked, error: float, solve: str, what: str, values: Values) -> Found:
     """By the change that a tenth more makes."""
     if not error:
@@ -259,5 +325,6 @@ SOURCES = (
     Source("longest waves", _longest_waves),
     Source("modulus", _modulus),
     Source("time scale", _time_scale),
+    Source("material fit", _material_fit),
     Source("window", _window),
 )

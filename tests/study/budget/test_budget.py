@@ -298,6 +298,41 @@ def test_budget__reads_the_last_octave_that_a_curve_states(tmp_path):
     assert float(other["cost"].sel(source="grid")) > 0
 
 
+def dynamic(frequencies, noise=0.0):
+    """The Zener solid of ROUGH as dynamic moduli, with noise."""
+    rng = np.random.default_rng(5)
+    x, stiff, soft = frequencies * 0.1 / 4, 3e6, 0.75e6  # relaxation time and moduli of it
+    moduli = soft + (stiff - soft) * x**2 / (1 + x**2), (stiff - soft) * x / (1 + x**2)
+    storage, loss = (one * np.exp(noise * rng.standard_normal(x.size)) for one in moduli)
+    columns = {"frequencies": frequencies.tolist(), "storage": storage.tolist(), "loss": loss.tolist()}
+    return {"material": {"model": "dynamic", "frequency_unit": "rad/s", **columns}}
+
+
+def test_budget__of_a_fit_has_the_error_of_its_rows(tmp_path):
+    """Area and approach under a load go with the modulus to the power -2/3."""
+    table = dynamic(np.geomspace(0.1, 1e3, 40), 0.05)
+    study = case(BALL, tmp_path, **table, **{"surface.shape": [91, 91], "keep.times": [0.1, 1.0]})
+    found = stated(study, tmp_path, "approach")
+    fit = study.material().fit
+    for row, time in enumerate((0.1, 1.0)):
+        most = np.max(fit.error(np.geomspace(time / 10, time, 11)))
+        assert width(found, "material fit", row) == pytest.approx(2 / 3 * np.log1p(most), rel=0.02)
+        assert 0.005 < most < 0.1
+    assert str(found["state"].sel(source="material fit").values) == "counted"
+    assert float(found["cost"].sel(source="material fit")) > 0
+    given = stated(case(BALL, tmp_path), tmp_path, "approach")
+    assert "given by its parameters" in str(given["method"].sel(source="material fit").values)
+
+
+def test_budget__of_a_fit_that_does_not_reach_the_times_is_open(tmp_path):
+    late = case(BALL, tmp_path, **dynamic(np.geomspace(1e-4, 1e-2, 30)))
+    found = stated(late, tmp_path, "approach")
+    assert "material fit" in found.attrs["open"]
+    assert "extend it" in str(found["method"].sel(source="material fit").values)
+    part = stated(case(BALL, tmp_path, **dynamic(np.geomspace(1.0, 1e3, 30))), tmp_path, "approach")
+    assert "1 of 2 places need times beyond 1 ms to 1 s" in str(part["method"].sel(source="material fit").values)
+
+
 def test_budget__of_several_quantities_states_their_units(tmp_path):
     found = stated(case(BALL, tmp_path), tmp_path, ["contact_area", "approach"])
     assert found["units"].values.tolist() == ["m^2", "m"]
