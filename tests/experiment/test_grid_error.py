@@ -143,6 +143,18 @@ def test_peak_between_the_cells__errs_in_the_approach_or_in_force_and_area(given
     assert found.grid_error_area.values == pytest.approx(area, rel=1e-9)
 
 
+@pytest.mark.parametrize(("slides", "order"), [(False, 1.5), (True, 1.0)])
+def test_grid_error__of_an_area_that_slides_vanishes_more_slowly(slides, order, monkeypatch):
+    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0, 0.0))
+    ds, height = pressed_by_hand(), rv.from_array(-np.hypot(np.arange(6)[:, None] - 2, np.arange(5) - 1.0), 1.0)
+    if slides:
+        ds = ds.assign(friction_force=("time", [1.0, 1.0]))
+    other = ds.assign(contact_area=ds.contact_area * 1.1, approach=ds.approach + 1e-3)
+    found = grid_error.with_grid_error(ds, height, lambda *_: other)
+    ratio = np.sqrt(30 / coarser(height, 2, "free").size)
+    assert found.grid_error_area[0] == pytest.approx(1.25 * 0.1 / (ratio**order - 1), rel=1e-6)
+
+
 def test_grid_error__takes_no_grid_for_another(monkeypatch):
     """The fewest cells have no coarser ones; where a third grid is missing the two that are there count for less."""
     for shape, missing in ((2, True), (3, True), (4, False)):
