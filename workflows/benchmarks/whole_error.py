@@ -23,7 +23,7 @@ import numpy as np
 
 import roughvisc as rv
 from roughvisc.groups import whole_of
-from roughvisc.study.budget.quantities import QUANTITIES
+from roughvisc.study.quantities import QUANTITIES
 
 CELLS, SIDE, PATCHES = 64, 1e-3, 24
 #: Hurst exponent, cut-off in cells of the scan, roll-off over the side.

@@ -13,13 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.study.budget.quantities import Observable, known_quantity
 from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
 from roughvisc.study.budget.stated import stated_by
 from roughvisc.study.budget.variants import Variants, check_share, with_rows
 from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.quantities import Observable, known_quantity
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.store import result_path, whole_result
 from roughvisc.units import Quantity, in_si, quantities, stated_quantity

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.materials.fit import AnyFit
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.materials.spectrum import lattice
-from roughvisc.study.budget.quantities import Observable
 from roughvisc.study.budget.stated import Stated
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
+from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
 from roughvisc.units import unit_for
 

@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.budget.quantities import Observable
 from roughvisc.study.execution.run import unconverged
+from roughvisc.study.quantities import Observable
 from roughvisc.study.storage.store import whole_result
 
 log = logging.getLogger("roughvisc")

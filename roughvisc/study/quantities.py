@@ -1,4 +1,4 @@
-"""Quantities that a budget knows: what each takes from a result, and how the grid's error of it behaves."""
+"""Quantities whose error is asked for: what each takes from a result, and how the grid's error of it behaves."""
 
 from __future__ import annotations
 
