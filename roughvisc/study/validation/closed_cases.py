@@ -31,6 +31,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.body import Body, body_of
 from roughvisc.mechanics.bodies.body import sheet as sheet_of
+from roughvisc.mechanics.bodies.layer import layer as layer_of
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.materials.models import (
     Material,
@@ -56,6 +57,7 @@ _TOLERANCE = 1e-3
 _UNIT = elastic(0.25)  # contact modulus 1
 _ZENER = zener(0.25, 0.125, 0.125)  # contact modulus 1, relaxes to a third; retardation time 1
 _MAXWELL = maxwell(0.25, 0.25)
+_BASES = {"softer": zener(0.025, 0.0125, 0.0125, 0.3), "stiffer": zener(2.5, 1.25, 1.25, 0.3)}  # creep as _ZENER does
 _SIZE = 2.6  # of the grid, in contact radii
 _ROUND, _SLOPE = 10.0, 0.1  # radius of the spheres, in contact radii; slope of the cone
 
@@ -255,21 +257,25 @@ def wave(cells: int) -> Rows:
     yield "pressure (L1)", float(np.max(error)) / mean, _TOLERANCE
 
 
-def sheet(cells: int) -> Rows:
-    """A sheet as thick as the contact comes to be wide; the base takes as much of the grid's error as of the rest."""
-    load = 4 / 3 / _ROUND / float(_ZENER.contact_compliance(4.0))
-    times = [0.0, 0.5, 1.0, 2.0, 4.0]
-    for base in get_args(Base):
-        exact = closed_forms.StepLoad(
-            closed_forms.OnSheet(closed_forms.Paraboloid(_ROUND), Sheet(1.0, _ZENER.poisson, base)), _ZENER, load
-        )
-        program = Program().load(load, over=0).hold(4.0)
-        ball = sphere(_ROUND, _SIZE, cells)
-        ds = _press(ball, sheet_of(_ZENER, 1.0, base), program, times=times)
-        smallest = float(exact.radius(0.0))
-        yield f"approach, {base}", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
-        radius = _radius_error(_SIZE / cells, smallest) + _TOLERANCE
-        yield f"contact radius, {base}", _relative(_radius(ds), exact.radius(ds.time)), radius
+def _on(bodies: dict[str, tuple[Body, Sheet | closed_forms.ElasticLayer]]) -> Callable[[int], Rows]:
+    """A ball on what is as thick as the contact comes to be wide; the base takes as much of the grid's error as of it.
+
+    The bodies by name, each as it is solved and as the closed form takes it.
+    """
+
+    def rows(cells: int) -> Rows:
+        for name, (body, layer) in bodies.items():
+            on = closed_forms.OnSheet(closed_forms.Paraboloid(_ROUND), layer)
+            load = float(on.scaled_force(1.0)) / float(_ZENER.contact_compliance(4.0))
+            exact = closed_forms.StepLoad(on, _ZENER, load)
+            program, times = Program().load(load, over=0).hold(4.0), [0.0, 0.5, 1.0, 2.0, 4.0]
+            ds = _press(sphere(_ROUND, _SIZE, cells), body, program, times=times)
+            smallest = float(exact.radius(0.0))
+            yield f"approach, {name}", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
+            radius = _radius_error(_SIZE / cells, smallest) + _TOLERANCE
+            yield f"contact radius, {name}", _relative(_radius(ds), exact.radius(ds.time)), radius
+
+    return rows
 
 
 def loaded_punch(cells: int) -> Rows:
@@ -314,6 +320,14 @@ def histories(cells: int) -> Rows:
     yield "pressure (L1)", float(pressure.max()), error + _TOLERANCE
 
 
+_SHEETS = {base: (sheet_of(_ZENER, 1.0, base), Sheet(1.0, _ZENER.poisson, base)) for base in get_args(Base)}
+_LAYERS = {
+    f"{name} base": (
+        layer_of(_ZENER, 1.0, on=base),
+        closed_forms.ElasticLayer(1.0, _ZENER.poisson, base.poisson, base.glassy / _ZENER.glassy),
+    )
+    for name, base in _BASES.items()
+}
 #: name -> (what is pressed on what, its rows for a number of cells)
 CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
     "Hertz": ("sphere, elastic (Hertz)", _both_parities(hertz)),
@@ -328,7 +342,8 @@ CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
     "Ting": ("sphere, triangle of load, Zener (Ting)", unloading),
     "relaxation": ("sphere, load then fixed approach, Zener (element reduction)", relaxation),
     "full wave": ("wave in full contact, periodic, Zener", wave),
-    "sheet": ("sphere on a sheet, step load, Zener (Fredholm equation; Lee, Radok)", sheet),
+    "sheet": ("sphere on a sheet, step load, Zener (Fredholm equation; Lee, Radok)", _on(_SHEETS)),
+    "layer": ("sphere on a layer, step load, Zener (Fredholm equation; Lee, Radok)", _on(_LAYERS)),
     "punch": ("flat punch, loaded and unloaded, Zener", loaded_punch),
     "cycles": ("flat punch, cycles of approach, Zener", cycled_punch),
     "histories": ("sphere, measured creep: series against direct history", histories),
