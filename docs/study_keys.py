@@ -15,6 +15,7 @@ from roughvisc.study.statement.schema import (
     program,
     settings,
     surface,
+    want,
 )
 from roughvisc.study.statement.schema.meanings import meaning as first_meaning
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
@@ -83,6 +84,7 @@ TABLES = {
     "observe.leakage": ("observe.leakage", observe.LeakageTable.model_fields),
     "observe.conductance": ("observe.conductance", observe.ConductanceTable.model_fields),
     "audit": ("audit", audit.AuditSection.model_fields),
+    "want": ("want", want.WantSection.model_fields),
 }
 #: first word of a table's name -> the table whose meanings hold where it has none of its own
 _SHARED = {"generate": "generate: any", "material": "material: any"}
@@ -98,6 +100,7 @@ _WORDS = {
     "solve": "a table",
     "keep": "a table",
     "audit": "a table",
+    "want": "a table",
     "sweep": "a table of lists, or several",
     "precision": "a number above 0 and below 1",
     "generate": "one of " + ", ".join(surface.GENERATED),

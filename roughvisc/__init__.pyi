@@ -2,6 +2,7 @@
 
 from roughvisc import observables as observables
 from roughvisc.api import friction as friction
+from roughvisc.api import run as run
 from roughvisc.api import simulate as simulate
 from roughvisc.errors import ConvergenceError as ConvergenceError
 from roughvisc.errors import EdgeContactError as EdgeContactError
@@ -33,7 +34,6 @@ from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.budget.budget import budget as budget
 from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.ensembles import over_realisations as over_realisations
-from roughvisc.study.execution.single import run as run
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.observed import observe as observe
 from roughvisc.study.statement.case import Case as Case

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import xarray as xr
 
@@ -19,6 +21,9 @@ from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
 from roughvisc.units import Quantity, quantities
+
+if TYPE_CHECKING:
+    from roughvisc.study.statement.case import Case
 
 Progress = Callable[[float, float], None]
 
@@ -220,3 +225,66 @@ def friction(
     problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
     return root_of(found.assign_attrs(title="Steady sliding"))
+
+
+def run(
+    case: Case | str | Path,
+    out: str | Path | None = None,
+    *,
+    want: Mapping[str, Quantity] | None = None,
+    progress: bool | Progress = True,
+    same_bits: bool = False,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Compute one case and store it in a file.
+
+    It runs in this process, or on a worker of the default ``dask.distributed.Client`` if there is one.
+
+    Parameters
+    ----------
+    case : Case or path
+        A case, or its study file.
+    out : path, optional
+        Results folder, under the same path for all workers. Default: ``results/`` and the name of the study, next to
+        the study.
+    want : dict, optional
+        How accurate numbers are wanted, with the keys of the table ``want`` of a study:
+        ``{"friction_coefficient": "1 %"}``, or ``{"time": "60 s"}`` for the best in a time. The grid and the tolerance
+        are then chosen, and those of the case are not used. Default: what the study states; without a target the case
+        is computed as it is stated.
+    progress : bool or callable
+        A progress bar, or a function called with the current time and the length of the program. [s]
+    same_bits : bool
+        Compute again what was computed, completely or in part, with other versions of the FFTs or of NumPy, whose last
+        digits differ. Otherwise such results are used, because they also meet the tolerance, and a warning says so.
+    threads : int, optional
+        Number of threads for a large grid; see :func:`roughvisc.simulate`. Default on a worker: all its threads.
+
+    Returns
+    -------
+    xarray.Dataset
+        The result over ``(time, x, y)``; fields are read from its file when they are needed. The file is
+        ``ds.encoding["source"]``, named by the key of the case. A finished case is not computed again, and an
+        interrupted one is resumed. Where something was wanted, it is the result of the case that was chosen: the
+        attribute ``choice`` says what and why, and the budgets are in the folder ``budget`` beside it.
+
+    Raises
+    ------
+    InputError
+        If the input is invalid; nothing is written. If what is wanted cannot be had: the message says how accurate
+        the number is at best, and what would help.
+    TooLargeError
+        If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
+        recorded.
+    ConvergenceError
+        If a step did not converge. The result is written nevertheless, and the message names the file.
+    """
+    from roughvisc.study.execution import single
+    from roughvisc.study.statement.case import Case, read_study
+
+    stated = case if isinstance(case, Case) else read_study(case)
+    if want is None and not stated.is_to_be_chosen:
+        return single.run(stated, out, progress=progress, same_bits=same_bits, threads=threads)
+    from roughvisc.study.budget import target
+
+    return target.run(stated, out, want=want, progress=progress is not False, same_bits=same_bits, threads=threads)

@@ -100,7 +100,7 @@ ALLOWED = {
         "study.validation",
         "observables",
     },
-    "api": {*_SOLVE, "solve", "study.storage"},
+    "api": {*_SOLVE, "solve", "study.budget", "study.execution", "study.statement", "study.storage"},
     "cli": {
         *_LABELS,
         "progress",

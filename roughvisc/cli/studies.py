@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,13 @@ from roughvisc.cli.reading import naming_keys
 from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
+    import xarray as xr
     from rich.console import Console
 
     from roughvisc.study.statement.case import Case
+
+
+_FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best in a time: '60 s'; may be repeated."
 
 
 @click.command()
@@ -25,6 +29,7 @@ if TYPE_CHECKING:
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the results. [default: results/STUDY beside it]"
 )
+@click.option("--for", "targets", multiple=True, metavar="TARGET", help=_FOR)
 @click.option("--no-plots", is_flag=True, help="Draw no figures.")
 @click.option(
     "--workers", type=click.IntRange(0), help="Number of processes; 0: this one only. [default: one per core]"
@@ -36,7 +41,9 @@ if TYPE_CHECKING:
 @click.option("--same-bits", is_flag=True, help="Repeat cases computed with other versions of the FFT library.")
 @click.option("--profile", is_flag=True, help="Print where the time went; runs in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: bool, **where: Any) -> None:
+def run(
+    study: Path, out: Path | None, targets: tuple[str, ...], no_plots: bool, profile: bool, quiet: bool, **where: Any
+) -> None:
     """Compute all cases of a study file.
 
     Writes one NetCDF file per case, named by the key of the case. A single case also gets two figures. The cases of a
@@ -44,9 +51,13 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
     others continue. Repeat the command to resume an interrupted run: finished cases are not computed again, failed
     ones only with --retry-failed.
 
+    With --for, or [want] in the study, the grid and the tolerance are chosen: coarse to fine, until the whole error of
+    the number is as small as wanted. If no grid can give that, the command says why and what would help.
+
     \b
     Example:
       roughvisc run focus_variation-study.toml --out results
+      roughvisc run focus_variation-study.toml --for "5 % mean_gap"
       roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
     from rich.console import Console
@@ -56,6 +67,15 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
 
     keep_long_messages(study_folder(study, out))
     cases = read_cases(study)
+    if targets:
+        from roughvisc.study.budget.target import parse_targets, wanting
+
+        want = parse_targets(targets)
+        cases = [wanting(case, want) for case in cases]
+    chosen = [case for case in cases if case.is_to_be_chosen]
+    if chosen and len(cases) > 1:
+        where = "--for" if targets else "want"
+        raise InputError(f"{study}: {where}: found a target beside a sweep of {len(cases)} cases: expected one case")
     folder = result_folder(cases[0], out, to_write=False)
     console = Console(quiet=quiet)
     elsewhere = where["scheduler"] or where["scheduler_file"]
@@ -64,10 +84,12 @@ def run(study: Path, out: Path | None, no_plots: bool, profile: bool, quiet: boo
             "--profile: measures this process only: expected no --scheduler, --scheduler-file or --workers"
         )
     with _profile(console) if profile else nullcontext():
-        if len(cases) == 1 and not elsewhere:
+        budgets = _choose(cases, folder, console, **where) if chosen else {}
+        if len(cases) == 1 and (chosen or not elsewhere):
             complaint = _run_one(
-                cases[0], folder, study.stem, console, not no_plots, where["same_bits"], where["threads"]
+                cases[0], folder, study.stem, console, not no_plots, where["same_bits"], where["threads"], bool(chosen)
             )
+            _show_budgets(budgets, folder, console, not no_plots)
             if complaint:
                 complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
@@ -86,8 +108,66 @@ def _profile(console: Console) -> Iterator[None]:
     console.print(profile_table(profile))
 
 
+def _choose(
+    cases: list[Case],
+    folder: Path,
+    console: Console,
+    *,
+    scheduler: str | None,
+    scheduler_file: Path | None,
+    workers: int | None,
+    threads: int | None,
+    same_bits: bool,
+    **_: Any,
+) -> dict[str, xr.Dataset]:
+    """Put what is chosen for the target of a case in its place, say what it is and why; the budgets around it."""
+    from functools import partial
+
+    from roughvisc.study.budget.target import choose
+    from roughvisc.study.execution.cluster import connect
+    from roughvisc.study.execution.monitor import watcher
+
+    def tell(line: str) -> None:
+        console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
+
+    elsewhere = connect(scheduler, scheduler_file) if scheduler or scheduler_file else nullcontext()
+    with elsewhere as client:
+        choice = choose(
+            cases[0],
+            folder,
+            watch=partial(watcher, not console.quiet, console, summary=False),
+            tell=tell,
+            client=client,
+            workers=workers,
+            threads=threads,
+            same_bits=same_bits,
+        )
+    cases[:] = [choice.case]
+    tell("Chosen")
+    for reason in choice.reasons:
+        tell(f"  {reason}")
+    return choice.budgets
+
+
+def _show_budgets(budgets: Mapping[str, xr.Dataset], folder: Path, console: Console, plots: bool) -> None:
+    """Print, keep and draw the whole errors around what was chosen."""
+    if not budgets:
+        return
+    from roughvisc.cli.budgets import show
+
+    for name, one in budgets.items():
+        show(console, one, folder / "budget", name, plots)
+
+
 def _run_one(
-    case: Case, folder: Path, label: str, console: Console, plots: bool, same_bits: bool, threads: int | None
+    case: Case,
+    folder: Path,
+    label: str,
+    console: Console,
+    plots: bool,
+    same_bits: bool,
+    threads: int | None,
+    chosen: bool = False,
 ) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
     from roughvisc.progress import Bar
@@ -98,7 +178,8 @@ def _run_one(
     from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key), same_bits):
-        console.print("Already finished: nothing to compute")
+        if not chosen:
+            console.print("Already finished: nothing to compute")
         if not is_writable(folder):
             complain(f"{folder}: is not writable: the finished result is shown, and nothing is written")
             plots = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -16,10 +16,10 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
 from roughvisc.study.budget.stated import stated_by
 from roughvisc.study.budget.variants import Variants, check_share, with_rows
-from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.monitor import Monitor, watcher
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.quantities import Observable, known_quantity
+from roughvisc.study.quantities import Observable, Observe, known_quantity
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.store import result_path, whole_result
 from roughvisc.units import Quantity, in_si, quantities, stated_quantity
@@ -44,7 +44,7 @@ def budget(
     modulus_error: Quantity | None = None,
     time_scale_error: Quantity | None = None,
     cutoff: Quantity | None = None,
-    population: Population = "patch",
+    population: Population | None = None,
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
@@ -67,12 +67,13 @@ def budget(
         there, and makes the error of the grid some times smaller.
     modulus_error, time_scale_error : float or str, optional
         Relative errors of the moduli of the material and of its times, at 95 %: of a measured curve, or from batch
-        to batch. Without them these sources stay open. [-]
+        to batch. Default of these and the next two: what the table ``want`` of the study states. Without them these
+        sources stay open. [-]
     cutoff : float or str, optional
         Shortest wavelength that the real surface has, where it ends or where it no longer counts. Without it the
         waves that the scan does not hold stay open. [m]
-    population : {"patch", "ensemble"}
-        Whether the number is of this patch, or of the roughness that it is a sample of.
+    population : {"patch", "ensemble"}, optional
+        Whether the number is of this patch, the default, or of the roughness that it is a sample of.
     out : path, optional
         Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
     client, workers
@@ -136,7 +137,7 @@ def budgets(
     modulus_error: Quantity | None = None,
     time_scale_error: Quantity | None = None,
     cutoff: Quantity | None = None,
-    population: Population = "patch",
+    population: Population | None = None,
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
@@ -148,34 +149,25 @@ def budgets(
         raise InputError("quantity is empty: expected at least one")
     experiment = case.experiment()
     quantities = [known_quantity(name, experiment.axis, experiment.largest_speed > 0) for name in names]
-    if population not in get_args(Population):
+    if population is not None and population not in get_args(Population):
         raise InputError(f"population is {population!r}: expected {' or '.join(map(repr, get_args(Population)))}")
-    shortest = None if cutoff is None else stated_quantity(cutoff, "m", "cutoff", above=0)
+    known = {
+        "modulus_error": check_share("modulus_error", modulus_error),
+        "time_scale_error": check_share("time_scale_error", time_scale_error),
+        "cutoff": None if cutoff is None else stated_quantity(cutoff, "m", "cutoff", above=0),
+        "population": population,
+    }
     fields = tuple(dict.fromkeys(field for one in quantities for field in one.fields))
     axis = AXES[experiment.axis]
     given = in_si(at, axis.variables[axis.name].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, places, fields)
-    asked = Asked(
-        Variants(base, base.height()),
-        sharp,
-        check_share("modulus_error", modulus_error),
-        check_share("time_scale_error", time_scale_error),
-        shortest,
-        population,
-        stated_by(kept or result_path(result_folder(case), case.key), quantities, axis.name, places),
-    )
+    stated = stated_by(kept or result_path(result_folder(case), case.key), quantities, axis.name, places)
+    asked = Asked(Variants(base, base.height()), sharp, **known_errors(case, known), stated=stated)
     solves = asked.solves()
     if asked.stated.result is not None:
         del solves["own"]
-    outcomes = run_cases(list(solves.values()), folder, watch=watcher(progress), client=client, workers=workers)
-    for name, one in solves.items():
-        outcome = outcomes[one.key]
-        if outcome.entry is None:
-            raise RoughviscError(f"budget: the solve {name!r} failed: {outcome.message}")
-        if outcome.kind != "done":
-            log.warning("budget: the solve %r: %s: %s", name, outcome.kind, outcome.message)
-    results = {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
+    results = solved("budget", solves, folder, watch=watcher(progress), client=client, workers=workers)
     if asked.stated.result is not None:
         results["own"] = asked.stated.result
     try:
@@ -185,6 +177,44 @@ def budgets(
     finally:
         for one in results.values():
             one.close()
+
+
+def solved(
+    what: str,
+    solves: Mapping[Any, Case],
+    folder: Path,
+    *,
+    watch: Monitor,
+    client: Client | None = None,
+    workers: int | None = None,
+    threads: int | None = None,
+    same_bits: bool = False,
+    retry_failed: bool = False,
+) -> dict[Any, xr.Dataset]:
+    """Name -> whole result of each of some solves, from their files in a folder.
+
+    Raises
+    ------
+    RoughviscError
+        If one fails.
+    """
+    outcomes = run_cases(
+        list(solves.values()),
+        folder,
+        watch=watch,
+        client=client,
+        workers=workers,
+        threads=threads,
+        same_bits=same_bits,
+        retry_failed=retry_failed,
+    )
+    for name, one in solves.items():
+        outcome = outcomes[one.key]
+        if outcome.entry is None:
+            raise RoughviscError(f"{what}: the solve {name!r} failed: {outcome.message}")
+        if outcome.kind != "done":
+            log.warning("%s: the solve %r: %s: %s", what, name, outcome.kind, outcome.message)
+    return {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
 
 
 def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path]:
@@ -206,6 +236,13 @@ def _kept(case: Case | str | Path | xr.Dataset) -> Path | None:
     return Path(source) if source else None
 
 
+def known_errors(case: Case, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of the errors of a case's numbers: as given, else as the study states it."""
+    stated = case.settings.want
+    found = {name: one if one is not None or stated is None else getattr(stated, name) for name, one in given.items()}
+    return found | {"population": found["population"] or "patch"}
+
+
 def _rows_at(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
     """The rows of a result nearest to some places of its axis; all rows where None. Slides have theirs by the cell."""
     if places is None:
@@ -217,16 +254,52 @@ def _rows_at(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
 
 def _of_quantity(asked: Asked, quantity: Observable, results: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """The budget of one quantity."""
-    observe = {} if (stated := asked.variants.case.settings.observe) is None else stated.stated()
+    observe = observed_with(asked.variants.case)
     values = {name: quantity.of(one, observe) for name, one in results.items()}
-    own, axis = results["own"], asked.variants.case.experiment().axis
+    own = results["own"]
     stated_error = quantity.stated_error(own, values["own"])
     judged = {source.name: source.judge(asked, quantity, values, stated_error) for source in SOURCES}
+    seconds = {name: float(one["wall_time"].values[-1]) for name, one in results.items()}
     value = values["fine" if asked.sharp else "own"]
+    places = own[asked.variants.case.experiment().axis].values
+    return assembled(asked, quantity, judged, value, places, seconds, seconds["own"])
+
+
+def observed_with(case: Case) -> Observe:
+    """Keyword arguments of the observables of a case, as its study states them."""
+    return {} if (stated := case.settings.observe) is None else stated.stated()
+
+
+def assembled(
+    asked: Asked,
+    quantity: Observable,
+    judged: Mapping[str, Found],
+    value: Array,
+    places: Array,
+    seconds: Mapping[str, float],
+    case_cost: float,
+) -> xr.Dataset:
+    """The budget of a quantity from what its sources make of it.
+
+    Parameters
+    ----------
+    asked : Asked
+        What is known beside the case.
+    quantity : Observable
+    judged : mapping
+        Name -> what each source makes of it.
+    value, places : ndarray
+        Value of the quantity at each place of the axis, and those places.
+    seconds : mapping
+        Name of each solve -> its wall time [s].
+    case_cost : float
+        That of the case itself. [s]
+    """
+    case = asked.variants.case
+    axis = case.experiment().axis
     with np.errstate(invalid="ignore"):
         known = np.where(np.abs(value) > 0, value, math.nan)
-    down, up = (_together(judged.values(), value.shape, side) for side in (-1, 1))
-    seconds = {name: float(one["wall_time"].values[-1]) for name, one in results.items()}
+    down, up = (together(judged.values(), value.shape, side) for side in (-1, 1))
     half_width = [
         np.full(value.shape, math.nan) if one.half_width is None else one.half_width for one in judged.values()
     ]
@@ -243,14 +316,14 @@ def _of_quantity(asked: Asked, quantity: Observable, results: Mapping[str, xr.Da
             "value": (axis, value, units | {"long_name": quantity.name.replace("_", " ")}),
             "lower": (axis, known * np.exp(-down), units | {"long_name": "lower bound at 95 %"}),
             "upper": (axis, known * np.exp(up), units | {"long_name": "upper bound at 95 %"}),
-            "case_cost": ((), seconds["own"], {"units": "s", "long_name": "wall time of the case itself"}),
+            "case_cost": ((), case_cost, {"units": "s", "long_name": "wall time of the case itself"}),
         },
-        coords={"source": list(judged), axis: (axis, own[axis].values, {"units": AXES[axis].variables[axis].units})},
+        coords={"source": list(judged), axis: (axis, places, {"units": AXES[axis].variables[axis].units})},
         attrs={
             "quantity": quantity.name,
             "population": asked.population,
-            "case": asked.variants.case.to_json(),
-            "title": asked.variants.case.title,
+            "case": case.to_json(),
+            "title": case.title,
             "open": "; ".join(name for name, one in judged.items() if one.half_width is None),
         },
     )
@@ -269,7 +342,7 @@ def _state(found: Found) -> Literal["counted", "none", "open"]:
     return "counted" if found.counts else "none"
 
 
-def _together(found: Any, shape: tuple[int, ...], side: int) -> Array:
+def together(found: Iterable[Found], shape: tuple[int, ...], side: int) -> Array:
     """Half-width of all sources on one side."""
     squares = np.zeros(shape)
     for one in found:

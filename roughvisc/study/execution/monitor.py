@@ -28,9 +28,9 @@ from roughvisc.study.storage.table import write_table
 _SHOWN = 8
 
 
-def watcher(progress: bool, console: Console | None = None) -> LiveMonitor | NullMonitor:
+def watcher(progress: bool, console: Console | None = None, summary: bool = True) -> LiveMonitor | NullMonitor:
     """Who watches a sweep: a display, or nobody."""
-    return LiveMonitor(console) if progress else NullMonitor()
+    return LiveMonitor(console, summary) if progress else NullMonitor()
 
 
 class NullMonitor:
@@ -56,9 +56,12 @@ class LiveMonitor:
     ----------
     console : rich.console.Console or None
         Where to, None for the standard error; without a terminal plain lines are written every few seconds.
+    summary : bool
+        Whether a line says in the end how many cases are done.
     """
 
-    def __init__(self, console: Console | None) -> None:
+    def __init__(self, console: Console | None, summary: bool = True) -> None:
+        self._sums_up = summary
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
         self._at: dict[str, Callable[[float, float], str]] = {}
@@ -112,7 +115,7 @@ class LiveMonitor:
     def close(self) -> None:
         """Nothing more follows."""
         self._display.stop()
-        if self._names:
+        if self._names and self._sums_up:
             self._display.say(self._summary())
 
     def _summary(self) -> str:

@@ -28,42 +28,7 @@ def run(
     same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Compute one case and store it in a file.
-
-    It runs in this process, or on a worker of the default ``dask.distributed.Client`` if there is one.
-
-    Parameters
-    ----------
-    case : Case or path
-        A case, or its study file.
-    out : path, optional
-        Results folder, under the same path for all workers. Default: ``results/`` and the name of the study, next to
-        the study.
-    progress : bool or callable
-        A progress bar, or a function called with the current time and the length of the program. [s]
-    same_bits : bool
-        Compute again what was computed, completely or in part, with other versions of the FFTs or of NumPy, whose last
-        digits differ. Otherwise such results are used, because they also meet the tolerance, and a warning says so.
-    threads : int, optional
-        Number of threads for a large grid; see :func:`roughvisc.simulate`. Default on a worker: all its threads.
-
-    Returns
-    -------
-    xarray.Dataset
-        The result over ``(time, x, y)``; fields are read from its file when they are needed. The file is
-        ``ds.encoding["source"]``, named by the key of the case. A finished case is not computed again, and an
-        interrupted one is resumed; see :func:`run_case`.
-
-    Raises
-    ------
-    InputError
-        If the input is invalid; nothing is written.
-    TooLargeError
-        If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
-        recorded.
-    ConvergenceError
-        If a step did not converge. The result is written nevertheless, and the message names the file.
-    """
+    """Bring a case as it is stated to its file; see :func:`roughvisc.run`."""
     if not isinstance(case, Case):
         case = read_study(case)
     folder, client = result_folder(case, out, to_write=False), default_client()

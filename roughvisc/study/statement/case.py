@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from roughvisc.mechanics.stepping.program import Program
     from roughvisc.settings import Settings
 
+#: Tables that no result depends on, and what their values are.
+_NO_RESULT = {"observe": "observed", "want": "wanted"}
+
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
 
@@ -151,6 +154,11 @@ class Case:
         """How it is computed and what is kept, as the solver takes it."""
         return self.settings.solving()
 
+    @property
+    def is_to_be_chosen(self) -> bool:
+        """Whether its study states how accurate a number is wanted, so that grid and tolerance are to be chosen."""
+        return self.settings.want is not None and self.settings.want.chooses
+
     def _repr_html_(self) -> str:
         stated = _dump(self.settings)
         surface = stated["surface"]
@@ -251,8 +259,9 @@ def read_cases(path: str | Path) -> list[Case]:
     swept = with_files(data.pop("sweep", {}), path.parent, refusal)
     changes = with_realisations(expand(swept, refusal), data, path.parent, refusal)
     for key in dict.fromkeys(key for change, _ in changes for key in change):
-        if key.partition(".")[0] == "observe":
-            found = "cannot be varied: what is observed changes no result: expected one value, in [observe]"
+        table = key.partition(".")[0]
+        if table in _NO_RESULT:
+            found = f"cannot be varied: what is {_NO_RESULT[table]} changes no result: expected one value, in [{table}]"
             raise refusal(f"sweep: {key}", found)
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}

@@ -40,12 +40,12 @@ def identity(settings: Study) -> tuple[str, str]:
 
     Both come from one reading of the file. The surface counts by the content of its file and not by its path, as do
     tables of a material; the program by its segments and not by how they were written. No title counts, nothing that is
-    observed of the result, and nothing that an audit is told; nor does the library of the transforms, which changes the
-    last digits: a result says what it was made with.
+    observed of the result, and nothing that an audit is told or that is wanted; nor does the library of the transforms,
+    which changes the last digits: a result says what it was made with.
     """
     stated = settings.model_dump(
         mode="json",
-        exclude={"title", "audit", "observe", "program", "surface", "material", *EXPERIMENTS},
+        exclude={"title", "audit", "observe", "want", "program", "surface", "material", *EXPERIMENTS},
         serialize_as_any=True,
     )
     usual = type(settings.solve)().model_dump(mode="json")

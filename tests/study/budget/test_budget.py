@@ -9,6 +9,8 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget.budget import budgets
+from roughvisc.study.quantities import QUANTITIES
+from roughvisc.study.statement.schema.want import WANTED
 
 BALL = """
 title = "Ball"
@@ -244,6 +246,24 @@ def test_budget__of_a_resampled_scan_keeps_its_waves(tmp_path):
     gaps = [rv.run(one, out=tmp_path / "own", progress=False)["mean_gap"] for one in (study, whole)]
     apart = [np.abs(np.log(one / found["value"])) for one in gaps]
     assert (apart[0] < 0.3 * apart[1]).all()
+
+
+def test_budget__takes_what_the_study_knows_of_errors(tmp_path):
+    """What is given in the call counts before it."""
+    told = {"want": {"modulus_error": "5 %", "time_scale_error": 0.1, "cutoff": "18 um", "population": "ensemble"}}
+    study, plain = case(ROUGH, tmp_path, **told), case(ROUGH, tmp_path)
+    assert study.key == plain.key
+    given = {"modulus_error": 0.05, "time_scale_error": "10 %", "cutoff": 1.8e-5, "population": "ensemble"}
+    found = stated(study, tmp_path, "contact_area")
+    xr.testing.assert_equal(found, stated(plain, tmp_path, "contact_area", **given))
+    assert found.attrs["open"] == ""
+    other = stated(study, tmp_path, "contact_area", modulus_error=0.0, population="patch")
+    assert width(other, "modulus") == 0 < width(found, "modulus")
+    assert width(other, "sample") == 0 < width(found, "sample")
+
+
+def test_wanted_numbers__are_those_that_a_budget_knows():
+    assert set(WANTED) == set(QUANTITIES)
 
 
 def test_budget__keeps_its_solves(tmp_path, monkeypatch):

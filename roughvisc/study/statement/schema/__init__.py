@@ -23,6 +23,7 @@ from roughvisc.study.statement.schema.program import AnySegment
 from roughvisc.study.statement.schema.section import Section, refuse
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
 from roughvisc.study.statement.schema.surface import AnySurface
+from roughvisc.study.statement.schema.want import WantSection
 
 #: Tables that state an experiment other than a program.
 EXPERIMENTS = ["friction"]
@@ -73,6 +74,7 @@ class Study(Section):
     keep: KeepSection = KeepSection()
     observe: nullable(ObserveSection) = Field(None, description="a table")
     audit: nullable(AuditSection) = None
+    want: nullable(WantSection) = None
 
     def loading(self) -> Program:
         """The program as the solver takes it.
@@ -175,7 +177,7 @@ def study_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(study_schema()["properties"])
-    ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title']
+    ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title', 'want']
     >>> study_schema()["$defs"]["SolveSection"]["properties"]["edge"]["description"].partition(";")[0]
     'whether contact may reach the border in free space: the scan outline is then treated as a punch'
     """

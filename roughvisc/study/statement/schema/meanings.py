@@ -32,6 +32,7 @@ _TABLES = {
     "LeakageTable": ("observe.leakage",),
     "ConductanceTable": ("observe.conductance",),
     "AuditSection": ("audit",),
+    "WantSection": ("want",),
 }
 
 
