@@ -287,8 +287,8 @@ class LoadingRows(Rows):
         area = max(touching - staircase_area(contact, step.scene), 0.0)
         arrays: dict[str, Array] = {}
         if window.whole:
-            mean_gap = self._mean_of_gap(step, contact)
             arrays = {name: self._field(name, step, contact) for name in self._settings.fields if kept}
+            mean_gap = self._mean_of_gap(step, contact, arrays.get("gap"))
         else:
             assert step.effective is not None, "a window asks for a memory of pressures"
             mean_gap = self._mean_gap(window, step.effective, step.level)
@@ -342,7 +342,7 @@ class LoadingRows(Rows):
             return {"contact_fraction": fraction, "mean_gap": math.nan}
         source = records.arrays(number, "source")["source"]
         window = self._window(facts)
-        if self.profile.present.all():
+        if self.profile.all_present:
             mean_gap = self._mean_gap(window, source, facts["level"])
         else:
             gap = np.empty(window.domain)
@@ -446,12 +446,13 @@ class LoadingRows(Rows):
         gap[contact[rows]] = 0.0
         return gap
 
-    def _mean_of_gap(self, step: Step, contact: NDArray[np.bool_]) -> float:
-        """Its mean over the present cells, from some rows at a time. [m]"""
+    def _mean_of_gap(self, step: Step, contact: NDArray[np.bool_], known: Array | None) -> float:
+        """Its mean over the present cells, from some rows at a time where it is not known. [m]"""
         present = self.profile.present
 
         def total(rows: slice) -> float:
-            return float(np.sum(self._gap(step, contact, rows), where=present[rows]))
+            gap = self._gap(step, contact, rows) if known is None else known[rows]
+            return float(np.sum(gap, where=present[rows]))
 
         gaps = over_rows(total, contact.shape, step.scene.operator.threads)
         return sum(gaps) / np.count_nonzero(present)
@@ -484,9 +485,8 @@ class LoadingRows(Rows):
         """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
         gap -= level
         np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
-        absent = ~self.profile.present[rows]
-        if absent.any():
-            gap[absent] = np.nan
+        if not self.profile.all_present:
+            gap[~self.profile.present[rows]] = np.nan
 
     def _area(self) -> float:
         """Of the surface. [m2]"""

@@ -80,7 +80,7 @@ class Profile:
         #: Area that nominal pressures refer to: that of the surface as it was given. [m2]
         self.nominal_area = nominal_area(height)
         self._extent = float(_FIRST_EXTENT)
-        if follow and not kernel.raises_surface and self.present.all() and min(height.shape) >= _WORTH_FOLLOWING:
+        if follow and not kernel.raises_surface and self.all_present and min(height.shape) >= _WORTH_FOLLOWING:
             self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
 
     def _lay_out(self, height: xr.DataArray) -> None:
@@ -93,6 +93,7 @@ class Profile:
         values = self.domain.values
         self._centres = self.domain["x"].values, self.domain["y"].values
         self.present: NDArray[np.bool_] = present[cells]
+        self.all_present = bool(self.present.all())
         #: Height of the highest point, which on an indenter may lie between the cells. [m]
         self.highest = highest(height)
         #: Undeformed gap of the domain at first touch, zero at absent cells. [m]
@@ -165,7 +166,7 @@ class Profile:
         """What a scene takes from the surface."""
         return {
             "gap": np.ascontiguousarray(self.gap[self.window.cells]),
-            "present": None if self.present.all() else self.present,
+            "present": None if self.all_present else self.present,
             "outside": self.window.outside,
         }
 

@@ -287,7 +287,7 @@ def build_scene(profile: Profile, material: Material, program: Program, settings
     material = complete(material)
     (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), profile.gap[profile.present])
-    if settings.boundary == "periodic" and profile.present.all() and not has_finite_mean(profile.kernel):
+    if settings.boundary == "periodic" and profile.all_present and not has_finite_mean(profile.kernel):
         _check_approach(program, profile.mean_gap)
     foreseen = 0.0 if profile.window.whole else _foreseen(profile, program, material)
     while profile.window.outside <= foreseen:

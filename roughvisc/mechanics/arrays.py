@@ -87,6 +87,8 @@ def over_blocks(work: Callable[[slice], Found], size: int, threads: int) -> list
 
 def over_rows(work: Callable[[slice], Found], shape: tuple[int, ...], threads: int) -> list[Found]:
     """The same of blocks of a field that are whole rows."""
+    if shape[0] * shape[1] <= _BLOCK:
+        return [work(slice(0, shape[0]))]
     return parallel_map(work, list(blocks(shape[0], max(_BLOCK // shape[1], 1))), threads)
 
 
@@ -114,9 +116,7 @@ def add_scaled(out: Array, field: NDArray[Any], factor: float, threads: int) -> 
     """``out += factor * field``, multiplied in double precision."""
 
     def add_to(added: NDArray[Any], out: Array) -> None:
-        here = added.astype(np.float64)
-        here *= factor
-        out += here
+        out += np.multiply(added, factor, dtype=np.float64)
 
     blockwise(add_to, field, out=out, threads=threads)
 
@@ -241,7 +241,7 @@ def summed(values: Array) -> float:
 
 def total(vector: Array, threads: int) -> float:
     """Sum of a vector."""
-    return sum_over(summed, vector, threads=threads)
+    return summed(vector) if vector.size <= _BLOCK else sum(blockwise(summed, vector, threads=threads))
 
 
 def inner(field: NDArray[Any], cells: Cells, values: Array, threads: int) -> float:
@@ -262,7 +262,7 @@ def is_wide(size: int) -> bool:
 
 def threads_of(size: int, workers: int | None = None) -> int:
     """How many threads work on a field of so many cells; None: as ``scipy.fft.set_workers`` has it."""
-    if not is_wide(size):
+    if size < _THREADED:
         return 1
     return fft.get_workers() if workers is None else workers
 

@@ -61,7 +61,7 @@ class Sparse:
         """Cells of the grid."""
         return math.prod(self.shape)
 
-    @property
+    @cached_property
     def threads(self) -> int:
         """How many work on it."""
         return threads_of(self.size)
@@ -92,7 +92,9 @@ class Sparse:
     def times(self, factor: float) -> Array:
         """``factor`` times all of it, in memory of its own."""
         if self.cells is None:
-            return arrays.weighted([(factor, self.values)], empty(self.shape), self.threads)
+            whole = empty(self.shape)
+            arrays.blockwise(np.multiply, self.values, factor, out=whole, threads=self.threads)
+            return whole
         found, cells, values = empty(self.shape), self.cells, factor * self.values
         flat = found.reshape(-1)
 
@@ -160,7 +162,12 @@ class Scattered:
     @classmethod
     def over_largest(cls, shape: tuple[int, int], cells: Cells, values: Array) -> Scattered:
         """Values over their largest magnitude."""
-        return cls(shape, cells, values, _largest(values, threads_of(shape[0] * shape[1])) or 1.0)
+
+        def largest(here: Array) -> float:
+            return float(np.maximum.reduce(np.abs(here), initial=0.0))
+
+        size = max(arrays.blockwise(largest, values, threads=threads_of(shape[0] * shape[1])))
+        return cls(shape, cells, values, size or 1.0)
 
     def rows(self, rows: slice) -> NDArray[np.float32]:
         """Some rows of it."""
@@ -225,12 +232,3 @@ class Sum:
 def _not_zero(field: Array) -> Cells:
     values = field.reshape(-1)
     return arrays.cells_where(lambda part: values[part] != 0, values.size, threads_of(values.size))
-
-
-def _largest(vector: Array, threads: int) -> float:
-    """Largest magnitude in a vector; zero of none."""
-
-    def largest(values: Array) -> float:
-        return float(np.maximum.reduce(np.abs(values), initial=0.0))
-
-    return max(arrays.blockwise(largest, vector, threads=threads))

@@ -289,10 +289,10 @@ def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
 
     def counted(*given, **named):
         forward.append(1)
-        return fft.rfft2(*given, **named)
+        return fft.rfftn(*given, **named)
 
-    here = {name: getattr(fft, name) for name in ("irfft2", "fftfreq", "rfftfreq")}
-    monkeypatch.setattr(steady, "fft", SimpleNamespace(rfft2=counted, **here))
+    here = {name: getattr(fft, name) for name in ("irfftn", "fftfreq", "rfftfreq")}
+    monkeypatch.setattr(steady, "fft", SimpleNamespace(rfftn=counted, **here))
     ds = friction_whole(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
     assert int(ds.convolutions.sum()) == len(forward)
     assert (ds.convolutions > 2 * ds.iterations).all()

@@ -86,6 +86,8 @@ class Operator:
         if boundary not in ("free", "periodic"):
             raise InputError(f"boundary is {boundary!r}: expected 'free' or 'periodic'")
         self.shape = shape
+        #: Number of cells.
+        self.size = shape[0] * shape[1]
         self.spacing = spacing
         self.boundary = boundary
         self.mirrored = mirrored
@@ -117,7 +119,7 @@ class Operator:
     @property
     def threads(self) -> int:
         """How many threads work on one field."""
-        return threads_of(self.shape[0] * self.shape[1], self.workers)
+        return threads_of(self.size, self.workers)
 
     @cached_property
     def coarse(self) -> Operator:
@@ -197,7 +199,7 @@ class Operator:
     @property
     def _goes_by_blocks(self) -> bool:
         """Whether transforms on the cells themselves do."""
-        return self.shape[0] * self.shape[1] >= _BLOCKED
+        return self.size >= _BLOCKED
 
     def _convolved(
         self,

@@ -41,7 +41,7 @@ class Influence:
         self.threads = operator.threads
         self.scale = scale
         self.convolutions = 0
-        self.size = operator.shape[0] * operator.shape[1]
+        self.size = operator.size
 
     def at(self, field: Array, cells: Cells) -> Array:
         """Values of a field at some cells, as flat indices."""

@@ -160,8 +160,8 @@ def solve_complementarity(
 
 def _longest(values: Array, step: Array) -> float:
     """Longest part of a step, up to the whole, after which positive values are not negative."""
-    shrinking = step < 0
-    return min(1.0, float(np.min(-values[shrinking] / step[shrinking], initial=math.inf)))
+    shrinking = np.flatnonzero(step < 0)
+    return min(1.0, -float(np.maximum.reduce(values.take(shrinking) / step.take(shrinking), initial=-math.inf)))
 
 
 class _System:
@@ -190,7 +190,7 @@ class _System:
         self, right: Array, enough: float, relative: float = _LOOSEST, start: Array | None = None
     ) -> tuple[Array, float, int]:
         """Change of the pressure and of the level, and the vectors that it took, for a right-hand side."""
-        scaled = self._scale * self._without_level(right)
+        scaled = self._scale * (right - self._level(right))
         enough = min(enough, relative * float(np.sqrt(np.sum(scaled**2))))
         known = None if start is None else start / self._scale
         solution, count = gmres(self._apply, self._precondition, scaled, enough, known)
@@ -200,22 +200,26 @@ class _System:
 
     def _apply(self, scaled: Array) -> Array:
         step = self._scale * scaled
-        return np.asarray(self._scale * self._without_level(self._displacement(step) + self._diagonal * step))
+        found = self._displacement(step)
+        found += self._diagonal * step
+        found -= self._level(found)
+        found *= self._scale
+        return found
 
     def _precondition(self, scaled: Array) -> Array:
         step = self._about_inverse(scaled / self._scale)
-        step -= float(step.sum()) * self._uniform  # the load does not change
+        step -= float(np.add.reduce(step, axis=None)) * self._uniform  # the load does not change
         step /= self._scale
         return step
 
     def _about_inverse(self, field: Array) -> Array:
-        return np.asarray(self._inside * self._inverse(self._inside * field) + self._outside * field)
+        found = self._inverse(self._inside * field)
+        found *= self._inside
+        found += self._outside * field
+        return found
 
     def _level(self, field: Array) -> float:
-        return float(np.sum(field * self._uniform))
-
-    def _without_level(self, field: Array) -> Array:
-        return field - self._level(field)
+        return float(np.add.reduce(field * self._uniform, axis=None))
 
 
 def gmres(

@@ -147,9 +147,10 @@ class Sliding:
         self.convolutions += 1
         symbol, unit = self._stiffness
         largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
-        found = fft.rfft2((displacement / largest).astype(np.float32), workers=self._threads) * symbol
-        found = fft.irfft2(found, s=self.shape, overwrite_x=True, workers=self._threads)
-        return largest * unit * np.asarray(found, dtype=np.float64)
+        waves = fft.rfftn((displacement / largest).astype(np.float32), workers=self._threads)
+        waves *= symbol
+        found = fft.irfftn(waves, s=self.shape, overwrite_x=True, workers=self._threads)
+        return np.multiply(largest * unit, found, dtype=np.float64)
 
     def lagging(self, pressure: Array) -> Array:
         """Slope along x of the displacement out of phase. [-]"""
@@ -174,8 +175,9 @@ class Sliding:
 
     def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
         self.convolutions += 1
-        found = fft.rfft2(field, workers=self._threads) * symbol
-        return np.asarray(fft.irfft2(found, s=self.shape, overwrite_x=True, workers=self._threads))
+        waves = fft.rfftn(field, workers=self._threads)  # of the two-dimensional ones the axes are looked at each time
+        waves *= symbol
+        return np.asarray(fft.irfftn(waves, s=self.shape, overwrite_x=True, workers=self._threads))
 
 
 def steady_state(

@@ -321,7 +321,7 @@ def at_border(scene: Scene, contact: Sparse) -> bool:
         return False
     pressure = contact.field()
     borders = (-1,) if scene.operator.mirrored else (0, -1)
-    return any(bool(np.any(pressure[i] > 0) or np.any(pressure[:, i] > 0)) for i in borders)
+    return any(np.maximum.reduce(line) > 0 for i in borders for line in (pressure[i], pressure[:, i]))
 
 
 def edge_error(scene: Scene, time: float) -> EdgeContactError:

@@ -239,7 +239,7 @@ def test_units__do_not_matter():
 def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch):
     """Handing a small transform over takes ten times as long as the transform."""
     used = set()
-    for name in ("rfft2", "irfft2"):
+    for name in ("rfftn", "irfftn"):
         plain = getattr(fft, name)
         monkeypatch.setattr(
             fft, name, lambda *given, plain=plain, workers=None, **named: used.add(workers) or plain(*given, **named)
