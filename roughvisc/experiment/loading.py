@@ -283,7 +283,8 @@ class LoadingRows(Rows):
             step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
         shown, window = step.shown, self.profile.window
         contact = shown.contact.positive()
-        touching = float(np.count_nonzero(contact)) * step.scene.operator.cell_area
+        count = int(np.count_nonzero(contact))
+        touching = count * step.scene.operator.cell_area
         area = max(touching - staircase_area(contact, step.scene), 0.0)
         arrays: dict[str, Array] = {}
         if window.whole:
@@ -303,7 +304,7 @@ class LoadingRows(Rows):
             "time_error": step.time_error,
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
-            "status": self._status(step, converged, contact),
+            "status": self._status(step, converged, count),
             "contact_area": area,
             "contact_area_counted": touching,
             "contact_fraction": self.profile.contact_fraction(contact, area),
@@ -497,12 +498,12 @@ class LoadingRows(Rows):
         """Separation of the mean plane of the profile and the undeformed plane in free space. [m]"""
         return {"mean_plane_separation": self.profile.mean_gap - approach} if self._has_mean_plane else {}
 
-    def _status(self, step: Step, converged: bool, contact: NDArray[np.bool_]) -> int:
+    def _status(self, step: Step, converged: bool, count: int) -> int:
         if not converged:
             meaning = "not_converged"
         elif step.shown.force == 0:
             meaning = "open"
-        elif self.profile.window.whole and np.count_nonzero(contact) == np.count_nonzero(self.profile.present):
+        elif self.profile.window.whole and count == np.count_nonzero(self.profile.present):
             meaning = "full_contact"
         else:
             meaning = "converged"

@@ -194,6 +194,9 @@ def gather(field: Array, cells: Cells, threads: int) -> Array:
 
 def scatter(out: Array, cells: Cells, values: Array, threads: int) -> None:
     """Set a flat field at some cells."""
+    if cells.size <= _BLOCK:
+        out[cells] = values
+        return
 
     def put(here: Cells, new: Array) -> None:
         out[here] = new

@@ -52,11 +52,22 @@ class Influence:
         """Largest eigenvalue of the influence, or a bound on it."""
         return self.operator.largest_influence * self.scale
 
-    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
-        """Displacement by a pressure, in double precision; into some memory on large grids, where that is given."""
+    def displacement(self, pressure: Array, out: Array | None = None, less: Array | None = None) -> Array:
+        """Displacement by a pressure, in double precision, less another one.
+
+        Into some memory on large grids, where that is given.
+        """
         self.convolutions += 1
         displacement = self.operator.displacement(pressure, out)
-        blockwise(np.multiply, displacement, self.scale, out=displacement, threads=self.threads)
+
+        def scale_and_subtract(here: Array, other: Array, out: Array) -> None:
+            np.multiply(here, self.scale, out=out)
+            out -= other
+
+        if less is None:
+            blockwise(np.multiply, displacement, self.scale, out=displacement, threads=self.threads)
+        else:
+            blockwise(scale_and_subtract, displacement, less, out=displacement, threads=self.threads)
         return displacement
 
     def displacement_single(self, pressure: Array, cells: Cells) -> tuple[Single, float]:

@@ -101,11 +101,11 @@ class ContactProblem:
             length = approach - lowest
             unit = length / (operator.self_influence or operator.spacing[0])
 
-        def over_length(here: Array) -> None:
-            here -= lowest
-            here /= length
+        def over_length(here: Array, out: Array) -> None:
+            np.subtract(here, lowest, out=out)
+            out /= length
 
-        blockwise(over_length, gap, threads=operator.threads)
+        blockwise(over_length, gap, out=gap, threads=operator.threads)
         target = math.nan if approach is None else 1.0
         known = load is None and not operator.definite and present is None
         return cls(
@@ -121,12 +121,12 @@ class ContactProblem:
             remaining=float(np.mean(gap)) - target if known else math.nan,
         )
 
-    @property
+    @cached_property
     def definite(self) -> bool:
         """Whether every pressure displaces: with periodic boundaries a uniform one does not, on a half-space."""
         return self.influence.operator.definite
 
-    @property
+    @cached_property
     def sees_load(self) -> bool:
         """Whether the energy knows the load."""
         return self.load is not None or self.definite
@@ -226,11 +226,11 @@ class ContactProblem:
         else:
             pressure = start
 
-            def over_unit(here: Array) -> None:
-                np.maximum(here, 0, out=here)
-                here /= self.unit
+            def over_unit(here: Array, out: Array) -> None:
+                np.maximum(here, 0, out=out)
+                out /= self.unit
 
-            blockwise(over_unit, pressure, threads=threads)
+            blockwise(over_unit, pressure, out=pressure, threads=threads)
         if self.present is not None:
             pressure = np.where(self.present, pressure, 0.0)
         factor = 1.0 if self.load is None else self.load / total(pressure.reshape(-1), threads)

@@ -558,8 +558,7 @@ def take_step(
         response, unit = influence.displacement_single(trial.change, free_set)
     else:
         scatter(pressure, free_set, trial.pressure, threads)
-        response, unit = influence.displacement(iterate.pressure), 1.0
-        blockwise(np.subtract, response, displacement, out=response, threads=threads)
+        response, unit = influence.displacement(iterate.pressure, less=displacement), 1.0
     curvature = unit * inner(response, free_set, trial.change, threads)
     minimum = minimum_along(trial, curvature)
     fraction, cut = admissible_fraction(trial, minimum, threads)
@@ -620,12 +619,9 @@ def in_own_units(
     load, approach = total(pressure.reshape(-1), problem.influence.threads), certificate.level
     if problem.load is not None:
         approach = approach_under_load(problem, pressure, iterate.contact, displacement, certificate.level)
-
-    def unscale(pressure: Array, displacement: Array) -> None:
-        pressure *= problem.unit
-        displacement *= problem.length
-
-    blockwise(unscale, pressure, displacement, threads=problem.influence.threads)
+    threads = problem.influence.threads
+    blockwise(np.multiply, pressure, problem.unit, out=pressure, threads=threads)
+    blockwise(np.multiply, displacement, problem.length, out=displacement, threads=threads)
     return ContactState(
         pressure=pressure,
         displacement=displacement,

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -56,9 +56,11 @@ class Uncertainty:
 
     def or_worse(self, other: Uncertainty, part: float) -> Uncertainty:
         """The larger of both, part by part; what steps add to the energies lies a part of the way to the other's."""
-        worse = {name: max(value, getattr(other, name)) for name, value in vars(self).items()}
-        here, there = ({name: getattr(one, name) for name in _EXCESS} for one in (self, other))
-        return Uncertainty(**worse | {name: (1 - part) * here[name] + part * there[name] for name in _EXCESS})
+        here, there = vars(self), vars(other)
+        worse = dict(zip(here, map(max, here.values(), there.values()), strict=True))
+        for name in _EXCESS:
+            worse[name] = (1 - part) * here[name] + part * there[name]
+        return Uncertainty(**worse)
 
     def relative(self, force: float, approach: float) -> float:
         """The largest of pressure, force and approach over what these have come to so far [N], [m]. [-]"""
@@ -206,23 +208,21 @@ class Scene:
         """Least value over the present cells."""
         return lowest(field, self.present, self.operator.threads)
 
-    def compliance(self, t: float) -> float:
-        """Contact compliance. [1/Pa]"""
-        return self._known[0](min(t, self.program.duration))
+    @cached_property
+    def compliance(self) -> Callable[[float], float]:
+        """Contact compliance at a time, no later than the end; asked for the same few times over and over. [1/Pa]"""
+        material, end = self.material, self.program.duration
+        return lru_cache(maxsize=32)(lambda t: float(material.contact_compliance(min(t, end))))
 
-    def mean_compliance(self, step: float) -> float:
+    @cached_property
+    def mean_compliance(self) -> Callable[[float], float]:
         """Mean contact compliance over the first so many seconds of creep. [1/Pa]"""
-        return self._known[1](min(step, self.program.duration))
+        material, end = self.material, self.program.duration
+        return lru_cache(maxsize=32)(lambda step: mean_compliance(material, min(step, end)))
 
     def stiff_ratio(self, step: float) -> float:
         """As :func:`~roughvisc.mechanics.hereditary.exponentials.stiff_ratio`, no longer than the program."""
         return old_weight(self.compliance(step), self.mean_compliance(step))
-
-    @cached_property
-    def _known(self) -> tuple[Callable[[float], float], Callable[[float], float]]:
-        """Both functions of the material, which are asked for the same few times over and over."""
-        once = lru_cache(maxsize=32)
-        return once(lambda t: float(self.material.contact_compliance(t))), once(partial(mean_compliance, self.material))
 
     @cached_property
     def glassy(self) -> float:

@@ -106,10 +106,16 @@ def trial_step(
     )
     del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
+
+    def add_and_divide(found: Array, past: Array, out: Array) -> None:
+        past += found
+        np.divide(found, alpha, out=out)
+
     for found, past in ((pressure, effective), (displacement, carried)):
-        if past is not None:
-            blockwise(np.add, past, found, out=past, threads=threads)
-        blockwise(np.divide, found, alpha, out=found, threads=threads)
+        if past is None:
+            blockwise(np.divide, found, alpha, out=found, threads=threads)
+        else:
+            blockwise(add_and_divide, found, past, out=found, threads=threads)
     instant = Instant(
         time,
         Sparse.of(pressure),
