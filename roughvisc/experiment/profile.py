@@ -85,6 +85,7 @@ class Profile:
 
     def _lay_out(self, height: xr.DataArray) -> None:
         self.height = height
+        self._can_grow: bool | None = None  # not known yet
         present = np.isfinite(height.values)
         _check_missing(height, present, self._missing)
         cells = quarter(height.shape) if self.mirrored else ...
@@ -138,7 +139,9 @@ class Profile:
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""
-        return "recipe" in self.height.attrs and grown(self.height, 1.0) is not None
+        if self._can_grow is None:
+            self._can_grow = "recipe" in self.height.attrs and grown(self.height, 1.0) is not None
+        return self._can_grow
 
     def enlarge(self, scene: Scene) -> tuple[Scene, tuple[int, int]] | None:
         """The scene on a larger grid, and the cell of it where the present one begins; None if it cannot grow."""

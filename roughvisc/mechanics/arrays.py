@@ -34,7 +34,7 @@ _BLOCK = 1 << 17
 
 
 def blockwise(
-    work: Callable[..., Found], *fields: NDArray[Any] | float, out: NDArray[Any] | None = None, threads: int = 1
+    work: Callable[..., Found], *fields: Any, out: NDArray[Any] | None = None, threads: int = 1
 ) -> list[Found]:
     """What some work gives of each block of cells, in their order.
 
@@ -54,8 +54,7 @@ def blockwise(
     On narrow grids, where slices would take as long as the work, it is given the fields as they are: work that is no
     ufunc needs vectors then.
     """
-    first = fields[0]
-    size = first.size if isinstance(first, np.ndarray) else 0
+    size = fields[0].size
     if size <= _BLOCK:
         return [work(*fields) if out is None else work(*fields, out=out)]
     if out is not None and not out.flags.c_contiguous:
@@ -157,7 +156,7 @@ def cells_where(test: Callable[[slice], Mask], size: int, threads: int) -> Cells
     """Cells, as flat indices, at which a test of a slice of flat cells says yes."""
 
     def find(part: slice) -> Cells:
-        found = np.flatnonzero(test(part))
+        [found] = test(part).nonzero()
         if part.start:
             found += part.start
         return found

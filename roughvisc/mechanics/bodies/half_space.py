@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -97,8 +98,11 @@ def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float | Array, f
     return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
 
 
+_gauss_rule = cache(np.polynomial.legendre.leggauss)
+
+
 def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
-    nodes, weights = np.polynomial.legendre.leggauss(points)
+    nodes, weights = _gauss_rule(points)
     total = np.zeros_like(x)
     for node_x, weight_x in zip(nodes, weights, strict=True):
         x_squared = (x - node_x * dx / 2) ** 2

@@ -40,10 +40,10 @@ _BLOCK = 8
 
 
 class _Work(NamedTuple):
-    """A room for the transforms along y, one for some rows or columns of each thread, and which go together."""
+    """A room for the transforms along y, one for some rows or for some columns a thread, and which go together."""
 
     spectrum: NDArray[Any]
-    rooms: list[NDArray[np.uint8]]
+    rooms: list[tuple[NDArray[Any], NDArray[Any]]]
     rows: tuple[slice, ...]
     columns: tuple[slice, ...]
 
@@ -232,15 +232,14 @@ class Operator:
         go forward, are multiplied and come back while they stay in the cache. Rows go to ``keep`` as they come back: it
         has them written where it wants them.
         """
-        along, nx, (mx, my), kind = self._transforms, self.shape[0], points, symbol[0].dtype
-        threads = self.threads
-        work = self._work_on(points, kind)
+        along, nx, threads = self._transforms, self.shape[0], self.threads
+        work = self._work_on(points, symbol[0].dtype)
         spectrum, rooms = work.spectrum, work.rooms[:threads]  # each thread takes a room, and puts it back
-        own = mx == nx  # columns stay where they are unless there are more points of them
+        own = points[0] == nx  # columns stay where they are unless there are more points of them
 
         def forward(rows: slice) -> None:
             room = rooms.pop()
-            along.rows_into(spectrum[rows], _rows_of(field, rows), _as(room, kind, (rows.stop - rows.start, my)))
+            along.rows_into(spectrum[rows], _rows_of(field, rows), room[0][: rows.stop - rows.start])
             rooms.append(room)
 
         def across(number_of_block: int) -> None:
@@ -248,7 +247,7 @@ class Operator:
             room = rooms.pop()
             columns = there = spectrum[:, block]
             if not own:
-                columns = _as(room, spectrum.dtype, (mx, block.stop - block.start))
+                columns = room[1][:, : block.stop - block.start]
                 columns[:nx] = there
                 columns[nx:] = 0
             changed = along.of_columns(columns, axis=0, overwrite_x=True, workers=1)
@@ -260,7 +259,7 @@ class Operator:
 
         def back(rows: slice) -> None:
             room = rooms.pop()
-            here = _as(room, kind, (rows.stop - rows.start, my))
+            here = room[0][: rows.stop - rows.start]
             keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
             rooms.append(room)
 
@@ -276,7 +275,10 @@ class Operator:
             memory, rooms = self._memory
             spectrum = _as(memory, number, (self.shape[0], self._transforms.width(points[1])))
             rows = tuple(blocks(self.shape[0], _rows_together(points[1])))
-            work = _Work(spectrum, rooms, rows, _column_blocks(spectrum.shape[1], points[0], number))
+            columns = _column_blocks(spectrum.shape[1], points[0], number)
+            most, widest = rows[0].stop, max(block.stop - block.start for block in columns)
+            parts = [(_as(room, kind, (most, points[1])), _as(room, number, (points[0], widest))) for room in rooms]
+            work = _Work(spectrum, parts, rows, columns)
             self._work[points, kind] = work
         return work
 

@@ -40,9 +40,15 @@ def neighbours(mask: Mask, periodic: bool, before: bool = False, beyond: bool = 
         yield from (lower.T, upper.T) if turned else (lower, upper)
 
 
-def faces_between(contact: Mask, free: Mask, periodic: bool, **outside: bool) -> int:
+def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> int:
     """Number of faces between cells in contact and free ones, as :func:`neighbours` sees these."""
-    return sum(int(np.count_nonzero(contact & beside)) for beside in neighbours(free, periodic, **outside))
+    count = 0
+    for own, other in ((contact, free), (contact.T, free.T)):
+        below = other[-1] if periodic else before
+        above = other[0] if periodic else beyond
+        pairs = (own[1:], other[:-1]), (own[:-1], other[1:]), (own[0], below), (own[-1], above)
+        count += sum(int(np.count_nonzero(cells & beside)) for cells, beside in pairs)
+    return count
 
 
 def staircase(contact: Mask, free: Mask, cell_area: float, periodic: bool, **outside: bool) -> float:

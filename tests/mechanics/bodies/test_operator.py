@@ -156,8 +156,7 @@ def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines
     operator = Operator(shape, (1.0, 1.0), "periodic", workers=2)
     for kind in (np.float32, np.float64):
         work = operator._work_on(shape, np.dtype(kind))
-        rows = operators._as(work.rooms[0], np.dtype(kind), (2, shape[1]))
-        for memory in (work.spectrum, rows):
+        for memory in (work.spectrum, *work.rooms[0]):
             assert memory.ctypes.data % 64 == 0
             assert memory.strides[0] % 128 == 64
 
