@@ -366,10 +366,14 @@ class LoadingRows(Rows):
         """How it was modelled, what an audit asks for, and notes on what is beyond the model; these are logged too."""
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
         material = self._problem.body.material
-        largest = (float(dataset[name].max()) for name in ("force", "approach"))
+        force, approach = (float(np.fmax.reduce(dataset[name].values)) for name in ("force", "approach"))
         (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
         warnings = {
-            "slope_note": self._slope_note(dataset),
+            "slope_note": slope_note(
+                profile.height[profile.window.surface_cells],
+                settings.boundary,
+                approach - profile.least_gap,  # below the highest cell
+            ),
             "border_note": self._border_note(dataset),
             "edge_note": "" if self._border is None else edge_note(self._border),
             "wake_note": self._wake_note(dataset),
@@ -379,7 +383,7 @@ class LoadingRows(Rows):
         return {
             "memory": choice.note,
             "series_error": choice.series_error,
-            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, *largest),
+            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, force, approach),
             "material_note": complete(material).note,
             "program_note": scene.program.note,
             "slide_note": slide_note(scene.program, profile.spacing),
@@ -391,12 +395,6 @@ class LoadingRows(Rows):
             "compliance_at_once": scene.compliance(0.0),
             "compliance_at_end": scene.final,
         }
-
-    def _slope_note(self, dataset: xr.Dataset) -> str:
-        """What to say of a surface that is too steep where it was loaded."""
-        profile = self.profile
-        deepest = float(dataset["approach"].max()) - profile.least_gap  # below the highest cell
-        return slope_note(profile.height[profile.window.surface_cells], self._settings.boundary, deepest)
 
     def _wake_note(self, dataset: xr.Dataset) -> str:
         """What to say of a contact that stands alone and slides into the wake of the one before."""

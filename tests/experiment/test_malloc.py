@@ -7,8 +7,8 @@ import sys
 import pytest
 
 import roughvisc as rv
+from roughvisc.experiment import loading
 from roughvisc.experiment import resources as malloc
-from roughvisc.experiment.loading import LoadingRows
 from roughvisc.experiment.resources import keep_memory, retain_arena
 
 MB = 1 << 20
@@ -54,8 +54,8 @@ def test_wide_grid__keeps_what_is_freed_till_its_end(library):
 def test_memory_of_a_march__is_given_back_when_the_result_is_described(library, monkeypatch):
     """Before the file is written: what the notes take is freed by then."""
     monkeypatch.setattr(malloc, "_WIDE", 1)
-    note = LoadingRows._slope_note
-    monkeypatch.setattr(LoadingRows, "_slope_note", lambda *given: library.told.append("noted") or note(*given))
+    note = loading.slope_note
+    monkeypatch.setattr(loading, "slope_note", lambda *given: library.told.append("noted") or note(*given))
     program = rv.Program().load(1e-4, over=0.05)
     rv.simulate(rv.sphere(1e-3, 2e-4, 20), rv.elastic(1e6), program, times=[0.05], tolerance=1e-2, progress=False)
     assert library.told == [(MMAP, 32 * MB), (TRIM, 2047 * MB), "noted", (TRIM, 64 * MB), "trim"]

@@ -161,12 +161,10 @@ class ContactProblem:
 
     def separated(self, displacement: Array, contact: Cells) -> tuple[float, Array, Array | None]:
         """Least separation of present cells, that of some cells, and that of all, flat, unless the field is wide."""
-        displaced = displacement.reshape(-1)
-        if not is_wide(displaced.size):
-            whole = slice(0, displaced.size)
-            field = self.separation_of(displaced, whole)
-            return self.lowest_of(field, whole), field.take(contact), field
-        apart = np.empty(contact.size)
+        if not is_wide(displacement.size):
+            field = (self.gap + displacement).reshape(-1)
+            return self.lowest_of(field, slice(0, field.size)), field.take(contact), field
+        displaced, apart = displacement.reshape(-1), np.empty(contact.size)
 
         def work(part: slice, few: slice) -> float:
             here = self.separation_of(displaced, part)

@@ -277,16 +277,15 @@ def in_pairs(steps: Held) -> Through:
         if first is not None:
             yield first if step is None else assign_pair_error(first, step)
             first = None
-        if step is not None and step.state.behind and _is_held(step):
+        if (
+            step is not None
+            and step.state.behind
+            and (step.scene.keeps(step.shown.time) or (step.state.companion and step.state.companion.before is None))
+        ):
             first = step
         elif step is not None:
             yield step
         del step  # its fields are not needed while the next one is computed
-
-
-def _is_held(step: Step) -> bool:
-    companion = step.state.companion
-    return step.scene.keeps(step.shown.time) or (companion is not None and companion.before is None)
 
 
 def assign_pair_error(first: Step, second: Step) -> Step:

@@ -190,8 +190,11 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
         return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
     length = state.pace.suggestion or _first_length(scene, state, segment, event)
     length = max(length, shortest_step(scene, state, segment))
-    if "bdf2" not in scene.memory.rules:
-        length = min(length, _longest_linear(scene, distance))
+    if "bdf2" not in scene.memory.rules:  # pressure taken as linear must not ring
+        longest = distance
+        while scene.stiff_ratio(longest) > STIFF and longest > 1e-9 * distance:
+            longest /= 2
+        length = min(length, longest)
     if segment.amplitude and remaining_creep_fraction(scene, length) > _NOT_SEEN * scene.tolerance:
         length = min(length, segment.period / _STEPS_A_CYCLE)
     if length >= distance * (1 - 1e-9):
@@ -206,14 +209,6 @@ def shortest_step(scene: Scene, state: State, segment: Segment) -> float:
     """No step is shorter: by the segment, or by the first time kept in it. [s]"""
     length = min(segment.duration, scene.next_kept(state.now.time) - state.began)
     return SMALLEST_STEP * length
-
-
-def _longest_linear(scene: Scene, distance: float) -> float:
-    """Longest step in which pressure taken as linear does not ring. [s]"""
-    length = distance
-    while scene.stiff_ratio(length) > STIFF and length > 1e-9 * distance:
-        length /= 2
-    return length
 
 
 def _first_length(scene: Scene, state: State, segment: Segment, event: float) -> float:
