@@ -62,11 +62,11 @@ TABLES = {
         for name, one in _GENERATED.items()
     },
     **{
-        name: ("material", _own(one, {"model", *TEMPERATURE, *THICKNESS}))
+        name: ("material", _own(one, {"model", "on", *TEMPERATURE, *THICKNESS}))
         for name, one in _MODELS.items()
     },
     "material: temperature": ("material", _only(material.SECTIONS["elastic"], TEMPERATURE)),
-    "material: thickness": ("material", _only(material.SECTIONS["elastic"], THICKNESS)),
+    "material: thickness": ("material", _only(material.SECTIONS["elastic"], (*THICKNESS, "on"))),
     **{
         f"program: {name}": ("program.0", kind["load"].model_fields)
         for name, kind in program.KINDS.items()

@@ -35,10 +35,8 @@ from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.contact.neighbours import staircase
-from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.march import march
@@ -47,6 +45,7 @@ from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, 
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.step import at_border, segment_number
 from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
+from roughvisc.mechanics.stepping.wave_memory import choose_body_memory
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
@@ -172,7 +171,7 @@ class Loading(Experiment):
     def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
         """Memory of the march, its contact sparse unless it is known. [byte]"""
         options = memory_options(self.program.on_area(area), settings)
-        memory = choose_memory(complete(body.material), **options).memory
+        memory = choose_body_memory(body, **options).memory
         counts = {"rows": least_rows(settings, self.program)} | counts
         if settings.method == "fast":
             return march_bytes(settings, cells, memory, **counts)
@@ -207,19 +206,17 @@ class LoadingRows(Rows):
         require_memory(
             (height.sizes["x"], height.sizes["y"]),
             settings,
-            body.material,
+            body,
             program,
             in_memory=in_memory,
-            raises_surface=body.kernel.raises_surface,
             heights=height.values,
             area=nominal_area(height),
         )
         mirror = settings.method == "fast" and not program.slides
-        (term,) = body.terms()
         self.profile = Profile(
-            height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=term.kernel
+            height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=body.kernel
         )
-        self._scene, self._choice = build_scene(self.profile, term.material, program, settings)
+        self._scene, self._choice = build_scene(self.profile, body, program, settings)
         self._followed = not self.profile.window.whole
         log.info("memory: %s", self._choice.note)
         for _ in range(0 if state is None else state.growths):
@@ -230,7 +227,7 @@ class LoadingRows(Rows):
         self._border = None if state is None else state.border
         #: Whether the profile has a mean plane of its own: that of an indenter depends on how large its grid is.
         self._has_mean_plane = settings.boundary == "free" and not self.profile.can_grow()
-        spacing, kernel, single = self.profile.spacing, term.kernel, settings.tolerance >= _SINGLE
+        spacing, kernel, single = self.profile.spacing, body.kernel, settings.tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: FarFieldDisplacement(window, spacing, kernel, single=single))
         self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, spacing, kernel))
 
@@ -365,7 +362,6 @@ class LoadingRows(Rows):
     def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
         """How it was modelled, what an audit asks for, and notes on what is beyond the model; these are logged too."""
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
-        material = self._problem.body.material
         force, approach = (float(np.fmax.reduce(dataset[name].values)) for name in ("force", "approach"))
         (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
         warnings = {
@@ -384,7 +380,7 @@ class LoadingRows(Rows):
             "memory": choice.note,
             "series_error": choice.series_error,
             "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, force, approach),
-            "material_note": complete(material).note,
+            "material_note": self._problem.body.note,
             "program_note": scene.program.note,
             "slide_note": slide_note(scene.program, profile.spacing),
             "accuracy_note": accuracy_note(scene, dataset),

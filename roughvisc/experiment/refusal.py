@@ -14,10 +14,9 @@ from roughvisc.errors import TooLargeError
 from roughvisc.experiment.profile import uses_window
 from roughvisc.experiment.resources import Available, curve_bytes, march_bytes, memory_available
 from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.wave_memory import choose_body_memory
 from roughvisc.settings import Settings
 from roughvisc.topography.borders import is_mirrored
 
@@ -34,11 +33,10 @@ _SURFACE = 4.0
 def require_memory(
     shape: tuple[int, int],
     settings: Settings,
-    material: Material,
+    body: Body,
     program: Program,
     *,
     in_memory: bool,
-    raises_surface: bool = False,
     heights: NDArray[np.float64] | None = None,
     area: float = 1.0,
 ) -> None:
@@ -48,12 +46,10 @@ def require_memory(
     ----------
     shape : tuple of int
         Cells of the surface.
-    settings, material, program : Settings, Material, Program
+    settings, body, program : Settings, Body, Program
         Of the case.
     in_memory : bool
         Whether the kept fields stay in memory.
-    raises_surface : bool
-        Whether pressure may raise the body's surface anywhere: there is no window then.
     heights : ndarray, optional
         Of the surface, if they are there: a surface that is its own mirror image is solved on a quarter. [m]
     area : float
@@ -67,9 +63,9 @@ def require_memory(
     cells = math.prod(shape)
     if cells < WORTH_ASKING:
         return
-    memory = choose_memory(complete(material), **memory_options(program.on_area(area), settings)).memory
+    memory = choose_body_memory(body, **memory_options(program.on_area(area), settings)).memory
     rows = least_rows(settings, program)
-    part = 0.0 if uses_window(settings) and not raises_surface else 1.0
+    part = 0.0 if uses_window(settings) and not body.kernel.raises_surface else 1.0
 
     def needed(cells: float, settings: Settings = settings, *, part: float, in_memory: bool = in_memory) -> float:
         return march_bytes(settings, cells, memory, rows=rows, part=part, in_memory=in_memory)

@@ -22,6 +22,7 @@ from roughvisc.mechanics.arrays import is_wide
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import Memory
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.settings import Settings
 from roughvisc.variables.chunks import chunks
 
@@ -231,6 +232,8 @@ _COMPANION, _EXPONENTIAL = 1.5, 5.2
 _FOLLOWING, _MOVED = 13.0, 12.0
 #: What the direct history adds beside the companion: total displacements and effective pressures.
 _DIRECT = 6.5
+#: A symbol of each exponential where every wave has its own compliances; spectra of pressure and displacement.
+_SYMBOL, _SPECTRA = 0.25, 4.0
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
 _SHOWN = 3.0
 #: Fields of the state while the file is written, a frame as it was kept among them.
@@ -301,6 +304,13 @@ def march_bytes(
             if memory.acts_on != "displacement":
                 solved += _FOLLOWING + (_EXPONENTIAL * modes if memory.acts_on == "both" else 0.0)
                 solved += _MOVED if grows else 0.0
+    elif isinstance(memory, WaveMemory):
+        # of waves, as many numbers as cells, or four times as many; and a quarter as many for a symbol
+        modes, padded = len(memory.series.compliances), 4.0 if settings.boundary == "free" else 1.0
+        solved += _COMPANION + _DIRECT + padded * (modes * (_EXPONENTIAL + _SYMBOL) + _SPECTRA)
+        state += 3 * padded * modes
+        if "bdf2" in memory.rules:
+            solved += _SHOWN + padded * _EXPONENTIAL * modes
     elif isinstance(memory, History):
         past = 1.5 * history_bytes(contact * cells, steps)
         solved += _COMPANION + _DIRECT

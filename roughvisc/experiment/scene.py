@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.profile import Profile
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.kernel import has_finite_mean
 from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice
 from roughvisc.mechanics.hereditary.memory import ActsOn
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.stepping.controller import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program, Segment, instant
 from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.settings import Settings
 from roughvisc.units import said
 
@@ -271,8 +273,8 @@ def slide_note(program: Program, spacing: Spacing) -> str:
 _FORESEEN_ON = 40
 
 
-def build_scene(profile: Profile, material: Material, program: Program, settings: Settings) -> tuple[Scene, Choice]:
-    """Scene of a case and what models its material.
+def build_scene(profile: Profile, body: Body, program: Program, settings: Settings) -> tuple[Scene, Choice]:
+    """Scene of a case and what models its body.
 
     Raises
     ------
@@ -284,7 +286,7 @@ def build_scene(profile: Profile, material: Material, program: Program, settings
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, settings.time_step)
     check_slides(program, settings, profile.spacing)
-    material = complete(material)
+    material = complete(body.material)
     (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), profile.gap[profile.present])
     if settings.boundary == "periodic" and profile.all_present and not has_finite_mean(profile.kernel):
@@ -295,9 +297,18 @@ def build_scene(profile: Profile, material: Material, program: Program, settings
     grows = not profile.window.whole or (
         settings.boundary == "free" and settings.edge == "error" and profile.can_grow()
     )
-    choice = choose_memory(material, **memory_options(program, settings, "pressure" if grows else "displacement"))
+    operator = profile.operator(settings.boundary)
+    options = memory_options(program, settings, "pressure" if grows else "displacement")
+    choice = choose_body_memory(body, **options, operator=operator)
+    if isinstance(choice.memory, WaveMemory):
+        if settings.method != "fast":
+            raise InputError(
+                f"method is {settings.method!r} and the body is {body!r}, in which space and time do not separate: "
+                "expected method = 'fast'"
+            )
+        grows, operator = False, choice.memory.grid
     scene = Scene(
-        operator=profile.operator(settings.boundary),
+        operator=operator,
         material=choice.material,
         memory=choice.memory,
         program=program,

@@ -46,10 +46,10 @@ class Stack(Experiment):
         return list(self.loads)
 
     def _found(self, problem, done):
-        (term,), settings = problem.body.terms(), problem.settings
-        profile = Profile(problem.height, settings.missing, kernel=term.kernel)
+        body, settings = problem.body, problem.settings
+        profile = Profile(problem.height, settings.missing, kernel=body.kernel)
         operator = profile.operator(settings.boundary)
-        cell, alpha = operator.cell_area, float(term.material.contact_compliance(0.0))
+        cell, alpha = operator.cell_area, float(body.material.contact_compliance(0.0))
         for number, load in enumerate(self.loads[done:], done + 1):
             options = {"error_tolerance": settings.tolerance, "estimate_error": True, "tolerance": settings.tolerance}
             found = solve_contact(operator, profile.gap, load=load * alpha / cell, **options)

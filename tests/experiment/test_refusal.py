@@ -107,11 +107,11 @@ def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
     settings = Settings(boundary="periodic", times=2)
     fields = 8.0 * ball.size
     limited(12 * fields)
-    refusal.require_memory(ball.shape, settings, RUBBER, PRESS, heights=ball.values, **given)
+    refusal.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=ball.values, **given)
     off = ball.values + 1e-6 * np.arange(600)
     with pytest.raises(TooLargeError):
-        refusal.require_memory(ball.shape, settings, RUBBER, PRESS, heights=off, **given)
-    refusal.require_memory(ball.shape, Settings(boundary="free", times=2), RUBBER, PRESS, heights=off, **given)
+        refusal.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=off, **given)
+    refusal.require_memory(ball.shape, Settings(boundary="free", times=2), rv.Body(RUBBER), PRESS, heights=off, **given)
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):

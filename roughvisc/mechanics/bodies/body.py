@@ -26,22 +26,6 @@ BASE: Base = "bonded"
 
 
 @dataclass(frozen=True)
-class Term:
-    """One term of a body's response: a function of time and an operator in space.
-
-    Attributes
-    ----------
-    material : Material
-        Its contact compliance is the function of time, ``C(t)``. [1/Pa]
-    kernel : Kernel
-        Displacement under unit pressure at unit contact compliance. [m]
-    """
-
-    material: Material
-    kernel: Kernel
-
-
-@dataclass(frozen=True)
 class Body:
     """A viscoelastic body whose surface is the same everywhere.
 
@@ -77,10 +61,6 @@ class Body:
             if not callable(getattr(self.kernel, name, None)):
                 found = type(self.kernel).__name__
                 raise InputError(f"kernel is a {found}: expected a Kernel; it has no {name}")
-
-    def terms(self) -> tuple[Term, ...]:
-        """What the response to pressure is a sum of: ``C(q, t) = sum_i C_i(t) K_i(q)``."""
-        return (Term(complete(self.material), self.kernel),)
 
     @property
     def materials(self) -> tuple[Material, ...]:

@@ -185,17 +185,27 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
         If the grid is impossible, or the transfer function is not positive.
     """
     check_grid(shape, spacing)
-    qx, qy = (2 * math.pi / (n * side) * np.arange(n // 2 + 1) for n, side in zip(shape, spacing, strict=True))
-    symbol = np.array(kernel.transfer(qx[:, None], qy[None, :]), dtype=float)
+    waves = periodic_waves(shape, spacing)
+    symbol = np.array(kernel.transfer(*waves), dtype=float)
     amiss = ~(np.isfinite(symbol) & (symbol > 0))
     amiss[0, 0] = not 0 <= symbol[0, 0] < math.inf
     if amiss.any():
         i, j = (int(n) for n in np.argwhere(amiss)[0])
+        qx, qy = (float(one.ravel()[at]) for one, at in zip(waves, (i, j), strict=True))
         raise InputError(
-            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {qx[i]:g} and {qy[j]:g} 1/m: "
+            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {qx:g} and {qy:g} 1/m: "
             "expected a positive number, or zero where both are zero"
         )
     return symbol
+
+
+def periodic_waves(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
+    """Wave numbers of a symbol under periodic pressure, along x and along y, which broadcast. [1/m]"""
+    qx, qy = (
+        np.array(2 * math.pi / (n * side) * np.arange(n // 2 + 1), dtype=np.float64)
+        for n, side in zip(shape, spacing, strict=True)
+    )
+    return qx[:, None], qy[None, :]
 
 
 def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:

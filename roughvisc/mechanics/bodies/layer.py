@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.body import Body, Term, separability_error
+from roughvisc.mechanics.bodies.body import Body, separability_error
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.layered import Layered, effective_compliance
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
@@ -100,15 +100,6 @@ class LayeredBody(Body):
         ]
         found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, shear)
         return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
-
-    def terms(self) -> tuple[Term, ...]:
-        """The one term that there is where space and time separate."""
-        if not self.separates:
-            raise InputError(
-                f"the body is {self!r}, whose materials creep differently: expected materials in proportion, as "
-                "elastic ones are, or steady sliding (rv.friction, [friction])"
-            )
-        return super().terms()
 
     def attributes(self) -> dict[str, Any]:
         """What it is, in words."""

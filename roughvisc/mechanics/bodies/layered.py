@@ -192,13 +192,17 @@ def _images(factor: Callable[[Array], Array], thicknesses: tuple[float, ...], li
     longest = 1e-2
     while longest > _LONG and abs(float(factor(np.array(longest / whole))) / limit - 1) > _NEAR:
         longest /= 10
-    first, last = _SHALLOWEST * thinnest, whole / longest
-    depths = np.geomspace(first, last, math.ceil(_PER_DECADE * math.log10(last / first)))
+    depths = image_depths(_SHALLOWEST * thinnest, whole / longest)
     q = np.geomspace(longest / whole, _SHORT / thinnest, 3 * depths.size)
     wanted = factor(q)
     rows = np.vstack([np.exp(-np.outer(q, depths)) / wanted[:, None], np.full(depths.size, 1 / limit)])
     weights = np.linalg.lstsq(rows, np.append(1 - 1 / wanted, 1 - 1 / limit), rcond=1e-13)[0]
     return depths, weights
+
+
+def image_depths(first: float, last: float, per_decade: int = _PER_DECADE) -> Array:
+    """Depths of images between two of them. [m]"""
+    return np.geomspace(first, last, math.ceil(per_decade * math.log10(last / first)))
 
 
 def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths: Array, weights: Array) -> Array:

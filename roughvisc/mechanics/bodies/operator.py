@@ -6,6 +6,7 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple
@@ -17,7 +18,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import blocks, empty, parallel_map, threads_of
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves
 from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.sparse import Scattered
 
@@ -109,6 +110,55 @@ class Operator:
         self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
         self._work: dict[tuple[tuple[int, int], np.dtype[Any]], _Work] = {}
+
+    def symbol_of(self, kernel: Kernel) -> Array:
+        """Symbol of another kernel on these cells, of either sign. [m]"""
+        if self.boundary == "free":
+            images = self._transforms.images
+            padded = (images * self._points[0], images * self._points[1])
+            return self._transforms.cropped(free_space_symbol(kernel, padded, self.spacing), self._points)
+        waves = periodic_waves(self.surface_shape, self.spacing)
+        return self._transforms.cropped(np.asarray(kernel.transfer(*waves), dtype=float), self._points)
+
+    def answering(self, symbol: Array, kernel: Kernel) -> Operator:
+        """The same cells, working memory and boundary with another kernel, of which :meth:`symbol_of` is known."""
+        other = Operator.__new__(Operator)
+        other.__dict__ |= {name: value for name, value in self.__dict__.items() if name not in _OF_SYMBOL}
+        other.kernel, other._symbol = kernel, symbol
+        other.definite = self.boundary == "free" or float(symbol[0, 0]) > 0
+        return other
+
+    @property
+    def wave_numbers(self) -> tuple[float, float]:
+        """Of the longest and of the shortest wave of the cells. [1/m]"""
+        longest = max(count * side for count, side in zip(self.surface_shape, self.spacing, strict=True))
+        return 2 * np.pi / longest, math.hypot(*(np.pi / side for side in self.spacing))
+
+    def spectrum(self, field: Array) -> NDArray[Any]:
+        """Transform of a field on these cells, zero beyond them."""
+        if self._points != self.shape:
+            padded = np.zeros(self._points)
+            padded[: self.shape[0], : self.shape[1]] = field
+            field = padded
+        return self._transforms.of_field(field, workers=self.threads)
+
+    def field_of(self, spectrum: NDArray[Any]) -> Array:
+        """The field of a transform, which is used up."""
+        found = self._transforms.field_back(spectrum, s=self._points, overwrite_x=True, workers=self.threads)
+        return np.ascontiguousarray(found[: self.shape[0], : self.shape[1]])
+
+    def multiply(self, spectrum: NDArray[Any], symbol: Array) -> None:
+        """Multiply a transform by a symbol, in place."""
+        self._transforms.multiply(spectrum, symbol)
+
+    def turn(self, cells: int, axis: int) -> NDArray[np.complex128]:
+        """What the transform of a periodic field is multiplied by if it is seen from so many cells farther."""
+        if self.mirrored or self.boundary != "periodic":
+            raise ValueError("only periodic fields without mirror images turn")
+        count = self.shape[axis]
+        waves = fft.fftfreq(count, 1 / count) if axis == 0 else fft.rfftfreq(count, 1 / count)
+        phases = np.exp(2j * np.pi * cells / count * waves)
+        return phases[:, None] if axis == 0 else phases
 
     def on(self, shape: tuple[int, int]) -> Operator:
         """The same body, boundary, symmetry and extent on another number of cells."""
@@ -355,6 +405,10 @@ class Operator:
         field_q = self._transforms.of_field(_rows_of(field, slice(0, self.shape[0])), workers=1)
         self._transforms.multiply(field_q, whole)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
+
+
+#: What an operator has found of its symbol.
+_OF_SYMBOL = {name for name, value in vars(Operator).items() if isinstance(value, cached_property)}
 
 
 def _rows_of(field: NDArray[Any] | Scattered, rows: slice) -> NDArray[Any]:

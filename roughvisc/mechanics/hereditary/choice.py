@@ -11,7 +11,7 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.hereditary.memory import STIFF, ActsOn, stiff_ratio
+from roughvisc.mechanics.hereditary.memory import STIFF, ActsOn, Memory, stiff_ratio
 from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
 from roughvisc.mechanics.materials.passive import smallest_loss
 from roughvisc.mechanics.materials.protocol import check_creep, complete
@@ -43,7 +43,7 @@ class Choice:
 
     Attributes
     ----------
-    memory : Modes or History
+    memory : Memory
         What a march keeps its past in.
     series_error : float
         Largest relative error of the compliance at time zero and from the shortest age on; zero where the memory is
@@ -52,7 +52,7 @@ class Choice:
         What is modelled, in words.
     """
 
-    memory: Modes | History
+    memory: Memory
     series_error: float
     note: str
 
@@ -140,11 +140,11 @@ def _active(material: Material) -> str:
 
 def _recursive(series: Prony, acts_on: ActsOn, duration: float) -> Modes:
     twice = acts_on == "pressure" and len(series.times) + bool(series.fluidity) <= _MOST_TWICE
-    rules = Modes.rules if _may_ring(series, duration) else tuple(rule for rule in Modes.rules if rule != "bdf2")
+    rules = Modes.rules if may_ring(series, duration) else tuple(rule for rule in Modes.rules if rule != "bdf2")
     return Modes(series, "both" if twice else acts_on, rules)
 
 
-def _may_ring(material: Material, duration: float) -> bool:
+def may_ring(material: Material, duration: float) -> bool:
     """Whether in some step pressure taken as linear would ring; if not, no step needs the state before the last."""
     if duration == 0:
         return False

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +42,9 @@ class ModesState:
         Length of the last step. [s]
     """
 
-    modes: Array
-    field: Array
-    earlier: Array | None = None
+    modes: NDArray[Any]
+    field: NDArray[Any]
+    earlier: NDArray[Any] | None = None
     step: float = 0.0
 
 

@@ -20,15 +20,23 @@ STIFF = 0.5
 #: ``bdf2``: second order, damps what relaxes within a step. ``euler``: its start. ``right``: constant, jumping at
 #: the start of the step.
 Rule = Literal["linear", "bdf2", "euler", "right"]
-ActsOn = Literal["displacement", "pressure", "both"]
+ActsOn = Literal["displacement", "pressure", "both", "waves"]
 
 
 class Memory(Protocol):
     """What a march asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
 
     @property
+    def material(self) -> Material:
+        """Whose past it is; of waves, that one of them by which steps are judged."""
+        ...
+
+    @property
     def acts_on(self) -> ActsOn:
-        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa], or ``(p, v)``."""
+        """Whether the fields are displacements at unit compliance [Pa m] or pressures [Pa], or ``(p, v)``.
+
+        One of waves takes pressures, and carries displacements.
+        """
         ...
 
     @property

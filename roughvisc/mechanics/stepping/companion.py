@@ -87,16 +87,16 @@ def coarse_initial_guess(now: Instant, companion: Instant | None = None, togethe
     pressure, displacement : ndarray, shape (nx, ny)
         [Pa], and at unit compliance [Pa m], in memory of their own.
     """
-    assert now.unit_displacement is not None
     threads = now.contact.threads
-    pressure, displaced = now.contact.times(1.0), [(1.0, now.unit_displacement)]
+    pressure, known = now.contact.times(1.0), now.unit_displacement
+    displaced = [] if known is None else [(1.0, known)]
     if companion is not None and together is not None:
         companion.contact.add_to(pressure, 1.0)
         together.contact.add_to(pressure, -1.0)
         cut_at_zero(pressure, threads)
-        if companion.unit_displacement is not None and together.unit_displacement is not None:
+        if displaced and companion.unit_displacement is not None and together.unit_displacement is not None:
             displaced += [(1.0, companion.unit_displacement), (-1.0, together.unit_displacement)]
-    return pressure, weighted(displaced, empty(pressure.shape), threads)
+    return pressure, weighted(displaced, empty(pressure.shape), threads) if displaced else None
 
 
 def difference(

@@ -273,7 +273,7 @@ def _step_with_companion(
 
 def _touched(scene: Scene, state: State, time: float) -> float:
     """Approach at which surfaces that are apart would touch at a time to come. [m]"""
-    carried = carried_into_step(scene, state.memory, time - state.now.time, "linear")[2]
+    carried = carried_into_step(scene, state.memory, time - state.now.time, "linear")[3]
     return scene.lowest(scene.gap + carried)
 
 

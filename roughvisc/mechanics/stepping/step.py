@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.mechanics.arrays import blockwise, empty
+from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.exponentials import Modes, padded
 from roughvisc.mechanics.hereditary.memory import Rule
@@ -29,6 +30,7 @@ from roughvisc.mechanics.stepping.scene import (
     Trajectory,
     Trial,
 )
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 
 Array = NDArray[np.float64]
 # The relative duality gap of each step's contact problem, in units of the tolerance. The error of the pressure (L1) is
@@ -49,7 +51,8 @@ def initial_state(scene: Scene) -> State:
 
 def trial_at_rest(scene: Scene, state: State) -> Trial:
     nothing = np.zeros(scene.operator.shape)
-    return Trial(state.now, nothing, None if scene.memory.acts_on == "displacement" else nothing, 0.0, "linear")
+    of_pressures = scene.memory.acts_on in ("pressure", "both")
+    return Trial(state.now, nothing, nothing if of_pressures else None, 0.0, "linear")
 
 
 def trial_step(
@@ -70,9 +73,9 @@ def trial_step(
     unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves; ``arrival``
     is the time of the end where that is known to the last bit, and not only as a sum. [s]
     """
-    alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
+    operator, alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
     # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
-    carried = None if effective is None else field
+    carried = None if scene.memory.acts_on == "displacement" else field
     threads = scene.operator.threads
     gap = field if carried is None else empty(field.shape)
     blockwise(np.add, scene.gap, field, out=gap, threads=threads)
@@ -92,7 +95,7 @@ def trial_step(
         if known is not None:
             blockwise(np.multiply, known, alpha, out=known, threads=threads)
     contact = solve_contact(
-        scene.operator,
+        operator,
         gap,
         load=value * alpha / area if control == "load" else None,
         approach=value if control == "approach" else None,
@@ -121,7 +124,7 @@ def trial_step(
         Sparse.of(pressure),
         value if control == "load" else contact.load / alpha * area,
         value if control == "approach" else contact.approach,
-        displacement,
+        displacement if operator is scene.operator else None,
     )
     return Trial(
         instant,
@@ -134,26 +137,35 @@ def trial_step(
         contact.error,
         contact.converged,
         contact.iterations,
-        contact.convolutions + (scene.memory.acts_on == "pressure"),
+        contact.convolutions + (scene.memory.acts_on in ("pressure", "waves")),
     )
 
 
-def carried_into_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[float, Array | None, Array]:
-    """``alpha`` of a step, and what is carried into it: the effective pressure, if known, and the displacement."""
+def carried_into_step(
+    scene: Scene, memory: Any, length: float, rule: Rule
+) -> tuple[Operator, float, Array | None, Array]:
+    """What answers the pressure of a step, an operator times ``alpha``, and what is carried into it.
+
+    That is the effective pressure, if known, and the displacement.
+    """
     alpha, carried = scene.memory.predict(memory, length, rule)
+    if isinstance(scene.memory, WaveMemory):
+        return scene.memory.operator_of(memory, length, rule), alpha, None, carried
     if scene.memory.acts_on == "displacement":
-        return alpha, None, carried
+        return scene.operator, alpha, None, carried
     if scene.memory.acts_on == "both":
-        return alpha, carried[0], carried[1]
-    return alpha, carried, scene.operator.displacement(carried)
+        return scene.operator, alpha, carried[0], carried[1]
+    return scene.operator, alpha, carried, scene.operator.displacement(carried)
 
 
 def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
     """What a trial changes of a trajectory, once it is accepted."""
-    now = trial.instant
-    assert now.unit_displacement is not None
-    acts_on = scene.memory.acts_on
-    field = now.unit_displacement if acts_on == "displacement" else now.pressure
+    now, acts_on = trial.instant, scene.memory.acts_on
+    if acts_on == "displacement":
+        assert now.unit_displacement is not None
+        field = now.unit_displacement
+    else:
+        field = now.pressure
     if acts_on == "both":  # held once
         both = np.empty((2, *field.shape))
         both[0], both[1] = field, now.unit_displacement
@@ -361,7 +373,7 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict
         return replace(instant, contact=contact, unit_displacement=None)
 
     now, before = moved(state.now), None if state.before is None else moved(state.before)
-    glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
+    _, glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
     unit_displacement = scene.operator.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement

@@ -30,6 +30,7 @@ from roughvisc.mechanics.stepping.program import Program, Slide
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.step import at_border
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.settings import Settings
 from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
 from roughvisc.study.statement.case import Case
@@ -367,7 +368,7 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     if program.slides:  # its corners will do: the times that are kept lie elsewhere in a shorter program
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
     profile = Profile(height, settings.missing, kernel=case.body().kernel)
-    scene, _ = build_scene(profile, case.material(), program, settings)
+    scene, _ = build_scene(profile, case.body(), program, settings)
     steps = rows = damped = 0
     reached = contact = fraction = level = force = 0.0
     work, instants = 0, [0.0]
@@ -524,7 +525,7 @@ def solved_on(stages: tuple[Stage, ...], found: CostEstimate) -> Solved:
 def wall_time(settings: Settings, solved: Solved, found: CostEstimate, choice: Choice, convolution: float) -> float:
     """Seconds for a case in one process with one thread, by those of a convolution on the final surface. [s]"""
     cells = solved.cells
-    modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
+    modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0
     past = found.contact * found.steps / 2 if isinstance(choice.memory, History) else 0.0
     stepping = found.steps * solved.mean(float) * 8 * (10 + 4 * modes + past) * 0.3e-9
     writing = found.rows * cells * 8 * len(settings.fields) * _WRITE

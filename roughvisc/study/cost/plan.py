@@ -25,9 +25,10 @@ from roughvisc.experiment.refusal import PART, amount, too_large
 from roughvisc.experiment.resources import PROCESS, Available, cores, memory_available
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.bodies.operator import Boundary
-from roughvisc.mechanics.hereditary.choice import Choice, choose_memory
+from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.notebook import table
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
@@ -318,7 +319,7 @@ class _Choices:
         wanted = memory_options(case.program(), case.solving(), "pressure" if grows else "displacement")
         name = f"{case.settings.material!r} {wanted!r}"
         if name not in self._found:
-            self._found[name] = choose_memory(case.material(), **wanted)
+            self._found[name] = choose_body_memory(case.body(), **wanted)
         return self._found[name]
 
 
@@ -346,7 +347,7 @@ def _row(
         choice = choices.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
-    exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes) else 0
+    exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0
     omitted = omitted_effects(choice, settings, window, mirrored)
     row |= {"memory_model": choice.note, "exponentials": exponentials, "left_out": omitted}
     row |= _pressures(case, surface, choice, found.force if found and marched else np.nan)

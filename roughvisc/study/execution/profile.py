@@ -18,6 +18,7 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding
 from roughvisc.mechanics.stepping import step as attempt
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.study.execution import run
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -32,7 +33,9 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
         *((Sliding, name) for name in ("displacement", "full_contact", "lagging", "force_across")),
     ),
     "vector work of the solver": ((attempt, "solve_contact"), (steady, "solve_complementarity")),
-    "memory": tuple((kind, name) for kind in (Modes, History) for name in ("predict", "advance", "enlarged")),
+    "memory": tuple(
+        (kind, name) for kind in (Modes, History, WaveMemory) for name in ("predict", "advance", "enlarged")
+    ),
     "surface and kernels": (
         (Case, "height"),
         (loading, "build_scene"),

@@ -28,7 +28,7 @@ Array = NDArray[Any]
 # mark, length and checksum of the text, checksum of these; the text lists the arrays with their checksums
 _HEAD = struct.Struct("<4sIII")
 _MARK = b"rvr2"
-_KINDS = "fiub"
+_KINDS = "fiubc"
 _SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
 #: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
 _WAITING = 8 << 20

@@ -131,7 +131,7 @@ def test_stages__are_the_windows_and_grids_that_a_profile_comes_through(monkeypa
     height = rv.sphere(1e-2, (1e-3 * shape[0], 1e-3 * shape[1]), shape)
     profile = Profile(height, follow=follow, mirror=True)
     program = rv.Program().load(1e-3, over=1.0)
-    scene, _ = build_scene(profile, rv.elastic(1e6), program, Settings(boundary="free"))
+    scene, _ = build_scene(profile, rv.Body(rv.elastic(1e6)), program, Settings(boundary="free"))
     found = [(profile.height.shape, np.prod(profile.window.shape), profile.window.outside)]
     while (larger := profile.enlarge(scene)) is not None:
         scene = larger[0]

@@ -10,10 +10,19 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, ValidationInfo, WrapValidator, create_model, model_validator
+from pydantic import (
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    WrapValidator,
+    create_model,
+    model_validator,
+)
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
+from roughvisc.mechanics.bodies.layer import layer
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.checks import tensile_to_shear
 from roughvisc.mechanics.materials.stiffness import stiffened
@@ -174,16 +183,23 @@ class MaterialSection(Section):
         return material if self.modulus_factor == 1 else stiffened(material, self.modulus_factor)
 
     def body(self) -> Body:
-        """What is made of it: a half-space, or a sheet."""
+        """What is made of it: a half-space, a sheet, or a layer on what its table ``on`` says."""
         return self._body_of(self.build())
 
     def _body_of(self, material: materials.Material) -> Body:
         """The body of the material, which may have taken a fit."""
         thickness, base = self.sheet["thickness"], self.sheet["base"]
+        below: MaterialSection | None = getattr(self, "on", None)
+        if base is not None and below is not None:
+            raise InputError(f"base is {base!r} beside a table on: expected one of them")
+        if thickness is not None and below is not None:
+            return layer(material, thickness, on=below.body())
         if thickness is not None:
             return sheet(material, thickness, base or BASE)
         if base is not None:
             raise InputError(f"base is {base!r} without a thickness: expected both, or neither for a half-space")
+        if below is not None:
+            raise InputError("on is there without a thickness: expected both, or neither for a half-space")
         return Body(material)
 
     @property
@@ -209,7 +225,9 @@ class MaterialSection(Section):
         if self.modulus_factor != 1:
             stated["modulus_factor"] = self.modulus_factor
         if self.sheet["thickness"] not in (None, math.inf):
-            stated |= self.sheet | {"base": self.sheet["base"] or BASE}
+            below: MaterialSection | None = getattr(self, "on", None)
+            base = {"base": self.sheet["base"] or BASE} if below is None else {"on": below.content()}
+            stated |= {"thickness": self.sheet["thickness"]} | base
         return stated
 
     @model_validator(mode="after")
@@ -224,7 +242,9 @@ class MaterialSection(Section):
         try:
             self._body_of(material)
         except InputError as error:
-            raise refuse("base" if self.sheet["thickness"] is None else "thickness", str(error)) from error
+            stated = [key for key in ("thickness", "base", "on") if getattr(self, key, None) is not None]
+            at_fault = next((key for key in stated if str(error).startswith(f"{key} ")), stated[0])
+            raise refuse(at_fault, str(error)) from error
         for name in MODELS[self.model][1]:
             part = getattr(self, name)
             if isinstance(part, MaterialSection) and part.sheet["thickness"] is not None:
@@ -247,7 +267,7 @@ def _section(name: str) -> type[MaterialSection]:
         fields["file"] = (nullable(FilePath), None)
         keys = {column.unit_key for column in columns.values()} - {"", *kinds}
         fields |= {key: (nullable(Text), None) for key in sorted(keys)}
-    fields |= {key: (nullable(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS}.items()}
+    fields |= {key: (nullable(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS, "on": _BELOW}.items()}
     return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
 
 
@@ -304,6 +324,18 @@ def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, V
 
     return pick
 
+
+def _pick_below(data: Any, check: Any, info: ValidationInfo) -> Any:
+    """What a layer lies on: any model but a pair, whatever it lies on itself."""
+    return _picker({name: one for name, one in SECTIONS.items() if name != "pair"})(data, check, info)
+
+
+_BELOW = Annotated[
+    MaterialSection,
+    WrapValidator(_pick_below),
+    WithJsonSchema({"type": "object"}),
+    Field(description="a table with a model, as [material] itself"),
+]
 
 SECTIONS = {name: _section(name) for name in MODELS}
 

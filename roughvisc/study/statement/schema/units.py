@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.entries import Unit
+from roughvisc.study.statement.schema.material import SECTIONS, MaterialSection
 from roughvisc.study.statement.schema.section import Section
 
 
@@ -47,6 +48,8 @@ def _choices(kind: Any) -> Iterator[Any]:
     elif get_origin(kind) in (Union, UnionType):
         for one in get_args(kind):
             yield from _choices(one)
+    elif kind is MaterialSection:  # of any model
+        yield from SECTIONS.values()
     else:
         yield kind
 

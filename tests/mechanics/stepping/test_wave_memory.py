@@ -1,0 +1,123 @@
+"""A layered body in time: against half-space and sheet where it is one, and a slide against the steady state."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.experiment.loading import Loading
+from roughvisc.mechanics.bodies.body import body_of
+from roughvisc.problem import Problem
+from roughvisc.recorder import Checkpoint
+from roughvisc.settings import Settings
+from roughvisc.study.storage.checkpoint import load_checkpoint, save_checkpoint
+
+RUBBER = rv.zener(3e6, 1e6, 1e5, poisson=0.4)
+#: The same but for rounding, so that the waves are solved for.
+SAME = rv.zener(3e6 * (1 + 1e-9), 1e6, 1e5, poisson=0.4)
+ROUGH = rv.self_affine(size=1e-3, shape=(21, 18), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+TOLERANCE = 3e-4
+PRESS = rv.Program().pressure(1e5, over=0.05).hold(0.5).pressure(3e4, over=0.02)
+
+
+def pressed(body, height=ROUGH, program=PRESS, **settings):
+    return rv.simulate(height, body, program, times=6, progress=False, tolerance=TOLERANCE, **settings)
+
+
+def off(found, expected):
+    """Error of the pressure (L1), over the largest load."""
+    apart = abs(found["pressure"] - expected["pressure"]).sum(("x", "y"))
+    return float(apart.max() / expected["pressure"].sum(("x", "y")).max())
+
+
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_equal_materials__are_a_half_space(control):
+    program = PRESS if control == "load" else rv.Program().approach(2e-6, over=0).hold(0.3)
+    found, expected = (
+        pressed(body, program=program, boundary="periodic") for body in (rv.layer(RUBBER, 1e-4, on=SAME), RUBBER)
+    )
+    assert "that all waves share" in found.roughvisc.attributes["memory"]
+    assert off(found, expected) < TOLERANCE
+    np.testing.assert_allclose(found["approach"][1:], expected["approach"][1:], rtol=TOLERANCE)
+    assert float(found["stated_error"].max()) <= TOLERANCE
+
+
+def test_rigid_base__is_a_sheet():
+    found = pressed(rv.layer(RUBBER, 1e-4, on=rv.elastic(1e13)), boundary="periodic")
+    expected = pressed(rv.sheet(RUBBER, 1e-4), boundary="periodic")
+    assert off(found, expected) < TOLERANCE
+
+
+def test_mirrored_surface__is_solved_on_a_quarter():
+    mirrored = rv.mirror(ROUGH.isel(x=slice(7), y=slice(6)))
+    body = rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7))
+    shifted = mirrored.roll(x=1, roll_coords=False)
+    found, expected = (pressed(body, height=height, boundary="periodic") for height in (mirrored, shifted))
+    assert "mirror images" in found.roughvisc.attributes["left_out"]
+    np.testing.assert_allclose(found["contact_area_counted"], expected["contact_area_counted"])
+    assert off(found, expected.roll(x=-1, roll_coords=False)) < TOLERANCE
+
+
+@pytest.mark.parametrize("shape", [(24, 23), (24, 22)])  # the second one is solved on a quarter
+def test_free_space__a_ball_on_equal_materials_is_one_on_a_half_space(shape):
+    ball, program = rv.sphere(radius=1e-3, size=2e-4, shape=shape), rv.Program().load(5e-4, over=0.05).hold(0.5)
+    found, expected = (pressed(body, ball, program) for body in (rv.layer(RUBBER, 5e-5, on=SAME), RUBBER))
+    assert off(found, expected) < TOLERANCE
+    np.testing.assert_allclose(found["approach"][1:], expected["approach"][1:], rtol=TOLERANCE)
+
+
+def test_free_space__an_elastic_ball_problem_is_that_of_the_kernel_at_any_time():
+    ball, program = rv.sphere(radius=1e-3, size=2e-4, shape=(21, 19)), rv.Program().load(5e-4, over=0)
+    layer, base = rv.elastic(1e6), rv.elastic(5e6, poisson=0.3)
+    # a Zener material that has hardly begun to creep
+    slow = rv.zener(5e6, 1e6, 1e15, poisson=0.3)
+    found = pressed(rv.layer(layer, 3e-5, on=slow), ball, program.hold(1e-3))
+    expected = pressed(rv.layer(layer, 3e-5, on=base), ball, program.hold(1e-3))
+    np.testing.assert_allclose(found["approach"][-1], expected["approach"][-1], rtol=1e-4)
+    assert off(found, expected) < TOLERANCE
+
+
+@pytest.mark.parametrize("direction", ["x", "-y"])
+def test_slide__settles_at_what_steady_sliding_finds(direction):
+    quick, base = rv.zener(3e6, 1e6, 1e4, poisson=0.4), rv.zener(1e7, 2e6, 2e3)
+    body, period, speed = rv.layer(quick, 1e-4, on=base), 5e-4, 1e-2
+    height = rv.wavy(amplitude=1e-6, wavelength=period, size=period, shape=(48, 1), waves=1)
+    if direction != "x":
+        height = height.rename(x="y", y="x").transpose("x", "y")
+    program = rv.Program().pressure(2e3, over=0.01).slide(distance=3 * period, speed=speed, direction=direction)
+    found = pressed(body, height, program, boundary="periodic")
+    steady = rv.friction(height, body, pressure=2e3, speeds=[speed], direction=direction, tolerance=1e-5)
+    assert float(steady["contact_fraction"][0]) < 0.3
+    # of second order in the cell
+    np.testing.assert_allclose(found["friction_coefficient"][-1], steady["friction_coefficient"][0], rtol=0.02)
+
+
+def test_resume__goes_on_to_the_same_bits(tmp_path):
+    body = rv.layer(RUBBER, 1e-4, on=rv.zener(1e7, 2e6, 2e4))
+    problem = Problem(ROUGH, body_of(body), Settings(boundary="periodic", times=4, tolerance=1e-3))
+    loading = Loading(PRESS)
+    whole = list(loading.rows(problem))
+    middle = whole[len(whole) // 2].state
+    save_checkpoint(tmp_path / "reached", Checkpoint(state=middle), "key")
+    again = load_checkpoint(tmp_path / "reached", "key", loading.states)
+    resumed = list(loading.rows(problem, again.state))
+    np.testing.assert_array_equal(resumed[-1].fields["pressure"], whole[-1].fields["pressure"])
+    assert len(resumed) == len(whole) - len(whole) // 2 - 1
+
+
+@pytest.mark.parametrize(
+    ("body", "settings", "expected"),
+    [
+        (rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7)), {"memory": "direct"}, "memory is 'direct' and the body is layer"),
+        (rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7)), {"method": "seed"}, "method is 'seed'"),
+    ],
+)
+def test_simulate__refuses(body, settings, expected):
+    with pytest.raises(InputError, match=expected):
+        pressed(body, boundary="periodic", numerics=rv.Numerics(**settings))
+
+
+def test_jump__of_a_layer_without_instantaneous_compliance_is_refused():
+    body = rv.layer(rv.kelvin_voigt(1e6, 1e5), 1e-4, on=rv.kelvin_voigt(1e7, 1e5))
+    with pytest.raises(InputError, match="no instantaneous compliance"):
+        pressed(body, program=rv.Program().approach(1e-6, over=0).hold(0.1), boundary="periodic")
