@@ -151,6 +151,30 @@ class Operator:
         """Multiply a transform by a symbol, in place."""
         self._transforms.multiply(spectrum, symbol)
 
+    @cached_property
+    def parseval(self) -> Array:
+        """Factors whose sum over a transform times the conjugate of another is the area integral of both. [m2]
+
+        Of a pressure and the displacement by one, on the cells; beyond them the pressure is zero.
+        """
+        (mx, my), images = self._points, self._transforms.images
+        if images > 1:  # of cosines
+            along = [np.where(np.arange(points) == 0, 0.25, 0.5) / points for points in (mx, my)]
+            return np.asarray(np.outer(*along) * self.cell_area)
+        twice = np.full(my // 2 + 1, 2.0)  # waves of which the conjugates are not stored
+        twice[0] = 1.0
+        if my % 2 == 0:
+            twice[-1] = 1.0
+        return np.asarray(np.broadcast_to(twice, (mx, my // 2 + 1)) * (self.cell_area / (mx * my)))
+
+    def even_sum(self, field: Array, symbol: Array) -> float:
+        """Sum of a field of wave numbers times a symbol, which is the same for negative ones along x."""
+        first = len(symbol)
+        total = float(np.einsum("ij,ij", field[:first], symbol))
+        if len(field) > first:
+            total += float(np.einsum("ij,ij", field[first:], symbol[len(field) - first : 0 : -1]))
+        return total
+
     def turn(self, cells: int, axis: int) -> NDArray[np.complex128]:
         """What the transform of a periodic field is multiplied by if it is seen from so many cells farther."""
         if self.mirrored or self.boundary != "periodic":

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,6 +145,21 @@ class Modes:
             return np.einsum("mxy,xy->m", fields, displacement)
         displaced, threads = fields[:, 1] if self.acts_on == "both" else fields, threads_of(displacement.size)
         return np.array([inner(field, cells, pressure, threads) for field in displaced])
+
+    #: Inner product of a pressure at rest with itself.
+    no_products: ClassVar[float] = 0.0
+
+    def at_once(self, product: float) -> float:
+        """Energy that the instantaneous compliance stores, from ``<p, p>``. [J]"""
+        return 0.5 * self.factor * self.material.glassy * product
+
+    def of_elements(self, product: float) -> float:
+        """The part of inner products of pressures that goes with each exponential: all share one kernel."""
+        return product
+
+    def of_flow(self, product: float) -> float:
+        """Energy that a fluidity dissipates, from ``<p, p>`` times the time. [J]"""
+        return self.factor * self.material.fluidity * product
 
     @cached_property
     def weights(self) -> Array:

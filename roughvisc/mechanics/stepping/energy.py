@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.materials.prony import by_size, one_less_mean_decay
 from roughvisc.mechanics.sparse import Sparse
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 
 Array = NDArray[np.float64]
 
@@ -46,8 +48,8 @@ class Energy:
         In all of the half-space, the uniform displacement of a periodic one left out. [J]
     unresolved : float
         What may be dissipated more or less where elements relaxed within a single step. [J]
-    pressure : float
-        ``<p, p>`` at the present instant. [Pa2 m3]
+    pressure : float or ndarray
+        ``<p, p>`` at the present instant, with each kernel where the elements' differ. [Pa2 m3]
     beside : ndarray, shape (m,)
         ``<p, z_i>``. [Pa2 m3]
     lagged : ndarray, shape (m,)
@@ -59,7 +61,7 @@ class Energy:
     stored: float = 0.0
     dissipated: float = 0.0
     unresolved: float = 0.0
-    pressure: float = 0.0
+    pressure: Any = 0.0
     beside: Array = field(default_factory=_nothing)
     lagged: Array = field(default_factory=_nothing)
     own: Array = field(default_factory=_nothing)
@@ -67,10 +69,10 @@ class Energy:
     earlier: Array = field(default_factory=_nothing)
 
 
-def at_rest(memory: Modes) -> Energy:
+def at_rest(memory: Modes | WaveMemory) -> Energy:
     """Nothing stored, nothing dissipated."""
     nothing = np.zeros(len(memory.material.times))
-    return Energy(0.0, 0.0, 0.0, 0.0, nothing, nothing, nothing, nothing, nothing)
+    return Energy(0.0, 0.0, 0.0, memory.no_products, nothing, nothing, nothing, nothing, nothing)
 
 
 def after_step(
@@ -123,26 +125,43 @@ def after_step(
     """
     cells, pressure = end[0].not_zero()
     both, last = (area * inner(field, cells, pressure, end[0].threads) for field in (start, end[1]))
-    glassy = 0.5 * memory.factor * memory.material.glassy
-    if step == 0:
-        stored = energy.stored + glassy * (last - energy.pressure)
-        crossing = area * memory.products(state.modes, end[1], cells, pressure)
-        return replace(energy, stored=stored, pressure=last, beside=crossing)
-    weights, (own, earlier, before, after) = memory.weights, memory.coefficients(state, step, rule)
-    if memory.material.fluidity:  # it comes last
-        weights, own, earlier, before, after = (each[:-1] for each in (weights, own, earlier, before, after))
-    first = energy.pressure
-    ahead = area * memory.products(state.modes, end[1], cells, pressure)  # <p_n+1, z_n>
+    ahead = area * memory.products(state.modes, end[1], cells, pressure)
     behind = np.zeros_like(ahead)
     if rule == "bdf2" and state.earlier is not None:
         behind = area * memory.products(state.earlier, end[1], cells, pressure)
+    return by_products(energy, memory, state, step, rule, (both, last, ahead, behind), fresh, jumped, work)
+
+
+def by_products(
+    energy: Energy,
+    memory: Modes | WaveMemory,
+    state: ModesState,
+    step: float,
+    rule: Rule,
+    products: tuple[Any, Any, Array, Array],
+    fresh: bool = False,
+    jumped: bool = False,
+    work: float | None = None,
+) -> Energy:
+    """The same from ``<p_n, p_n+1>``, ``<p_n+1, p_n+1>``, ``<p_n+1, z_n>`` and ``<p_n+1, z_n-1>``.
+
+    The last two are of each element. The others are numbers, or one for each kernel where the elements' differ.
+    """
+    whole_both, whole_last, ahead, behind = products
+    if step == 0:
+        stored = energy.stored + memory.at_once(whole_last - energy.pressure)
+        return replace(energy, stored=stored, pressure=whole_last, beside=ahead)
+    weights, (own, earlier, before, after) = memory.weights, memory.coefficients(state, step, rule)
+    if memory.material.fluidity:  # it comes last
+        weights, own, earlier, before, after = (each[:-1] for each in (weights, own, earlier, before, after))
+    first, both, last = (memory.of_elements(one) for one in (energy.pressure, whole_both, whole_last))
     # z_n+1 = own z_n + earlier z_n-1 + before p_n + after p_n+1
     beside = own * ahead + earlier * behind + before * both + after * last
     crossed = own * energy.own + earlier * energy.crossed + before * energy.beside + after * ahead
     squared = own * crossed + after * beside + before * (own * energy.beside + before * first + after * both)
     if rule == "bdf2":  # it takes nothing from p_n
         squared = squared + earlier * (own * energy.crossed + earlier * energy.earlier + after * behind)
-    flowed = step * (first + both + last) / 3
+    flowed = step * (energy.pressure + whole_both + whole_last) / 3
     unresolved = energy.unresolved
     if fresh or rule != "linear":
         # work of the mean pressure on the change of an element, less what it stores: <(p_n + p_n+1) / 2, z_n+1 - z_n>
@@ -163,15 +182,16 @@ def after_step(
             lost = exact
     if rule == "right":
         lost = weights * _lost(memory.material.times, step)[0] * (last - 2 * ahead + energy.own)
-        flowed = step * last
+        flowed = step * whole_last
     elif jumped and rule != "linear":
         lost = weights * (beside - ahead - 0.5 * (squared - energy.own))
-        flowed = step * last
-    stored = glassy * last + 0.5 * summed(weights * squared)
-    dissipated = summed(lost) + memory.factor * memory.material.fluidity * flowed
+        flowed = step * whole_last
+    stored = memory.at_once(whole_last) + 0.5 * summed(weights * squared)
+    dissipated = summed(lost) + memory.of_flow(flowed)
     if work is not None:
         dissipated, unresolved = work - (stored - energy.stored), energy.unresolved
-    return Energy(stored, energy.dissipated + dissipated, unresolved, last, beside, ahead, squared, crossed, energy.own)
+    dissipated += energy.dissipated
+    return Energy(stored, dissipated, unresolved, whole_last, beside, ahead, squared, crossed, energy.own)
 
 
 @lru_cache(maxsize=8)

@@ -45,7 +45,7 @@ def initial_state(scene: Scene) -> State:
     nothing = np.zeros(scene.operator.shape)
     given = any(segment.control == "approach" for segment in scene.program.segments[:1])
     now = Instant(0.0, Sparse.of(nothing), 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
-    at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes) else None
+    at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes | WaveMemory) else None
     return State(now, nothing, scene.memory.start(scene.operator.shape), energy=at_rest)
 
 
@@ -171,7 +171,7 @@ def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[st
         both[0], both[1] = field, now.unit_displacement
         field, now = both, Instant(now.time, Sparse.of(both[0]), now.force, now.approach, both[1])
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
-    spent = energy_after(scene, state, trial)
+    spent = energy_after(scene, state, trial, memory)
     if spent is None:
         assert trial.displacement is not None
         displacement = trial.displacement
@@ -205,11 +205,20 @@ def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState, **mo
     )
 
 
-def energy_after(scene: Scene, state: Trajectory, trial: Trial) -> energy.Energy | None:
-    """Energies at the end of a step; None where the memory is no series."""
+def energy_after(scene: Scene, state: Trajectory, trial: Trial, memory: Any) -> energy.Energy | None:
+    """Energies at the end of a step, with the state of the memory then; None where that is no series."""
     if state.energy is None:
         return None
     before, now = state.now, trial.instant
+    circumstances: dict[str, Any] = {
+        "fresh": state.before is None,
+        "jumped": state.unresolved,
+        "work": work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
+    }
+    if isinstance(scene.memory, WaveMemory):
+        products = scene.memory.products(state.memory, memory.field, trial.rule)
+        step = trial.length, trial.rule
+        return energy.by_products(state.energy, scene.memory, state.memory, *step, products, **circumstances)
     assert isinstance(scene.memory, Modes)
     assert before.unit_displacement is not None
     assert now.unit_displacement is not None
@@ -222,9 +231,7 @@ def energy_after(scene: Scene, state: Trajectory, trial: Trial) -> energy.Energy
         before.unit_displacement,
         (now.contact, now.unit_displacement),
         scene.operator.cell_area,
-        fresh=state.before is None,
-        jumped=state.unresolved,
-        work=work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
+        **circumstances,
     )
 
 

@@ -132,6 +132,53 @@ class WaveMemory:
             self._weighted(terms, mode)
         return ModesState(modes, pressure, state.modes if "bdf2" in self.rules else None, step)
 
+    def coefficients(self, state: ModesState, step: float, rule: Rule) -> tuple[Array, Array, Array, Array]:
+        """Of the recursion, as :meth:`~roughvisc.mechanics.hereditary.exponentials.Modes.coefficients`."""
+        return self._modes.coefficients(state, step, rule)
+
+    @cached_property
+    def weights(self) -> Array:
+        """One for each exponential: their compliances are in the inner products."""
+        return np.ones(len(self.series.compliances))
+
+    @property
+    def no_products(self) -> Array:
+        """Inner products of a pressure at rest with itself: by what is there at once, and by each term."""
+        return np.zeros(1 + len(self.series.compliances))
+
+    def at_once(self, products: Array) -> float:
+        """Energy that what is there at once stores, from ``<p, p>``. [J]"""
+        return 0.5 * float(products[0])
+
+    def of_elements(self, products: Array) -> Array:
+        """The part of inner products of pressures that goes with each exponential."""
+        return products[1 : 1 + len(self.series.times)]
+
+    def of_flow(self, products: Array) -> float:
+        """Energy that a fluidity dissipates, from ``<p, p>`` times the time. [J]"""
+        return float(products[-1]) if self.series.flows else 0.0
+
+    def products(self, state: ModesState, pressure: Spectrum, rule: Rule) -> tuple[Array, Array, Array, Array]:
+        """Inner products of the pressure at the end of a step, as energies ask for them, by Parseval's theorem."""
+        assert self.operator is not None
+        parseval = self.operator.parseval
+        both, last = (
+            np.array([self.operator.even_sum(product, symbol) for symbol in (self._symbols[0], *self._symbols[1])])
+            for product in ((parseval * (one.conj() * pressure).real) for one in (state.field, pressure))
+        )
+        weighted_pressure = parseval * pressure
+        count = len(self.series.times)
+
+        def of_modes(modes: Spectrum) -> Array:
+            flat = weighted_pressure.view(np.float64).reshape(-1)
+            return np.array([float(np.einsum("i,i", flat, one.view(np.float64).reshape(-1))) for one in modes[:count]])
+
+        ahead = of_modes(state.modes)
+        behind = np.zeros_like(ahead)
+        if rule == "bdf2" and state.earlier is not None:
+            behind = of_modes(state.earlier)
+        return both, last, ahead, behind
+
     def restart(self, state: ModesState) -> ModesState:
         """State whose next step does not reach behind the present instant."""
         return ModesState(state.modes, state.field)

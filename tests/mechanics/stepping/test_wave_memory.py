@@ -16,6 +16,9 @@ RUBBER = rv.zener(3e6, 1e6, 1e5, poisson=0.4)
 #: The same but for rounding, so that the waves are solved for.
 SAME = rv.zener(3e6 * (1 + 1e-9), 1e6, 1e5, poisson=0.4)
 ROUGH = rv.self_affine(size=1e-3, shape=(21, 18), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+MIRRORED = rv.mirror(ROUGH.isel(x=slice(7), y=slice(6)))
+BALL = rv.sphere(radius=1e-3, size=2e-4, shape=(19, 18))
+FLUID, SAME_FLUID = (rv.maxwell(modulus, 1e5, poisson=0.4) for modulus in (3e6, 3e6 * (1 + 1e-9)))
 TOLERANCE = 3e-4
 PRESS = rv.Program().pressure(1e5, over=0.05).hold(0.5).pressure(3e4, over=0.02)
 
@@ -49,10 +52,9 @@ def test_rigid_base__is_a_sheet():
 
 
 def test_mirrored_surface__is_solved_on_a_quarter():
-    mirrored = rv.mirror(ROUGH.isel(x=slice(7), y=slice(6)))
     body = rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7))
-    shifted = mirrored.roll(x=1, roll_coords=False)
-    found, expected = (pressed(body, height=height, boundary="periodic") for height in (mirrored, shifted))
+    shifted = MIRRORED.roll(x=1, roll_coords=False)
+    found, expected = (pressed(body, height=height, boundary="periodic") for height in (MIRRORED, shifted))
     assert "mirror images" in found.roughvisc.attributes["left_out"]
     np.testing.assert_allclose(found["contact_area_counted"], expected["contact_area_counted"])
     assert off(found, expected.roll(x=-1, roll_coords=False)) < TOLERANCE
@@ -121,3 +123,36 @@ def test_jump__of_a_layer_without_instantaneous_compliance_is_refused():
     body = rv.layer(rv.kelvin_voigt(1e6, 1e5), 1e-4, on=rv.kelvin_voigt(1e7, 1e5))
     with pytest.raises(InputError, match="no instantaneous compliance"):
         pressed(body, program=rv.Program().approach(1e-6, over=0).hold(0.1), boundary="periodic")
+
+
+@pytest.mark.parametrize(
+    ("height", "program", "boundary", "materials"),
+    [
+        (ROUGH, PRESS, "periodic", (RUBBER, SAME)),
+        (ROUGH, rv.Program().pressure(1e5, over=0).hold(0.2), "periodic", (RUBBER, SAME)),
+        (MIRRORED, PRESS, "periodic", (RUBBER, SAME)),
+        (ROUGH, rv.Program().pressure(1e4, over=0.05).hold(0.05), "periodic", (FLUID, SAME_FLUID)),
+        (ROUGH, rv.Program().pressure(1e5, over=0.05).slide(distance=5e-4, speed=1e-2), "periodic", (RUBBER, SAME)),
+        (BALL, rv.Program().load(5e-4, over=0.05).hold(0.2), "free", (RUBBER, SAME)),
+    ],
+    ids=["ramp", "jump", "mirrored", "flow", "slide", "free space"],
+)
+def test_energies__of_equal_materials_are_those_of_a_half_space(height, program, boundary, materials):
+    found, expected = (
+        pressed(body, height, program, boundary=boundary).roughvisc.steps
+        for body in (rv.layer(materials[0], 1e-4, on=materials[1]), materials[0])
+    )
+    for name in ("work", "stored_energy", "dissipated_energy"):
+        assert float(expected[name][-1]) > 0
+        np.testing.assert_allclose(found[name][-1], expected[name][-1], rtol=3e-4)
+
+
+def test_slide__dissipates_in_both_bodies_what_friction_does_in_the_steady_state():
+    body, period, speed = rv.layer(rv.zener(3e6, 1e6, 1e4), 1e-4, on=rv.zener(1e7, 2e6, 2e3)), 5e-4, 1e-2
+    height = rv.wavy(amplitude=1e-6, wavelength=period, size=period, shape=(48, 1), waves=1)
+    program = rv.Program().pressure(2e3, over=0.01).slide(distance=3 * period, speed=speed)
+    steps = pressed(body, height, program, boundary="periodic").roughvisc.steps.isel(step=slice(-12, None))
+    lost = np.diff(steps["dissipated_energy"].values)
+    slid = np.diff(steps["sliding_distance"].values)
+    friction = steps["friction_force"].values
+    np.testing.assert_allclose(lost.sum(), (slid * (friction[1:] + friction[:-1]) / 2).sum(), rtol=0.01)
