@@ -25,6 +25,7 @@ BESIDE = {
     "shift_factor": {},
     "thickness": {},
     "base": {"thickness": 1e-3},
+    "on": {"thickness": "1 mm"},
 }
 #: a CSV file whose headings have no units, for the keys that say them
 PLAIN = "0.01, 1\n0.1, 2\n1, 3\n"
