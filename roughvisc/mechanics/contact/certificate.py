@@ -105,7 +105,7 @@ def approach_under_load(
             outside = np.ones(opening.size, bool)
             outside[contact] = False
             weight = np.maximum(float(np.mean(opens.reshape(-1)[outside])) - opens.take(contact), 0)
-    return min(level + float((weight * excess).sum()) / float(weight.sum()), full)
+    return min(level + summed(weight * excess) / summed(weight), full)
 
 
 # Rounding of a sum over the cells, in parts of the sum: pairwise summation errs by a few units in the last place.

@@ -185,7 +185,7 @@ def _coefficients(
         own, earlier, before, after = (np.append(mode, flow) for mode, flow in zip(found, flowing, strict=True))
         found = own, earlier, before, after
     for each in found:
-        each.flags.writeable = False
+        each.setflags(write=False)
     return found
 
 

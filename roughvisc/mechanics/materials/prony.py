@@ -124,9 +124,11 @@ class Prony:
         """Mean of ``C`` over ``[s, s + h]``, [1/Pa]; ``C(s)`` for ``h = 0``. [s]"""
         s, h = np.asarray(s, dtype=float), np.asarray(h, dtype=float)
         compliances, times = self._terms
-        age, x = s[..., None] / times, h[..., None] / times
-        # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
-        retarded = np.add.reduce(compliances * (np.exp(-age) * one_less_mean_decay(x) - np.expm1(-age)), axis=-1)
+        risen = one_less_mean_decay(h[..., None] / times)
+        if s.any():  # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
+            age = s[..., None] / times
+            risen = np.exp(-age) * risen - np.expm1(-age)
+        retarded = np.add.reduce(compliances * risen, axis=-1)
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
 
     @cached_property
