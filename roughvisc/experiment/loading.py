@@ -306,9 +306,10 @@ class LoadingRows(Rows):
             "contact_area_counted": touching,
             "contact_fraction": self.profile.contact_fraction(contact, area),
             "mean_gap": mean_gap,
-            **self._mean_plane(shown.approach),
             **friction_row(step),
         }
+        if self._has_mean_plane:  # separation of the profile's and the undeformed plane in free space [m]
+            row["mean_plane_separation"] = self.profile.mean_gap - shown.approach
         if kept:
             row |= error_columns(step, self._choice.series_error) | area_columns(step, contact, touching, area)
         facts = {
@@ -364,13 +365,14 @@ class LoadingRows(Rows):
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
         force, approach = (float(np.fmax.reduce(dataset[name].values)) for name in ("force", "approach"))
         (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
+        repeats = settings.boundary == "periodic"
         warnings = {
             "slope_note": slope_note(
                 profile.height[profile.window.surface_cells],
                 settings.boundary,
                 approach - profile.least_gap,  # below the highest cell
             ),
-            "border_note": self._border_note(dataset),
+            "border_note": border_note(profile.height, dataset) if repeats and not profile.mirrored else "",
             "edge_note": "" if self._border is None else edge_note(self._border),
             "wake_note": self._wake_note(dataset),
         }
@@ -411,12 +413,6 @@ class LoadingRows(Rows):
                 left = {speed: creep_left(scene.compliance(period / speed), scene.final) for _, speed in strokes}
                 notes.append(wake_note(left, period))
         return " ".join(filter(None, notes))
-
-    def _border_note(self, dataset: xr.Dataset) -> str:
-        """What to say of a periodic surface whose opposite borders do not meet."""
-        if self._settings.boundary != "periodic" or self.profile.mirrored:
-            return ""
-        return border_note(self.profile.height, dataset)
 
     def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
         """A field of a step on the whole domain, in memory that nobody changes."""
@@ -487,10 +483,6 @@ class LoadingRows(Rows):
         """Of the surface. [m2]"""
         dx, dy = self.profile.spacing
         return dx * dy * self.profile.height.size
-
-    def _mean_plane(self, approach: float) -> dict[str, float]:
-        """Separation of the mean plane of the profile and the undeformed plane in free space. [m]"""
-        return {"mean_plane_separation": self.profile.mean_gap - approach} if self._has_mean_plane else {}
 
     def _status(self, step: Step, converged: bool, count: int) -> int:
         if not converged:
