@@ -64,7 +64,7 @@ ALLOWED = {
     "study.cost": _COST,
     "study.quantities": {"errors", "variables", "observables"},
     "study.trade": {*_TRADE, "study.quantities"},
-    "study.budget": {*_TRADE, "study.quantities", "study.trade", "observables"},
+    "study.budget": {*_TRADE, "study.quantities", "study.trade", "study.ensembles", "observables"},
     "study.validation": {*_SOLVE, "solve", "mechanics.closed_forms"},
     "views.realisation_rows": {"units"},
     "views.figures": {*_LABELS, "study.storage", "study.trade", "topography", "observables"},

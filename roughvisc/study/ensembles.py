@@ -15,6 +15,8 @@ from roughvisc.study.statement.realisations import ITSELF, REALISATION
 Array = NDArray[np.float64]
 #: Confidence of the intervals.
 LEVEL = 0.95
+#: Confidence from which on a surface stands outside its surrogates.
+APART = 0.99
 #: Where a measured surface stands among its surrogates; the values of ``standing``, in order.
 STANDING = ("inside", "below", "above", "not_known")
 _NOT_KNOWN = STANDING.index("not_known")
@@ -39,7 +41,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         - ``lower`` and ``upper``, the interval of the mean;
         - ``patch_lower`` and ``patch_upper``, the interval of one more patch, to which a single measurement belongs;
         - with realisation 0 its value ``itself``, its ``ratio`` to the mean [-], and ``standing``, whether it lies
-          inside the interval of a patch, one of its ``flag_values``.
+          inside the interval of a patch at 99 %, one of its ``flag_values``.
 
         ``count`` is the number of known values, and ``zeros`` how many of them are zero.
 
@@ -95,7 +97,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         variables |= {
             "itself": (dims, itself, units | {"long_name": f"{called} of the measured surface itself"}),
             "ratio": (dims, _ratio(itself, found["mean"]), {"units": "1", "long_name": "ratio to the mean"}),
-            "standing": (dims, standing(itself, found), _STANDING),
+            "standing": (dims, standing(itself, drawn.transpose(REALISATION, ...).values), STANDING_ATTRIBUTES),
         }
     return xr.Dataset(variables, rest.coords, {"quantity": str(values.name or ""), "confidence": LEVEL})
 
@@ -111,15 +113,15 @@ _WORDS = {
     "zeros": "number of zeros",
 }
 _COUNTS = ("count", "zeros")
-_STANDING = {
-    "long_name": "where the measured surface stands in the interval of a patch",
+STANDING_ATTRIBUTES = {
+    "long_name": "where the surface itself stands in the interval of a patch at 99 %",
     "flag_values": np.arange(len(STANDING), dtype="int8"),
     "flag_meanings": " ".join(STANDING),
 }
 
 
-def statistics(values: Array) -> dict[str, Array]:
-    """What :func:`over_realisations` gives, of values over (realisation, ...)."""
+def statistics(values: Array, level: float = LEVEL) -> dict[str, Array]:
+    """What :func:`over_realisations` gives, of values over (realisation, ...), at a level of confidence."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     with np.errstate(all="ignore"):  # what is missing or zero gives no number, and is meant to
@@ -127,7 +129,7 @@ def statistics(values: Array) -> dict[str, Array]:
         positive = np.where(known, values, 1.0).min(axis=0, initial=1.0) > 0
         logarithms = np.where(known & positive, np.log(np.where(known & positive, values, 1.0)), np.nan)
         middle, spread = _moments(logarithms, known & positive, count)
-        student = scipy.stats.t.ppf((1 + LEVEL) / 2, np.where(count > 1, count - 1, np.nan))
+        student = scipy.stats.t.ppf((1 + level) / 2, np.where(count > 1, count - 1, np.nan))
         of_mean, of_patch = student / np.sqrt(count), student * np.sqrt(1 + 1 / count)
         half = student * np.sqrt(spread**2 / count + spread**4 / (2 * (count - 1)))
         centre = middle + spread**2 / 2
@@ -150,8 +152,9 @@ def _moments(values: Array, known: NDArray[np.bool_], count: NDArray[np.intp]) -
     return mean, np.where(count > 1, np.sqrt(squares / (count - 1)), np.nan)
 
 
-def standing(itself: Array, found: dict[str, Array]) -> NDArray[np.int8]:
-    """Where a value stands in the interval of a patch: numbers of :data:`STANDING`."""
+def standing(itself: Array, values: Array) -> NDArray[np.int8]:
+    """Where a value stands among those of other patches, over (realisation, ...): numbers of :data:`STANDING`."""
+    found = statistics(values, APART)
     below, above = itself < found["patch_lower"], itself > found["patch_upper"]
     known = np.isfinite(itself) & np.isfinite(found["patch_lower"])
     return np.where(known, np.where(below, 1, np.where(above, 2, 0)), _NOT_KNOWN).astype("int8")

@@ -81,8 +81,8 @@ class Inspection:
         How opposite borders differ after levelling.
     noise : Noise or None
         None where the scan is flat, or too small for a spectrum.
-    rms_slope : float
-        Of the surface after the steps. [-]
+    rms_slope, kurtosis : float
+        Of the surface after the steps; Gaussian heights have a kurtosis of 3. [-]
     area : float
         Of the surface after the steps, mirror images included. [m2]
     shape : pair of int
@@ -103,6 +103,7 @@ class Inspection:
     borders: BorderMismatch
     noise: Noise | None
     rms_slope: float
+    kurtosis: float
     area: float
     shape: tuple[int, int]
     steps: dict[str, Any]
@@ -157,6 +158,7 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
         treated = gaussian_filter(treated, steps["filter"])
     steps |= {"mirror": True} if borders.jumps else {}
     images = 2 if borders.jumps else 1
+    measures = parameters(treated)
     return Inspection(
         points=points,
         missing=missing,
@@ -169,7 +171,8 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
         tilt=tilt,
         borders=borders,
         noise=noise,
-        rms_slope=float(parameters(treated)["rms_slope"]),
+        rms_slope=float(measures["rms_slope"]),
+        kurtosis=float(measures["Sku"]),
         area=float(np.prod([images * n * d for n, d in zip(treated.shape, spacing(treated), strict=True)])),
         shape=(images * treated.shape[0], images * treated.shape[1]),
         steps=steps,

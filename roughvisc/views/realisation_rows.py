@@ -58,7 +58,7 @@ def _notes(told: pd.DataFrame, scan: bool) -> list[str]:
         names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in apart["quantity"]))
         if names:
             notes.append(
-                f"! Not a random-phase surface: the scan lies outside the interval of its surrogates in {names}. The "
+                f"! Not a random-phase surface: the scan lies outside the 99 % of its surrogates in {names}. The "
                 "spectrum alone does not give this number; that of the scan stays as it is."
             )
     return notes

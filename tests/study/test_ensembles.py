@@ -65,7 +65,12 @@ def test_over_realisations__the_surface_itself_stands_apart():
     np.testing.assert_allclose(found["mean"], 1.0)
     np.testing.assert_allclose(found["ratio"], [9, 1, 0.1])
     assert [STANDING[int(one)] for one in found["standing"]] == ["above", "inside", "below"]
-    scaled = over_realisations(values * 1e-9)
+    drawn = np.log([1.1, 0.9, 1.0])
+    end = np.exp(drawn.mean() + scipy.stats.t.ppf(0.995, 2) * drawn.std(ddof=1) * np.sqrt(4 / 3))
+    for factor, stands in ((0.999, "inside"), (1.001, "above")):
+        values[0] = factor * end
+        assert STANDING[int(over_realisations(values)["standing"][0])] == stands
+    found, scaled = over_realisations(values), over_realisations(values * 1e-9)
     np.testing.assert_allclose(scaled["patch_upper"], 1e-9 * found["patch_upper"])
     assert "itself" not in over_realisations(values[1:])
     with pytest.raises(InputError, match="area lies over time: expected a dimension 'realisation'"):

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError, RoughviscError
+from roughvisc.study.budget.own_statistics import own_statistics
 from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
 from roughvisc.study.budget.stated import stated_by
 from roughvisc.study.budget.variants import Variants, check_share, with_rows
@@ -88,7 +89,10 @@ def budget(
         open [-]; ``direction``, 1 or -1 of an error that only raises or lowers the number. Over ``source``:
         ``method``, in words; ``cost``, wall time of the solves that it took [s]; ``state``, one of ``counted``,
         ``none`` and ``open``. Over the places: ``value``, ``lower`` and ``upper``, in the unit of the quantity, and
-        ``case_cost`` [s]. Of several quantities, over ``quantity`` too.
+        ``case_cost`` [s]. With ``population="ensemble"`` over the places too: ``surrogate_ratio``, the number over the
+        mean of its Gaussian surrogates, and ``standing``, where it lies among them; the attribute ``kurtosis`` is that
+        of the heights, and ``own_note`` says it where the surface is no random-phase surface. Of several quantities,
+        over ``quantity`` too.
 
     Raises
     ------
@@ -261,8 +265,10 @@ def _of_quantity(asked: Asked, quantity: Observable, results: Mapping[str, xr.Da
     judged = {source.name: source.judge(asked, quantity, values, stated_error) for source in SOURCES}
     seconds = {name: float(one["wall_time"].values[-1]) for name, one in results.items()}
     value = values["fine" if asked.sharp else "own"]
-    places = own[asked.variants.case.experiment().axis].values
-    return assembled(asked, quantity, judged, value, places, seconds, seconds["own"])
+    axis = asked.variants.case.experiment().axis
+    found = assembled(asked, quantity, judged, value, own[axis].values, seconds, seconds["own"])
+    variables, attributes = own_statistics(asked, values, axis)
+    return found.assign(variables).assign_attrs(attributes)
 
 
 def observed_with(case: Case) -> Observe:

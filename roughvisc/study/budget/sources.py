@@ -30,6 +30,8 @@ _ORDER, _TWO_GRIDS = 1.5, 3.0
 #: Of six patches: of the standard deviation of the logarithm, what holds the mean of all in 95 of 100. Student has
 #: 2.57; the patches have the spectrum of the one that was measured, whose longest waves scatter too.
 _SAMPLE = 3.3
+#: Names of the solves of the surrogates.
+SURROGATES = tuple(f"patch {number}" for number in range(1, PATCHES + 1))
 #: A spectrum that ends at a wavelength has 99 % of its slope above a wavelength longer by up to this factor.
 _SAME = 1.15
 #: Of the contact area where it slides, what the next octave changes over what the last one did.
@@ -78,7 +80,7 @@ class Asked:
         if self.sharp:
             found["fine"] = variants.on_cells(0.5)
         elif self.stated.grid:
-            if not (variants.is_rough and (stiffened or self.time_scale_error)):
+            if not (variants.is_rough and (stiffened or self.time_scale_error or self.draws)):
                 del found["coarse"]
         elif not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
             found["coarsest"] = variants.on_cells(4.0)
@@ -88,8 +90,8 @@ class Asked:
             found["slower"] = slower(compared)
         if self.octaves > 0 and (self.sharp or not self.stated.octave):
             found["smooth"] = variants.without_last_octave(found["fine" if self.sharp else "own"])
-        if self.population == "ensemble" and variants.is_rough:
-            found |= {f"patch {number}": variants.other_patch(number) for number in range(1, PATCHES + 1)}
+        if self.draws:
+            found |= {name: variants.other_patch(number) for number, name in enumerate(SURROGATES, 1)}
         if variants.case.settings.surface.taper:
             found["mirrored"] = variants.mirrored()
         return found
@@ -99,6 +101,11 @@ class Asked:
         """Of the materials that were fitted to a measurement, what that leaves unknown."""
         found = (getattr(material, "fit", None) for material in self.variants.case.body().materials)
         return [one for one in found if one is not None]
+
+    @property
+    def draws(self) -> bool:
+        """Whether surrogates of the surface are solved."""
+        return self.population == "ensemble" and self.variants.is_rough
 
     @property
     def compared(self) -> str:
@@ -187,14 +194,13 @@ def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -
         return Found(_nothing(values), "the surface is the whole body, and no sample", counts=False)
     if asked.population == "patch":
         return Found(_nothing(values), "the number is of this patch", counts=False)
-    names = tuple(f"patch {number}" for number in range(1, PATCHES + 1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        scatter = np.std(np.log([values[name] for name in names]), axis=0, ddof=1)
+        scatter = np.std(np.log([values[name] for name in SURROGATES]), axis=0, ddof=1)
     words = f"{PATCHES} Gaussian surrogates on cells twice as long"
-    closed = sum(not (values[name] > 0).all() for name in names)
+    closed = sum(not (values[name] > 0).all() for name in SURROGATES)
     if closed:  # zero has no logarithm
         words += f"; zero in {closed} of them: not how large it is but how often it is zero is to be asked"
-    return Found(_SAMPLE * scatter, words, solves=names)
+    return Found(_SAMPLE * scatter, words, solves=SURROGATES)
 
 
 def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array) -> Found:

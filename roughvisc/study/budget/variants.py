@@ -93,11 +93,14 @@ class Variants:
         return vary(case, {"surface.shortest_wave": 2 * self.shortest_wave})
 
     def other_patch(self, number: int) -> Case:
-        """Another patch of the same roughness, as large as what was measured, on cells twice as long."""
+        """Another patch of the same roughness, as large as what was measured, on cells twice as long.
+
+        Where the surface has its mirror images, so has the patch: a load [N] then makes the same pressure.
+        """
         mirrored = 2 if self.case.settings.surface.mirror else 1
         cells = [max(2, round(n / mirrored / 2)) for n in self.shape]
-        changes = {"surface.mirror": False, "surface.taper": None, "surface.resample": None}
-        return vary(self.case, changes | {"surface.realisation": number, "surface.band_limit": cells})
+        changes = {"surface.taper": None, "surface.resample": None, "surface.band_limit": cells}
+        return vary(self.case, changes | {"surface.realisation": number})
 
     def mirrored(self) -> Case:
         """With its mirror images in place of a taper."""

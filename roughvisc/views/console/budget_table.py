@@ -43,6 +43,14 @@ def budget_table(dataset: xr.Dataset) -> Group:
     notes = [f"The case itself took {spent:.2g} s. Errors are those of the {AXES[axis].rows}, least and largest."]
     if dataset.attrs["population"] == "patch":
         notes.append("The number is of this patch; population = 'ensemble' asks for that of its roughness.")
+    if "surrogate_ratio" in dataset:
+        ratio, kurtosis = dataset["surrogate_ratio"].values, dataset.attrs["kurtosis"]
+        if np.isfinite(ratio).any():
+            ends = dict.fromkeys(f"{one:.2g}" for one in (np.nanmin(ratio), np.nanmax(ratio)))
+            told = f"The number is {' to '.join(ends)} of the mean of its Gaussian surrogates, and not replaced by it"
+            notes.append(f"{told}. The heights have a kurtosis of {kurtosis:.2g} (3: Gaussian).")
+    if "own_note" in dataset.attrs:
+        notes.append(f"Warning: {dataset.attrs['own_note']}.")
     if dataset.attrs["open"]:
         notes.append("What is open is not in the interval.")
     return Group(*parts, *(Text(note, style="italic") for note in notes))

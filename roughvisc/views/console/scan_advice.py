@@ -14,6 +14,8 @@ from roughvisc.views.console.tables import readable
 
 #: What is to be done where nothing is.
 _NOTHING = "no action needed"
+#: Kurtosis of heights that may be Gaussian: that of a patch scatters. [-]
+_GAUSSIAN = (2.4, 4.0)
 #: Root mean square slope above which a unit or the spacing is mostly wrong. [-]
 _STEEP = 1.0
 
@@ -45,6 +47,7 @@ def advice(found: Inspection) -> Iterator[tuple[str, str, str]]:
     yield _form(found)
     yield _borders(found)
     yield _slope(found)
+    yield _heights(found)
     yield from _noise(found)
 
 
@@ -137,6 +140,19 @@ def _slope(found: Inspection) -> tuple[str, str, str]:
         f"{seen}, which is steeper than 45°, unlike almost any measured surface",
         "check the spacing and the units of x, y and height: one of them is probably wrong; if all are right, the "
         "half-space model does not hold, since it assumes small slopes",
+    )
+
+
+def _heights(found: Inspection) -> tuple[str, str, str]:
+    seen = f"their kurtosis is {found.kurtosis:.2g} (3: Gaussian)"
+    low, high = _GAUSSIAN
+    if not found.kurtosis < low and not found.kurtosis > high:
+        return "Heights", seen, _NOTHING
+    why = "plateaus, or few long waves" if found.kurtosis < low else "summits or pits that stand out"
+    return (
+        "Heights",
+        f"{seen}: {why}; the spectrum alone may not give its contact",
+        "realisations = 24 in [sweep] compares the scan with random surfaces of the same spectrum",
     )
 
 

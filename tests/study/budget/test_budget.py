@@ -226,14 +226,54 @@ def test_budget__of_a_mirrored_scan_takes_patches_of_its_own_size(tmp_path):
     text = ROUGH.replace(
         ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")], 'file = "scan.x3p"\nmirror = true\n'
     )
+    text = text.replace('pressure = "50 kPa"', 'load = "180 mN"')  # 50 kPa on the four images
     found = stated(case(text, tmp_path), tmp_path, "contact_area", population="ensemble", sharp=True)
     assert 0 < width(found, "sample") < 1
     shapes = set()
     for path in (tmp_path / "budget").glob("*.nc"):
         with xr.open_dataset(path) as one:
-            shapes.add((json.loads(one.attrs["case"])["surface"].get("realisation"), *one["height"].shape))
-    assert {shape for shape in shapes if shape[0]} == {(number, 20, 18) for number in range(1, 7)}
+            height, number = one["height"].values, json.loads(one.attrs["case"])["surface"].get("realisation")
+            shapes.add((number, *height.shape))
+            assert np.allclose(one["nominal_pressure"], 5e4)
+            assert np.array_equal(height, height[::-1, ::-1]), "images of what was measured, or drawn"
+            assert np.std(height[: len(height) // 4]) != np.std(height[len(height) // 4 : len(height) // 2])
+    assert {shape for shape in shapes if shape[0]} == {(number, 40, 36) for number in range(1, 7)}
     assert {shape[1:] for shape in shapes if not shape[0]} == {(80, 72), (40, 36), (160, 144)}
+
+
+def test_budget__a_surface_with_plateaus_is_no_random_phase_surface(tmp_path):
+    """Cut off at its mean, a surface touches over far more area than random surfaces with its spectrum."""
+    rough = rv.self_affine((1e-3, 0.9e-3), (54, 50), hurst=0.8, rms_slope=0.2, rolloff=3e-4, shortcut=8e-5, seed=1)
+    worn = rough.copy(data=np.minimum(rough.values, 0.0))
+    text = ROUGH.replace(ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")], 'file = "scan.x3p"\n')
+    for height, stands in ((rough, "inside"), (worn, "above")):
+        folder = tmp_path / stands
+        folder.mkdir()
+        rv.save_scan(height, folder / "scan.x3p")
+        study = case(text, folder)
+        found = stated(study, folder, "contact_area", population="ensemble")
+        level = height.values - height.values.mean()
+        assert found.attrs["kurtosis"] == pytest.approx((level**4).mean() / (level**2).mean() ** 2, rel=1e-3)
+        coarse = rv.vary(study, {"surface.band_limit": [27, 25]})  # as the surrogates are
+        cases = [coarse, *(rv.vary(coarse, {"surface.realisation": number}) for number in range(1, 7))]
+        own, *drawn = (
+            rv.simulate(
+                one.height(),
+                one.material(),
+                one.program(),
+                boundary="periodic",
+                tolerance=1e-2,
+                times=(1.0,),
+                progress=False,
+            )["contact_area"][-1].item()
+            for one in cases
+        )
+        assert float(found["surrogate_ratio"][-1]) == pytest.approx(own / np.mean(drawn), rel=1e-6)
+        meanings = found["standing"].attrs["flag_meanings"].split()
+        assert meanings[int(found["standing"][-1])] == stands
+        assert ("own_note" in found.attrs) == (stands == "above")
+    assert found.attrs["own_note"].startswith("not a random-phase surface: the number is ")
+    assert "surrogate_ratio" not in stated(study, folder, "contact_area")
 
 
 def test_budget__of_a_resampled_scan_keeps_its_waves(tmp_path):
