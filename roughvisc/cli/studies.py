@@ -321,14 +321,20 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
 @click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
 @click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
+@click.option(
+    "--floor", is_flag=True, help="Compute the error that no setting lessens, as `budget` does without options."
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-def trade(study: Path, out: Path | None, target: str | None, quantity: str, budget: str, quiet: bool) -> None:
+def trade(
+    study: Path, out: Path | None, target: str | None, quantity: str, budget: str, floor: bool, quiet: bool
+) -> None:
     """Measure what accuracy costs, and recommend a setting.
 
     Computes the case with several tolerances and grids; with a loading program also with fixed time steps, other
     memory models and the seed paper's algorithm. Each run is timed and compared with a closed-form solution if there
     is one, else with the finest run. Writes a NetCDF file and a figure. --apply changes the keys in STUDY and keeps its
-    comments and layout.
+    comments and layout. A budget that `roughvisc budget` has left in the results shows the error that no setting
+    lessens.
 
     \b
     Example:
@@ -340,12 +346,15 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
     from scipy import fft
 
     from roughvisc.progress import reporting
+    from roughvisc.study.budget.budget import budgets, case_of
+    from roughvisc.study.quantities import QUANTITIES
     from roughvisc.study.statement.case import read_study
     from roughvisc.study.storage.store import write_dataset
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
-    from roughvisc.study.trade.reference import quantities_of
+    from roughvisc.study.trade.floor import with_floors
+    from roughvisc.study.trade.reference import further_quantities_of, quantities_of
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.trade_table import trade_table
     from roughvisc.views.figures.files import write_figure
@@ -353,15 +362,25 @@ def trade(study: Path, out: Path | None, target: str | None, quantity: str, budg
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
     folder, part = trade_file.trade_folder(case, out), None
-    quantity = recommend.known_quantity(quantity, quantities_of(case), "--quantity")
+    usual = quantities_of(case)
+    quantity = recommend.known_quantity(quantity, (*usual, *further_quantities_of(case)), "--quantity")
     if target is not None:
         part = trade_file.part_of_one(target, "--apply")
         trade_file.check_writable(study)
     with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, budget=time, progress=report)
+        dataset = measured(case, quantities=[quantity], budget=time, progress=report)
+    beside = case_of(case, None)[1]
+    names = [name for name in dict.fromkeys([quantity, *usual]) if name in QUANTITIES]
+    if floor:
+        for name, one in budgets(case, names, out=beside, progress=not quiet).items():
+            write_dataset(one, beside / f"budget-{name}.nc")
+    dataset = with_floors(dataset, trade_file.budgets_in(beside, names, case))
     console.print(trade_table(dataset))
     say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
-    say(console, "Figure", write_figure(figure(dataset), folder / "trade.png"))
+    first = list(
+        dict.fromkeys([*([] if quantity == "contact_area" else [quantity]), *recommend.main_quantities(dataset)])
+    )
+    say(console, "Figure", write_figure(figure(dataset, first[:2]), folder / "trade.png"))
     if part is not None:
         index = recommend.cheapest(dataset, quantity, part)
         if index is None:

@@ -39,6 +39,9 @@ ORDERS = {
     "mean_gap": (1.0, 1.5),
     "friction_force": (1.0, 1.5),
     "friction_coefficient": (1.0, 1.5),
+    "leak_rate": (1.0, 1.5),
+    "thermal_conductance": (1.0, 1.5),
+    "incremental_stiffness": (1.0, 1.5),
 }
 #: The area of a sliding contact settles more slowly than that of one at rest.
 _MOVING = {"contact_area": (1.0, 1.0)}

@@ -467,6 +467,15 @@ VARIABLES: dict[str, Variable] = {
         "uncertainty of the reference due to the grid",
         "how far it may be off: by Richardson extrapolation; zero if exact; of a scan: what its spacing leaves unknown",
     ),
+    "floor": Variable(
+        ("quantity",),
+        "1",
+        "error that no setting lessens",
+        "half of the interval at 95 % by all sources of a budget but those that settings change, over the largest "
+        "value; missing without a budget",
+    ),
+    "floor_source": Variable(("quantity",), "", "source of most of the floor", dtype="str"),
+    "floor_open": Variable(("quantity",), "", "sources that are open, and not in the floor", dtype="str"),
 }
 
 #: Fields that the user may ask for in ``fields``: those that the solver finds.

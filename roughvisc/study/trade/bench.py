@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from roughvisc.experiment.resources import PROCESS
 from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, stages_of, work
 from roughvisc.study.execution.run import compute, unconverged
+from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.trade.ladder import Setting, changed, duration_of, has_steps, shape_of
@@ -84,6 +85,8 @@ class TimedRuns:
         Wall time of all runs together. [s]
     report : callable
         Called with a setting's name, how far it is, and of how much.
+    derived : sequence of Observable
+        What is compared of the results beside the usual.
 
     Attributes
     ----------
@@ -91,9 +94,18 @@ class TimedRuns:
         What is compared of the results.
     """
 
-    def __init__(self, case: Case, height: xr.DataArray, folder: Path, budget: float, report: Report) -> None:
+    def __init__(
+        self,
+        case: Case,
+        height: xr.DataArray,
+        folder: Path,
+        budget: float,
+        report: Report,
+        derived: Sequence[Observable] = (),
+    ) -> None:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
-        self.quantities = quantities_of(case)
+        self.quantities = (*quantities_of(case), *(one.name for one in derived))
+        self._derived = derived
         self._absent = height.attrs.get("missing") == "absent"
         self._path, self._report = result_path(folder, "run"), report
         self._until = time.perf_counter() + budget
@@ -158,7 +170,9 @@ class TimedRuns:
             raise NotRun(complaint)
         with whole_result(self._path) as kept:
             dataset = kept.load()
-        return Run(dataset, took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
+        observe = {} if (stated := case.settings.observe) is None else stated.stated()
+        found = {one.name: (case.experiment().axis, one.of(dataset, observe)) for one in self._derived}
+        return Run(dataset.assign(found), took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
 
     def _timed(self, case: Case, label: str) -> tuple[float, xr.Dataset, int]:
         steps = 0

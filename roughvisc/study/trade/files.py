@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 import xarray as xr
@@ -12,7 +14,10 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.formats import to_current
+from roughvisc.study.trade.floor import require_same
 from roughvisc.units import quantity
+
+log = logging.getLogger("roughvisc")
 
 
 def trade_folder(case: Case, out: str | Path | None) -> Path:
@@ -45,6 +50,23 @@ def open_trade(path: str | Path) -> xr.Dataset:
     if "run_time" not in dataset or "quantity" not in dataset.dims:
         raise InputError(f"{path}: is not a trade: expected a file that roughvisc trade wrote")
     return dataset
+
+
+def budgets_in(folder: Path, names: Iterable[str], case: Case) -> list[xr.Dataset]:
+    """Budgets of a case that ``roughvisc budget`` has left in a folder; one of another scene is left out, and told."""
+    found = []
+    for path in (folder / f"budget-{name}.nc" for name in names):
+        if not path.is_file():
+            continue
+        try:
+            with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+                one = file.load()
+            require_same(one, case)
+        except (OSError, ValueError, RuntimeError) as error:  # an InputError is a ValueError
+            log.warning("%s: does not count: %s", path, error)
+        else:
+            found.append(one)
+    return found
 
 
 def is_trade(path: str | Path) -> bool:

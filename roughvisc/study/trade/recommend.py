@@ -18,10 +18,23 @@ from roughvisc.variables import VARIABLES, current_name
 TARGETS = (1e-2, 1e-3)
 #: Wall times within this factor are taken to be the same.
 _ALIKE = 1.1
+#: Part of what no setting lessens below which an error is not worth paying for.
+_OF_FLOOR = 0.2
 #: What quantities are called in words.
 WORDS = {
     name: VARIABLES[name].label.lower()
-    for name in ("friction_coefficient", "contact_area", "pressure", "approach", "contact_area_counted", "mean_gap")
+    for name in (
+        "friction_coefficient",
+        "contact_area",
+        "pressure",
+        "approach",
+        "contact_area_counted",
+        "mean_gap",
+        "force",
+        "leak_rate",
+        "thermal_conductance",
+        "incremental_stiffness",
+    )
 }
 
 
@@ -103,8 +116,23 @@ def recommendation(dataset: xr.Dataset) -> str:
     """Advice in words, a line for each quantity that something is known of."""
     advised = [name for name in main_quantities(dataset) if name != "contact_area_counted"]
     known = [name for name in advised if np.isfinite(dataset["error"].sel(quantity=name)).any()]
-    lines = [_advice(dataset, name) for name in known]
+    lines = [_advice(dataset, name) for name in known] + list(filter(None, (_floor(dataset, name) for name in known)))
     return "\n".join(lines + ([_of_the_scan(dataset)] if dataset.attrs.get("grid_is_data") else []))
+
+
+def _floor(dataset: xr.Dataset, quantity: str) -> str:
+    """What no setting lessens of a quantity, and the cheapest setting that adds little to it; empty if not known."""
+    if "floor" not in dataset or not np.isfinite(floor := float(dataset["floor"].sel(quantity=quantity))):
+        return ""
+    source, still_open = (str(dataset[name].sel(quantity=quantity).values) for name in ("floor_source", "floor_open"))
+    text = f"no setting makes the {WORDS[quantity]} better than {percent(floor)}"
+    text += f", most of it by {source}" if source else ""
+    text += f" (still open, and not in it: {still_open})" if still_open else ""
+    index = cheapest(dataset, quantity, _OF_FLOOR * floor) if floor > 0 else None
+    if index is None:
+        return text
+    spent = duration(float(dataset["run_time"][index]))
+    return f"{text}: {dataset['setting'].values[index]} is sharp enough, {spent}"
 
 
 def _of_the_scan(dataset: xr.Dataset) -> str:

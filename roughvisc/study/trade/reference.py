@@ -25,6 +25,7 @@ from roughvisc.mechanics.closed_forms import (
 )
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
+from roughvisc.study.quantities import QUANTITIES as DERIVED
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import is_data
 from roughvisc.topography.grid import spacing
@@ -131,6 +132,14 @@ def quantities_of(case: Case) -> tuple[str, ...]:
     experiment = case.experiment()
     names = QUANTITIES + (SLIDING_QUANTITIES if experiment.largest_speed > 0 else ())
     return tuple(name for name in names if name in AXES[experiment.axis].variables)
+
+
+def further_quantities_of(case: Case) -> tuple[str, ...]:
+    """What else can be: what is derived from the fields of the results, and what is given in most."""
+    experiment, usual = case.experiment(), quantities_of(case)
+    slides = experiment.largest_speed > 0
+    has = (name for name, one in DERIVED.items() if one.fields or name in AXES[experiment.axis].variables)
+    return tuple(name for name in has if name not in usual and (slides or name not in SLIDING_QUANTITIES))
 
 
 def relative(difference: Array, values: Array) -> float:

@@ -17,12 +17,14 @@ from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.progress import reporting
 from roughvisc.settings import ENTRIES
+from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
 from roughvisc.study.trade.finest import ReferenceRun, all_grids
+from roughvisc.study.trade.floor import require_same, with_floors
 from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
-from roughvisc.study.trade.recommend import recommendation
-from roughvisc.study.trade.reference import ClosedForm, closed_form
+from roughvisc.study.trade.recommend import known_quantity
+from roughvisc.study.trade.reference import ClosedForm, closed_form, further_quantities_of, quantities_of
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import RESULT_FORMAT
@@ -34,6 +36,8 @@ def trade(
     case: Case | str | Path,
     settings: Sequence[Setting] | None = None,
     *,
+    quantities: Sequence[str] = (),
+    floor: xr.Dataset | Sequence[xr.Dataset] = (),
     budget: Quantity = 300.0,
     reference: Literal["auto", "run"] = "auto",
     progress: bool | Report = True,
@@ -48,6 +52,11 @@ def trade(
         Settings to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
         rounded to float32 precision; for a program also the direct history, fixed time steps, and the algorithm of the
         seed paper.
+    quantities : sequence of str
+        Further numbers whose error is measured: ``force``, ``leak_rate``, ``thermal_conductance`` or
+        ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or what is conducted.
+    floor : xarray.Dataset, or a sequence of them
+        Of :func:`roughvisc.budget` of the same study: errors that no setting lessens are then in the result.
     budget : float or str
         Total wall time of all runs. A setting that would exceed the remaining time is not run, which the result states.
         [s]
@@ -62,13 +71,15 @@ def trade(
     xarray.Dataset
         Along ``setting``: ``run_time``, ``transforms``, ``steps``, ``peak_memory``, ``disk_size``, and ``error`` and
         ``coarsening_error`` of each ``quantity``. Along ``quantity``: the ``reference`` and its own uncertainty,
-        ``reference_time_uncertainty`` and ``reference_grid_uncertainty``. The attribute ``recommendation`` says which
-        setting to use for which accuracy. ``rv.plot.trade`` draws the result.
+        ``reference_time_uncertainty`` and ``reference_grid_uncertainty``; of budgets the ``floor``, with
+        ``floor_source`` and ``floor_open``. The attribute ``recommendation`` says which setting to use for which
+        accuracy. ``rv.plot.trade`` draws the result.
 
     Raises
     ------
     InputError
-        If the study is invalid or contains a sweep, or its reference would take longer than half the budget.
+        If the study is invalid or contains a sweep, has no such quantity, a budget is of another study, or the
+        reference would take longer than half the budget.
 
     Notes
     -----
@@ -89,24 +100,32 @@ def trade(
     rungs = list(ladder(case, shape) if settings is None else settings)
     if not rungs:
         raise InputError("settings is empty: expected at least one Setting")
-    case = _comparable(case, height, rungs)
+    usual, further = quantities_of(case), further_quantities_of(case)
+    names = [known_quantity(name, (*usual, *further), "quantities") for name in quantities]
+    derived = [QUANTITIES[name] for name in names if name in further]
+    budgets = [floor] if isinstance(floor, xr.Dataset) else list(floor)
+    for one in budgets:
+        require_same(one, case)
+    case = _comparable(case, height, rungs, derived)
     exact = closed_form(case) if reference == "auto" else None
     with tempfile.TemporaryDirectory() as folder, reporting(progress, at=case.at) as report:
-        bench = TimedRuns(case, height, Path(folder), budget, report)
+        bench = TimedRuns(case, height, Path(folder), budget, report, derived)
         known = exact.quantities if exact else ()
         finest = None if set(bench.quantities) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
         rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
     order = [rungs.index(row["rung"]) for row in rows]
     rows = [rows[i] for i in np.argsort(order, kind="stable")]
-    return _labelled(bench, rows, exact, finest)
+    return with_floors(_labelled(bench, rows, exact, finest), budgets)
 
 
-def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting]) -> Case:
+def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], derived: Sequence[Observable]) -> Case:
     """The case with rows that all settings have in common, and with the pressures that are compared."""
     keep, settings, experiment = case.settings.keep, case.solving(), case.experiment()
     changes: dict[str, Any] = {"solve.grid_error": False}
+    fields = [*keep.fields, *(field for one in derived for field in one.fields)]
     if "pressure" in AXES[experiment.axis].variables:
-        changes["keep.fields"] = [*dict.fromkeys([*keep.fields, "pressure"])]
+        fields.append("pressure")
+    changes["keep.fields"] = [*dict.fromkeys(fields)]
     shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
     shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]
     cells = [(sides[0] * shape[0] / nx, sides[1] * shape[1] / ny) for nx, ny in shapes]
@@ -198,5 +217,4 @@ def _labelled(
         "rows": AXES[case.experiment().axis].rows,
         "transforms": transform_library(),
     }
-    dataset.attrs["recommendation"] = recommendation(dataset)
     return dataset

@@ -14,6 +14,10 @@ from roughvisc.views.console.tables import size
 
 #: Errors that are shown, and their headings; so many of them, the first, have room in 80 characters.
 _ERRORS = {
+    "force": "force",
+    "leak_rate": "leak",
+    "thermal_conductance": "conductance",
+    "incremental_stiffness": "stiffness",
     "friction_coefficient": "friction",
     "pressure": "pressure",
     "approach": "approach",
@@ -47,6 +51,9 @@ def trade_table(dataset: xr.Dataset) -> Group:
         spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
+    if "floor" in dataset:
+        floors = [_percent(float(dataset["floor"].sel(quantity=name))) for name in shown]
+        table.add_row("", Text("no setting better than", style="italic"), "", "", "", *floors)
     parts = [Text(printable(dataset.attrs.get("title") or "untitled"), style="bold"), table]
     rows = dataset.attrs.get("rows", "kept times")
     text = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -29,6 +30,8 @@ _FAMILIES = {
     "rounded fields": ("P", SKY),
     "seed paper's algorithm": ("X", ORANGE),
 }
+#: What the line is called below which nobody need pay.
+_FLOOR = "no setting is better"
 #: Where a label may stand: offset from its point [point], and how it is aligned there; the first that is free is taken.
 _PLACES = (
     ((6, 0), "left", "center"),
@@ -51,7 +54,8 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
     """Wall time against error of every setting, with the Pareto front: what no other setting beats in both.
 
     Errors that the reference cannot tell from zero lie in the grey band below; a setting whose error is exactly zero
-    is drawn at the bottom. The front does not go through either: where such points lie was not measured.
+    is drawn at the bottom. The front does not go through either: where such points lie was not measured. A dashed line
+    is the error that no setting lessens, where the trade holds it: below it nobody need pay.
 
     Parameters
     ----------
@@ -59,8 +63,8 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
         Of :func:`roughvisc.trade`.
     quantities : sequence of str, optional
         One panel for each: ``friction_coefficient``, ``pressure``, ``approach``, ``contact_area``,
-        ``contact_area_counted``, ``mean_gap``. Default: contact area and pressure, where something slides friction
-        coefficient and contact area.
+        ``contact_area_counted``, ``mean_gap``, and what the trade holds beside these. Default: contact area and
+        pressure, where something slides friction coefficient and contact area.
 
     Returns
     -------
@@ -128,6 +132,9 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     if nothing:
         ax.axhline(floor * 1.7, color="0.6", lw=0.6, ls=(0, (1, 2)), zorder=0)
         ax.text(0.02, floor, "none seen", transform=ax.get_yaxis_transform(), fontsize=6, style="italic", va="center")
+    if "floor" in dataset and (kept := 100 * float(dataset["floor"].sel(quantity=quantity))) > 0:
+        _draw_floor(ax, kept, str(dataset["floor_open"].sel(quantity=quantity).values))
+        ax.set_ylim(min(bottom, kept / 2), max(ax.get_ylim()[1], kept * 2))
     if unsure > bottom:
         ax.axhspan(bottom, min(unsure, height[known].max()), color="0.93", zorder=0, label="reference not known")
     for axis, most in ((ax.xaxis, 30), (ax.yaxis, 300)):
@@ -140,6 +147,13 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
     ax.grid(color="0.9", lw=0.5)
     where = np.flatnonzero(known)
     return where, np.column_stack([spent, height])[where], np.column_stack([spent, height])[best]
+
+
+def _draw_floor(ax: Axes, floor: float, still_open: str) -> None:
+    """The error that no setting lessens [%], and what is not in it."""
+    ax.axhline(floor, color="k", lw=1.0, ls=(0, (5, 2)), zorder=1, label=_FLOOR)
+    said = f"no setting better than {floor:.2g} %" + (f"; still open: {still_open}" if still_open else "")
+    ax.set_title(textwrap.fill(said, 50), fontsize=6, loc="right")
 
 
 def _brief(row: xr.Dataset) -> str:
@@ -160,6 +174,9 @@ def _place(ax: Axes, dataset: xr.Dataset, settings: np.ndarray, points: np.ndarr
     taken = [_around(at, 3.5 * point) for at in ax.transData.transform(points)]
     taken += [_around(at, 0.6 * point) for part in along for at in part]
     frame = ax.get_window_extent()
+    for floor in [one for one in ax.lines if one.get_label() == _FLOOR]:
+        height = ax.transData.transform((ax.get_xlim()[0], floor.get_ydata()[0]))[1]
+        taken.append(Bbox.from_extents(frame.x0, height - point, frame.x1, height + point))
     for i, at in zip(settings, points, strict=True):
         row = dataset.isel(setting=i)
         colour = 0.65 * np.array(to_rgb(_FAMILIES[str(row["family"].values)][1]))
