@@ -110,6 +110,7 @@ ALLOWED = {
         "study.execution",
         "study.audit",
         "study.cost",
+        "study.quantities",
         "study.trade",
         "study.budget",
         "study.validation",

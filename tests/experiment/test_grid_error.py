@@ -40,6 +40,20 @@ def test_grid_error__is_one_for_each_quantity(control):
     assert float(ds.grid_error[0]) == max(float(ds.grid_error_pressure[0]), float(ds.grid_error_approach[0]))
 
 
+@pytest.mark.parametrize(("control", "across", "cells"), [("load", 17.82, 50), ("approach", 9.82, 28)])
+def test_grid_error__of_a_punch_holds_what_its_cells_are_short_of_a_circle(control, across, cells):
+    """So many cells in a radius, where the coarser grids agree by chance."""
+    radius = 1e-3
+    exact = closed_forms.flat_punch(radius, 4e6, LOAD)
+    program = getattr(rv.Program(), control)(LOAD if control == "load" else exact.approach, over=0)
+    punch = rv.flat_punch(radius, cells * radius / across, cells)
+    ds = simulate_whole(
+        punch, rv.elastic(1e6), program, grid_error=True, progress=False, missing="absent", tolerance=1e-4
+    )
+    found, true = ("approach", exact.approach) if control == "load" else ("force", LOAD)
+    assert 0.003 < abs(float(ds[found][0]) / true - 1) < float(ds[f"grid_error_{found}"][0]) < 0.1
+
+
 def test_grid_error__of_the_gap_of_a_rough_surface_is_small():
     """Against cells a third as long, with the same waves: far below that of the approach, which hangs on the peak."""
     made = {"hurst": 0.8, "rms_slope": 0.1, "shortcut": 2e-4, "rolloff": 5e-4, "seed": 4}

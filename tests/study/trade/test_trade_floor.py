@@ -50,12 +50,12 @@ def test_floor__is_of_what_settings_do_not_change(tmp_path, grid_is_data):
 
 
 def test_words__say_the_floor_and_what_is_sharp_enough(tmp_path):
-    """A fifth of 10 % is 2 %: of the settings made up that with 0.6 % is the fastest."""
+    """A fifth of 2 % is 0.4 %: of the settings made up the fastest that keeps it has just that."""
     ds = with_floors(made_up(), [budget_of(case_of(tmp_path))])
-    ds = ds.assign(floor=ds.floor.where(ds.quantity != AREA, 0.1))
+    ds = ds.assign(floor=ds.floor.where(ds.quantity != AREA, 0.02))
     assert (
-        "no setting makes the contact area better than 10 %, most of it by next octave of waves (still open, and not "
-        "in it: modulus): tolerance = 1e-2, 96 x 90 cells is sharp enough, 0.5 s"
+        "no setting makes the contact area better than 2 %, most of it by next octave of waves (still open, and not "
+        "in it: modulus): tolerance = 1e-2 is sharp enough, 4 s"
     ) in recommend.recommendation(ds).splitlines()
     assert "no setting makes" not in made_up().attrs["recommendation"]
 
@@ -84,17 +84,15 @@ def test_trade__takes_the_floor_of_a_budget_of_the_same_study_alone(tmp_path):
 
 def test_errors__of_what_is_derived_are_those_of_the_observable(tmp_path):
     """Of a leak rate and a force; at the tolerance of the finest run there is no difference."""
-    case = case_of(tmp_path, ROUGH, observe={"leakage": {"viscosity": "1 mPa s", "pressure_drop": "1 bar"}})
+    case = case_of(tmp_path, ROUGH, observe={"leakage": {"viscosity": "1 mPa s", "along": "y"}})
     loose, sharp = (
         rv.run(vary(case, {"solve.tolerance": one, "keep.fields": ["gap"]}), out=tmp_path / "own", progress=False)
         for one in (1e-1, 2e-3)
     )
     found = measured(case, Setting(1e-1), Setting(1e-2), quantities=["leak_rate", "force"])
-    rates = [
-        rv.observables.leakage(one, viscosity=1e-3, pressure_drop=1e5)["leak_rate"].values for one in (loose, sharp)
-    ]
+    rates = [rv.observables.leakage(one, viscosity=1e-3, along="y")["leak_rate"].values for one in (loose, sharp)]
     expected = np.abs(rates[0] - rates[1]).max() / rates[1].max()
-    assert float(found.error.sel(quantity="leak_rate")[0]) == pytest.approx(expected, rel=1e-6)
+    assert float(found.error.sel(quantity="leak_rate")[0]) == pytest.approx(expected, rel=1e-5)
     assert expected > 1e-6
     assert float(found.error.sel(quantity="force")[0]) == 0
     assert "leak rate" in found.attrs["recommendation"]
