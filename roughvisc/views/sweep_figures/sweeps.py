@@ -284,8 +284,8 @@ def _draw_line(
         columns = [np.insert(one, last, np.nan) for one in columns]
     x, y, lower, upper, itself = columns
     ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | style)
-    if np.isfinite(lower).any():
-        draw_band(ax, x, lower, upper, style["color"], across.numeric)
+    if known := int(np.isfinite(lower).sum()):
+        draw_band(ax, x, lower, upper, style["color"], across.numeric and known > 1)
     if np.isfinite(itself).any():
         look = ITSELF_STYLE if across.numeric else {"ls": ""}
         ax.plot(x, itself, marker="D", mfc="w", ms=4, color=style["color"], **look)

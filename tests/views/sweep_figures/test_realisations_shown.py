@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from support import lines, text_boxes
 
 from roughvisc.views import plot
@@ -82,6 +82,16 @@ def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter(
     assert "mean of 5 realisations" in told
     assert "the scan itself" not in told
     assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
+
+
+def test_sweep__the_band_of_a_point_alone_is_a_bar():
+    hurst = ("case", [0.6, 0.6, 0.8], {"long_name": "surface.hurst"})
+    (ax,) = plot.sweep(patches(surface_hurst=hurst), times=-1, along="program.0.load").axes
+    (bar,) = [one for one in ax.collections if isinstance(one, LineCollection)]
+    low, high = interval(FACTORS[1:])
+    ((_, bottom), (_, top)) = bar.get_segments()[0]
+    assert top / bottom == pytest.approx(high / low)
+    assert sum(isinstance(one, PolyCollection) for one in ax.collections) == 1
 
 
 def test_cases_of__a_realisation_that_is_missing_does_not_count():
