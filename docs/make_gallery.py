@@ -55,7 +55,7 @@ FIGURES = {
 }
 SCRIPTS = {
     name: f"figures/{name}.png"
-    for name in ("maxwell_step", "zener_step", "thin_sheet", "stability_map")
+    for name in ("maxwell_step", "zener_step", "thin_sheet", "coating", "stability_map")
 }
 
 

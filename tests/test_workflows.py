@@ -267,3 +267,12 @@ def test_memory_benchmark__measures_what_is_stated(monkeypatch):
     assert row["case"] == "48 x 48, periodic, zener"
     assert row["bytes"] > 48**2 * 8
     assert 0 < row["stated_over_taken"] < 2
+
+
+def test_coating__that_is_thicker_has_more_contact(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    figure = importlib.import_module("coating").main(cells=20, figure=tmp_path / "figure.png", speeds=[1e-2, 1.0])
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    area = np.array([line.get_ydata() for line in figure.axes[2].lines])
+    assert (np.diff(area, axis=0) > 0).all()
+    assert len(capsys.readouterr().out.splitlines()) == len(area), "the table"

@@ -20,6 +20,7 @@ from roughvisc.experiment.notes import (
     contact_stands_alone,
     creep_left,
     edge_note,
+    layer_note,
     omitted_effects,
     slope_note,
     surface_stands_alone,
@@ -33,6 +34,7 @@ from roughvisc.experiment.scene import build_scene, kept_times, memory_options, 
 from roughvisc.experiment.stated import area_columns, error_columns, is_end_value, meets_tolerance
 from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
@@ -45,7 +47,7 @@ from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, 
 from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.step import at_border, segment_number
 from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
-from roughvisc.mechanics.stepping.wave_memory import choose_body_memory
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
@@ -378,10 +380,14 @@ class LoadingRows(Rows):
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
+        body, ages = self._problem.body, (0.0, scene.program.duration)
+        # of what was pressed, a series or not; of layers those of the top one
+        pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.final}
         return {
             "memory": choice.note,
             "series_error": choice.series_error,
-            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, force, approach),
+            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, force, approach)
+            or layer_note(body, settings.tolerance, wave_limits((nx, ny), (dx, dy)), ages),
             "material_note": self._problem.body.note,
             "program_note": scene.program.note,
             "slide_note": slide_note(scene.program, profile.spacing),
@@ -389,9 +395,7 @@ class LoadingRows(Rows):
             "edge": "accept" if settings.edge == "accept" else "",
             "left_out": omitted_effects(choice, settings, self._followed, profile.mirrored),
             **warnings,
-            # of what was pressed, a series or not
-            "compliance_at_once": scene.compliance(0.0),
-            "compliance_at_end": scene.final,
+            **({} if isinstance(choice.memory, WaveMemory) else pressed),
         }
 
     def _wake_note(self, dataset: xr.Dataset) -> str:

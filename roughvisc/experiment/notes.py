@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.layer import LayeredBody
 from roughvisc.mechanics.bodies.sheet import Sheet, complement
 from roughvisc.mechanics.hereditary.choice import Choice, terms
 from roughvisc.mechanics.hereditary.exponentials import Modes
@@ -243,6 +245,38 @@ def body_note(
             f"{kernel.uniform_displacement:.3g} m: up to {percent(min(share, 1.0))} of it."
         )
     return note
+
+
+#: Part of the tolerance that a body may be off with which it would be accurate enough on every wave.
+_ENOUGH = 0.1
+
+
+def layer_note(body: Body, tolerance: float, waves: tuple[float, float], ages: Sequence[float]) -> str:
+    """Whether one of the materials of a layered body would do alone; empty for another body.
+
+    Parameters
+    ----------
+    body : Body
+    tolerance : float
+        Of the solve.
+    waves : tuple of float
+        Wave numbers of the longest and of the shortest wave of the grid. [1/m]
+    ages : sequence of float
+        At which the materials are compared. [s]
+    """
+    if not isinstance(body, LayeredBody):
+        return ""
+    apart = body.apart(waves, ages)
+    for off, name in zip(apart, ("the top layer", "the lowest material"), strict=True):
+        if off < _ENOUGH * tolerance:
+            return (
+                f"A half-space of {name} alone would be accurate enough: it differs by at most {percent(off)} on every "
+                "wave of the grid."
+            )
+    return (
+        f"The layers matter: a half-space of the top layer alone would be off by up to {percent(apart[0])} on a wave "
+        f"of the grid, and one of the lowest material by up to {percent(apart[1])}."
+    )
 
 
 def percent(share: float) -> str:

@@ -232,8 +232,9 @@ _COMPANION, _EXPONENTIAL = 1.5, 5.2
 _FOLLOWING, _MOVED = 13.0, 12.0
 #: What the direct history adds beside the companion: total displacements and effective pressures.
 _DIRECT = 6.5
-#: A symbol of each exponential where every wave has its own compliances; spectra of pressure and displacement.
-_SYMBOL, _SPECTRA = 0.25, 4.0
+#: Spectra of each exponential where every wave has its own compliances, and its symbol; what the two-step rule adds to
+#: these; those of pressure and displacement; and numbers of a padded spectrum over cells. Measured at 513 and 251 squared.
+_WAVE, _WAVE_BEFORE, _SPECTRA, _PADDED = 3.3, 1.4, 4.0, 5.0
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
 _SHOWN = 3.0
 #: Fields of the state while the file is written, a frame as it was kept among them.
@@ -305,12 +306,11 @@ def march_bytes(
                 solved += _FOLLOWING + (_EXPONENTIAL * modes if memory.acts_on == "both" else 0.0)
                 solved += _MOVED if grows else 0.0
     elif isinstance(memory, WaveMemory):
-        # of waves, as many numbers as cells, or four times as many; and a quarter as many for a symbol
-        modes, padded = len(memory.series.compliances), 4.0 if settings.boundary == "free" else 1.0
-        solved += _COMPANION + _DIRECT + padded * (modes * (_EXPONENTIAL + _SYMBOL) + _SPECTRA)
+        modes, padded = len(memory.series.compliances), _PADDED if settings.boundary == "free" else 1.0
+        solved += _COMPANION + _DIRECT + padded * (modes * _WAVE + _SPECTRA)
         state += 3 * padded * modes
         if "bdf2" in memory.rules:
-            solved += _SHOWN + padded * _EXPONENTIAL * modes
+            solved += _SHOWN + padded * _WAVE_BEFORE * modes
     elif isinstance(memory, History):
         past = 1.5 * history_bytes(contact * cells, steps)
         solved += _COMPANION + _DIRECT

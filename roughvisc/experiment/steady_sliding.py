@@ -17,6 +17,7 @@ from roughvisc.experiment.notes import (
     border_note,
     contact_stands_alone,
     creep_left,
+    layer_note,
     octave_note,
     slope_note,
     surface_stands_alone,
@@ -28,6 +29,7 @@ from roughvisc.experiment.refusal import require_memory_of_curve
 from roughvisc.experiment.resources import curve_bytes
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
@@ -294,6 +296,12 @@ class SlidingRows(Rows):
         return {
             "model_note": MODEL,
             "direction": self._curve.direction,
+            "body_note": layer_note(
+                self._body,
+                self._settings.tolerance,
+                wave_limits(self._face.gap.shape, self._face.spacing),
+                (0.0, self._face.period / min(self._curve.asked)),
+            ),
             "material_note": self._body.note,
             "octave_note": octave_note(dataset),
             "last_octave": self._octave,

@@ -208,6 +208,12 @@ def periodic_waves(shape: tuple[int, int], spacing: tuple[float, float]) -> tupl
     return qx[:, None], qy[None, :]
 
 
+def wave_limits(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:
+    """Wave numbers of the longest and of the shortest wave on some cells. [1/m]"""
+    longest = max(count * side for count, side in zip(shape, spacing, strict=True))
+    return 2 * math.pi / longest, math.hypot(*(math.pi / side for side in spacing))
+
+
 def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
     """Refuse an impossible grid."""
     if any(int(n) != n or n < 1 for n in shape):

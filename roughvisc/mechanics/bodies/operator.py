@@ -6,7 +6,6 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple
@@ -18,7 +17,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import blocks, empty, parallel_map, threads_of
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves
+from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
 from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.sparse import Scattered
 
@@ -131,8 +130,7 @@ class Operator:
     @property
     def wave_numbers(self) -> tuple[float, float]:
         """Of the longest and of the shortest wave of the cells. [1/m]"""
-        longest = max(count * side for count, side in zip(self.surface_shape, self.spacing, strict=True))
-        return 2 * np.pi / longest, math.hypot(*(np.pi / side for side in self.spacing))
+        return wave_limits(self.surface_shape, self.spacing)
 
     def spectrum(self, field: Array) -> NDArray[Any]:
         """Transform of a field on these cells, zero beyond them."""

@@ -54,6 +54,8 @@ def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
     """By how much approach or force are off on a half-space, in place of the sheet that there is."""
     if evidence.sheet is not None:
         return _modelled(evidence.sheet, given)
+    if evidence.kernel:
+        return Finding("thickness", 0.0, f"Modelled: {evidence.kernel}.")
     if len(evidence.bodies) != 1:
         return unknown("thickness", "Two bodies, or a Poisson ratio that changes: there is no sheet to compare with.")
     poisson = evidence.bodies[0].poisson

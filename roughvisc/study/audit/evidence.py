@@ -313,6 +313,8 @@ class Evidence:
         One or two of constant Poisson's ratio; none where these are not known.
     sheet : Sheet or None
         What was pressed, if no half-space.
+    kernel : str
+        What else was pressed, in words: layers, or a kernel of the user's own.
     time_scale : float
         Shortest time in which what is prescribed changes. [s]
     speed, friction_power : float
@@ -337,6 +339,7 @@ class Evidence:
     late: float
     bodies: tuple[Body, ...] = ()
     sheet: Sheet | None = None
+    kernel: str = ""
     time_scale: float = math.nan
     speed: float = 0.0
     friction_power: float = math.nan
@@ -401,6 +404,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         late=float(attrs.get("compliance_at_end", math.nan)),
         bodies=_bodies(attrs, case, longest),
         sheet=None if thickness == math.inf else Sheet(thickness, float(poisson), attrs.get("base", BASE)),
+        kernel=str(attrs.get("kernel", "")),
         time_scale=float(attrs.get("time_scale", math.nan)),
         speed=speed,
         friction_power=friction_power,
@@ -450,6 +454,7 @@ def of_case(
         late=late,
         bodies=bodies_of(case, end),
         sheet=kernel if isinstance(kernel, Sheet) else None,
+        kernel=case.body().attributes().get("kernel", ""),
         time_scale=experiment.time_scale,
         speed=experiment.largest_speed,
         force=force,

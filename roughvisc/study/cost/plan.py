@@ -19,11 +19,12 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.notes import body_note, omitted_effects
+from roughvisc.experiment.notes import body_note, layer_note, omitted_effects
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.refusal import PART, amount, too_large
 from roughvisc.experiment.resources import PROCESS, Available, cores, memory_available
 from roughvisc.experiment.scene import memory_options
+from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
@@ -98,7 +99,7 @@ COLUMNS = {
     "half_memory": ("byte", "memory of the process at its peak on cells twice as long"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
-    "body_note": ("", "what the base of a sheet does, by the coarse march; empty of a half-space"),
+    "body_note": ("", "what the base of a sheet or layers do, by the coarse march; empty of a half-space"),
     "program_note": ("", "how a measured history became segments"),
     "audit": (
         "",
@@ -377,7 +378,13 @@ def _row(
         "final_cells_x": shape[0],
         "final_cells_y": shape[1],
         "audit": _audit(case, surface, found) if marched else "",
-        "body_note": body_note(case.body().kernel, settings, (sides[0], sides[1]), final, found.force, found.level),
+        "body_note": body_note(case.body().kernel, settings, (sides[0], sides[1]), final, found.force, found.level)
+        or layer_note(
+            case.body(),
+            settings.tolerance,
+            wave_limits(height.shape, spacing(height)),
+            (0.0, case.program().duration),
+        ),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "rows": found.rows,

@@ -156,3 +156,21 @@ def test_slide__dissipates_in_both_bodies_what_friction_does_in_the_steady_state
     slid = np.diff(steps["sliding_distance"].values)
     friction = steps["friction_force"].values
     np.testing.assert_allclose(lost.sum(), (slid * (friction[1:] + friction[:-1]) / 2).sum(), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "expected"),
+    [
+        (1e-12, "half-space of the lowest material alone would be accurate enough"),
+        (1e-4, "The layers matter"),
+        (1e2, "half-space of the top layer alone would be accurate enough: it differs by at most 0 %"),
+    ],
+)
+def test_body_note__says_whether_one_material_would_do(thickness, expected):
+    base = rv.elastic(1e7)
+    found = pressed(rv.layer(RUBBER, thickness, on=base), boundary="periodic")
+    assert expected in found.roughvisc.attributes["body_note"]
+    assert rv.audit(found)["thickness"].sentence.startswith("Modelled: layer(zener(")
+    for alone, at in ((base, 1e-12), (RUBBER, 1e2)):
+        if thickness == at:
+            assert off(found, pressed(alone, boundary="periodic")) < TOLERANCE
