@@ -233,7 +233,7 @@ _FOLLOWING, _MOVED = 13.0, 12.0
 #: What the direct history adds beside the companion: total displacements and effective pressures.
 _DIRECT = 6.5
 #: Spectra of each exponential where every wave has its own compliances, and its symbol; what the two-step rule adds to
-#: these; those of pressure and displacement; and numbers of a padded spectrum over cells. Measured at 513 and 251 squared.
+#: these; those of pressure and displacement; and numbers of a padded spectrum over cells (251 to 513 squared).
 _WAVE, _WAVE_BEFORE, _SPECTRA, _PADDED = 3.3, 1.4, 4.0, 5.0
 #: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
 _SHOWN = 3.0
