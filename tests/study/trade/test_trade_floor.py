@@ -100,8 +100,9 @@ def test_errors__of_what_is_derived_are_those_of_the_observable(tmp_path):
         measured(case, Setting(1e-1), quantities=["friction_coefficient"])
 
 
-def test_command__shows_the_floor_of_a_budget_that_is_there(invoke, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr("roughvisc.study.trade.trade.ladder", lambda *_: [Setting(1e-1), Setting(3e-2)])
+@pytest.mark.thorough
+def test_command__shows_the_floor_of_a_budget_that_is_there(invoke, tmp_path, monkeypatch, caplog, coarse_pictures):
+    monkeypatch.setattr("roughvisc.study.trade.trade.ladder", lambda *_: [Setting(1e-1)])
     monkeypatch.setattr("roughvisc.study.budget.budget.budgets", partial(budgets, workers=0))
     (tmp_path / "ball.toml").write_text(STUDY)
     status, out, _ = invoke("trade", "ball.toml", "--floor")
