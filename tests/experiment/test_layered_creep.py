@@ -1,0 +1,133 @@
+"""Layers whose materials creep differently: space and time do not separate. Against inverted Laplace transforms,
+against a march of Fredholm equations, against steady sliding, and limits."""
+
+import math
+
+import numpy as np
+import pytest
+from layered import GrowingOnLayer, relaxation_of_wave, sliding_symbol
+from support import friction_whole, simulate_whole
+
+import roughvisc as rv
+
+RUBBER, POLYMER = rv.zener(1e6, 3e5, 1e5, 0.5), rv.zener(8e6, 2e6, 2e7, 0.35)  # they creep in 0.3 s, and in 10 s
+SPRING = rv.elastic(3e6, 0.3)
+TWICE = rv.Prony(5e-7, 0.0, (1e-6, 3e-6), (0.02, 2.0), 0.45)
+PAIRS = {
+    "rubber on polymer": (RUBBER, POLYMER),
+    "polymer on rubber": (POLYMER, RUBBER),
+    "elastic on rubber": (SPRING, RUBBER),
+    "rubber on elastic": (RUBBER, SPRING),
+    "two times on rubber": (TWICE, RUBBER),
+}
+SIDE = 1e-3
+
+
+def simulated(height, pair, thickness, program, **settings):
+    body = rv.layer(pair[0], thickness, on=pair[1])
+    return simulate_whole(height, body, program, **{"progress": False, **settings})
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize(
+    "thickness", [2e-4, *(pytest.param(h, marks=pytest.mark.thorough) for h in (2e-6, 2e-5, 1e-3))]
+)
+def test_wave_in_full_contact__relaxes_as_the_inverted_transform(pair, thickness):
+    """The displacement is that of the profile from the first instant on; its pressure is 1 / (s C(q, s))."""
+    amplitude, cells, q, t = 1e-6, (15, 12), 2 * math.pi / SIDE, np.array([1e-3, 0.03, 0.3, 2.0, 20.0])
+    crest = amplitude * relaxation_of_wave(q, *PAIRS[pair], thickness, np.append(1e-9, t))
+    program = rv.Program().load(1.5 * crest[0] * SIDE**2, over=0).hold(20.0)
+    height = rv.wavy(amplitude, SIDE, SIDE, cells, waves=1)
+    ds = simulated(height, PAIRS[pair], thickness, program, boundary="periodic", times=t, tolerance=1e-3)
+    wave = np.cos(q * ds.x.values)
+    found = 2 * np.mean(ds.pressure.values * wave[:, None], axis=(1, 2))
+    np.testing.assert_allclose(found, crest[1:], atol=1e-3 * crest[0])
+    exact = 1.5 * crest[0] + crest[1:, None, None] * wave[:, None] * np.ones(cells[1])
+    error = np.abs(ds.pressure.values - exact).sum(axis=(1, 2)) / exact.sum(axis=(1, 2))
+    assert error.max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("pair", "wide"),
+    [
+        ("polymer on rubber", 0.4),
+        ("rubber on polymer", 1.5),
+        *(pytest.param(pair, wide, marks=pytest.mark.thorough) for pair in PAIRS for wide in (0.15, 0.8, 5.0)),
+    ],
+)
+def test_growing_contact_of_a_ball__is_that_of_the_march(pair, wide):
+    """A load applied at once and kept."""
+    thickness, cells = 1e-4, 63
+    radius, force = 25 * wide, wide**2 * 3e4  # in thicknesses
+    t = np.append(0.0, np.geomspace(0.02, 10.0, 10))
+    exact = GrowingOnLayer(lambda x: np.asarray(x) ** 2 / radius, *PAIRS[pair], force, t)
+    ball = rv.sphere(radius * thickness, 2.6 * exact.radius[-1] * thickness, cells)
+    program = rv.Program().load(force * thickness**2, over=0).hold(10.0)
+    ds = simulated(ball, PAIRS[pair], thickness, program, boundary="free", times=t, fields=(), tolerance=1e-3)
+    np.testing.assert_allclose(ds.approach, thickness * np.array(exact.approach), rtol=1.5e-3)
+    radii = np.sqrt(ds.contact_area / math.pi) / thickness
+    np.testing.assert_allclose(radii, exact.radius, atol=0.35 * 2.6 * exact.radius[-1] / cells)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_equal_materials__are_the_half_space(boundary):
+    """Times that differ by 1e-6 let the general way be taken."""
+    nearly = rv.zener(1e6, 3e5, 1e5 * (1 + 1e-6), 0.5)
+    height = rv.self_affine(SIDE, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
+    program = rv.Program().load(0.02, over=0.1).hold(0.3).load(0.01, over=0.1)
+    edge = {"edge": "accept"} if boundary == "free" else {}
+    settings = {"boundary": boundary, "times": [0.1, 0.4, 0.5], "tolerance": 1e-3, **edge}
+    half = simulate_whole(height, RUBBER, program, progress=False, **settings)
+    found = simulated(height, (RUBBER, nearly), 1e-4, program, **settings)
+    assert float((abs(found.pressure - half.pressure).sum(["x", "y"]) / half.pressure.sum(["x", "y"])).max()) < 1e-3
+    np.testing.assert_allclose(found.approach, half.approach, rtol=1e-3)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_rigid_base__is_the_sheet(boundary):
+    height = rv.self_affine(SIDE, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
+    program = rv.Program().load(0.02, over=0.1).hold(0.3).load(0.01, over=0.1)
+    edge = {"edge": "accept"} if boundary == "free" else {}
+    settings = {"boundary": boundary, "times": [0.1, 0.4, 0.5], "tolerance": 1e-3, **edge}
+    sheet = simulate_whole(height, rv.sheet(RUBBER, 1.2e-4), program, progress=False, **settings)
+    found = simulated(height, (RUBBER, rv.elastic(1e11)), 1.2e-4, program, **settings)
+    assert float((abs(found.pressure - sheet.pressure).sum(["x", "y"]) / sheet.pressure.sum(["x", "y"])).max()) < 1e-3
+
+
+#: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.
+QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
+
+
+@pytest.mark.parametrize(
+    ("pair", "cells"),
+    [
+        pytest.param((SPRING, QUICK), (24, 48), id="elastic on quick"),
+        pytest.param((SPRING, QUICK), (32, 64, 128), id="elastic on quick, finer", marks=pytest.mark.thorough),
+        pytest.param((QUICK, SLOW), (32, 64, 128), id="quick on slow", marks=pytest.mark.thorough),
+    ],
+)
+def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair, cells):
+    """Of a third of the wave in contact."""
+    errors = []
+    for count in cells:
+        height = rv.wavy(4e-6, SIDE, (SIDE, 3 * SIDE / count), (count, 3), waves=1)
+        steady = friction_whole(height, rv.layer(pair[0], 1.5e-4, on=pair[1]), speeds=SPEED, pressure=1.2e4)
+        program = rv.Program().pressure(1.2e4, over=0).slide(5 * SIDE, speed=SPEED)
+        ds = simulated(height, pair, 1.5e-4, program, boundary="periodic", times=1, fields=(), tolerance=1e-5)
+        errors.append(abs(float(ds.friction_coefficient[-1] / steady.friction_coefficient[0]) - 1))
+    assert errors[-1] < 3e-3
+    assert -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.6
+
+
+def test_settled_slide_in_full_contact__takes_what_both_bodies_dissipate():
+    """Work of friction over a period is the loss of the wave, ``q A^2 |Im 1/C| / 2`` of area and distance."""
+    thickness, amplitude, q, cells = 1.5e-4, 1e-6, 2 * math.pi / SIDE, 65
+    stiffness = 1 / complex(sliding_symbol(q, SPEED, QUICK, SLOW, thickness))
+    height = rv.wavy(amplitude, SIDE, (SIDE, 3 * SIDE / cells), (cells, 3), waves=1)
+    program = rv.Program().pressure(8 * amplitude * abs(stiffness), over=0).slide(6 * SIDE, speed=SPEED)
+    settings = {"boundary": "periodic", "times": [0.025, 0.03], "fields": (), "tolerance": 1e-4}
+    ds = simulated(height, (QUICK, SLOW), thickness, program, **settings)
+    distance, area = float(ds.sliding_distance[1] - ds.sliding_distance[0]), SIDE * 3 * SIDE / cells
+    expected = q * amplitude**2 * abs(stiffness.imag) / 2 * area
+    for name in ("friction_work", "dissipated_energy"):
+        assert float(ds[name][1] - ds[name][0]) / distance == pytest.approx(expected, rel=2e-3), name
