@@ -10,8 +10,9 @@ import logging
 import math
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +23,11 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
 from roughvisc.study.budget.budget import FOLDER, assembled, known_errors, observed_with, solved, together
+from roughvisc.study.budget.population import MOST, PILOT, Level, counts_for, draw, mean_of, scatter_of
 from roughvisc.study.budget.sources import SOURCES, Asked, Found
 from roughvisc.study.budget.variants import Variants, with_rows
 from roughvisc.study.execution import single
-from roughvisc.study.execution.cluster import default_client
+from roughvisc.study.execution.cluster import default_client, local_client
 from roughvisc.study.execution.monitor import Monitor, NullMonitor, watcher
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.quantities import Observable, known_quantity
@@ -59,6 +61,8 @@ _DEARER = 4.0
 _WORTH_PROCESSES = 20.0
 #: Time of some solves from which on a display shows how they go on. [s]
 _WORTH_WATCHING = 2.0
+#: Error at which the search for the best in a time begins, of a population.
+_FIRST_GOAL = 0.3
 #: Sources that grid and tolerance rule; all others are the floor.
 _RULED = ("time steps and solver", "grid")
 FLOOR = tuple(source.name for source in SOURCES if source.name not in _RULED)
@@ -356,6 +360,17 @@ def choose(
     around = replace(around, parts=bench.solve(others, around.solves[around.level].seconds))
     if told := list(around.below_floor(targets)):
         raise _refusal(case, told)
+    if draws_others(case):
+        workers = workers if client is None else None
+        with local_client(workers) if workers else nullcontext(client) as there:
+            population = mean_of_population(case, grids, around, replace(bench, client=there), targets, limit)
+        chosen = grids.case(population.level)
+        bench.solve({"own": chosen})
+        _keep(chosen, bench.folder, folder, same_bits)
+        budgets = {one.name: population.budget(one, chosen) for one in quantities}
+        return Choice(
+            chosen, result_path(folder, chosen.key), tuple(_reasons(grids, population, targets, limit)), budgets
+        )
 
     while True:
         tell(f"{grids.words(around.level)}: {around.words(targets)}")
@@ -375,12 +390,18 @@ def choose(
         around = around.finer(bench, grids)
 
     chosen = grids.case(around.level)
-    path = result_path(folder, chosen.key)
-    if not is_result_of(chosen, path, same_bits):
-        with atomic_write(path) as temporary:
-            shutil.copyfile(result_path(bench.folder, chosen.key), temporary)
+    _keep(chosen, bench.folder, folder, same_bits)
     reasons = tuple(_reasons(grids, around, targets, limit))
-    return Choice(chosen, path, reasons, {one.name: around.budget(one, chosen) for one in quantities})
+    budgets = {one.name: around.budget(one, chosen) for one in quantities}
+    return Choice(chosen, result_path(folder, chosen.key), reasons, budgets)
+
+
+def _keep(case: Case, found: Path, folder: Path, same_bits: bool) -> None:
+    """Bring the result of a case from the folder of the solves to that of the results."""
+    path = result_path(folder, case.key)
+    if not is_result_of(case, path, same_bits):
+        with atomic_write(path) as temporary:
+            shutil.copyfile(result_path(found, case.key), temporary)
 
 
 def _refusal(case: Case, problems: Sequence[str]) -> InputError:
@@ -400,7 +421,10 @@ def first_grids(case: Case, bench: Bench, targets: Mapping[str, float], limit: f
     while True:
         grids = grids_of(case, bench.quantities, tolerance)
         held = grids.case(grids.held)
-        asked = Asked(Variants(held, held.height()), False, **known_errors(case, dict.fromkeys(KNOWN)))
+        known = known_errors(case, dict.fromkeys(KNOWN))
+        if draws_others(case):  # in place of the scatter of a few
+            known["population"] = "patch"
+        asked = Asked(Variants(held, held.height()), False, **known)
         around = Around(grids.held + 3, grids.held, {}, {}, asked, bench.quantities).finer(bench, grids)
         wait = around.seconds_of_next(len(around.changed_cases()))
         if around.spent + wait > limit:
@@ -589,11 +613,184 @@ class Around:
         )
 
 
-def _reasons(grids: Grids, around: Around, targets: Mapping[str, float], limit: float) -> Iterator[str]:
+def draws_others(case: Case) -> bool:
+    """Whether the number of a case is that of all surfaces of its recipe, of which as many are drawn as it takes."""
+    surface, want = case.settings.surface, case.settings.want
+    of_a_recipe = hasattr(surface, "seed") and surface.second is None and surface.realisation is None
+    return of_a_recipe and want is not None and want.population == "ensemble"
+
+
+@dataclass(frozen=True)
+class OfPopulation:
+    """The number of all surfaces of a recipe, with its error.
+
+    Attributes
+    ----------
+    around : Around
+        Of the surface of the case itself, on the coarsest grid that holds its waves: for the floor.
+    levels : dict
+        Level -> draws of all grids down to the finest.
+    targets : dict
+        Name of each quantity -> error of its logarithm that was aimed at.
+    """
+
+    around: Around
+    levels: dict[int, Level]
+    targets: Mapping[str, float]
+
+    @property
+    def level(self) -> int:
+        """The finest."""
+        return min(self.levels)
+
+    @property
+    def quantities(self) -> Sequence[Observable]:
+        """Those that are wanted."""
+        return self.around.quantities
+
+    @property
+    def spent(self) -> float:
+        """Wall time of all solves. [s]"""
+        return self.around.spent + sum(one.seconds for one in self.levels.values())
+
+    def seconds_of_next(self, parts: int) -> float:
+        """Expected wall time of a pilot on the next grid. [s]"""
+        return PILOT * _DEARER * self.levels[self.level].cost
+
+    def grid(self, quantity: Observable) -> Array:
+        """Error of the grid, by the means over the draws, as of three grids of one surface."""
+        last, before = (np.abs(self.levels[self.level + n].mean(quantity.name)) for n in (0, 1))
+        return np.asarray(quantity.grid_factor * np.maximum(last, before / 4))
+
+    def judged(self, quantity: Observable) -> dict[str, Found]:
+        """Name -> what each source makes of the quantity."""
+        found = self.around.judged(quantity)
+        half, _ = scatter_of(self.levels, quantity.name)
+        nothing = np.zeros_like(half)
+        return found | {
+            "grid": Found(self.grid(quantity), "means of the draws with cells twice and four times as long"),
+            "sample": Found(half, self.draws(), solves=("draws",)),
+            "longest waves": Found(nothing, "the number is that of surfaces of this size", counts=False),
+        }
+
+    def draws(self) -> str:
+        """How many draws on which grids."""
+        shape = self.around.asked.variants.shape
+        cells = {level: [round(n * 2.0 ** (self.around.held - level)) for n in shape] for level in self.levels}
+        counts = (f"{one.count} on {cells[level][0]} x {cells[level][1]} cells" for level, one in self.levels.items())
+        return f"draws: {', '.join(counts)}"
+
+    def error(self, quantity: Observable, names: Sequence[str] | None = None) -> float:
+        """The largest error that some sources give together, of the logarithm; of all where None."""
+        judged = [one for name, one in self.judged(quantity).items() if names is None or name in names]
+        shape = self.grid(quantity).shape
+        return float(max(together(judged, shape, side).max() for side in (-1, 1)))
+
+    def floor(self, quantity: Observable) -> float:
+        """What neither grids nor draws lessen."""
+        return self.around.floor(quantity)
+
+    def rooms(self) -> dict[str, Array]:
+        """Name of each quantity -> what all else leaves of the square of its target for the draws."""
+        found = {}
+        for one in self.quantities:
+            others = self.around.error(one, (*FLOOR, "time steps and solver"))
+            found[one.name] = self.targets[one.name] ** 2 - others**2 - self.grid(one) ** 2
+        return found
+
+    def words(self, targets: Mapping[str, float], quantities: Sequence[Observable] | None = None) -> str:
+        """The error of quantities, all of them where None, and what is wanted."""
+        return Around.words(self, targets, quantities)  # type: ignore[arg-type]
+
+    def budget(self, quantity: Observable, chosen: Case) -> xr.Dataset:
+        """The budget of a quantity, whose value is the mean of the logarithm over all surfaces."""
+        seconds = {name: one.seconds for name, one in self.around.parts.items()}
+        seconds["draws"] = sum(one.seconds for one in self.levels.values())
+        asked = replace(self.around.asked, variants=Variants(chosen, self.around.asked.variants.height))
+        asked = replace(asked, population="ensemble")
+        value = np.exp(mean_of(self.levels, quantity.name))
+        cost = self.levels[self.level].cost
+        return assembled(asked, quantity, self.judged(quantity), value, self.around.places(), seconds, cost)
+
+
+def mean_of_population(
+    case: Case, grids: Grids, around: Around, bench: Bench, targets: Mapping[str, float], limit: float
+) -> OfPopulation:
+    """Draws on grids, from a pilot on three of them to as many and as fine as it takes for the targets, or in a time.
+
+    Raises
+    ------
+    InputError
+        If a target takes a finer grid than there is, too many draws, or more than the time.
+    """
+    top = around.held + 2
+    counts = dict.fromkeys(range(top, around.held - 1, -1), PILOT)
+    goals = {one.name: math.log1p(targets.get(one.name, _FIRST_GOAL)) for one in around.quantities}
+    best: OfPopulation | None = None
+    on_level = cache(grids.case)
+
+    def drawn(counts: Mapping[int, int]) -> OfPopulation:
+        levels = {
+            level: draw(
+                level,
+                count,
+                on_level(level),
+                on_level(level + 1) if level < top else None,
+                around.quantities,
+                around.places(),
+                bench.folder,
+                bench.client,
+                bench.threads,
+            )
+            for level, count in counts.items()
+        }
+        return OfPopulation(around, levels, goals)
+
+    pilot = around.spent * PILOT
+    if around.spent + pilot > limit:
+        raise _refusal(case, [f"time: found {limit:g} s: expected some {pilot:.2g} s at least, for a pilot of draws"])
+    while True:
+        found = drawn(counts)
+        rooms = found.rooms()
+        refine = any((rooms[name] < 0.5 * goals[name] ** 2).any() for name in goals) and found.level > _FINEST
+        short = any((rooms[name] <= 0.05 * goals[name] ** 2).any() for name in goals)
+        more = dict(counts)
+        if refine:
+            more[found.level - 1] = PILOT
+            wait = found.seconds_of_next(0)
+        elif not short:
+            more = counts_for(found.levels, {name: np.sqrt(room) for name, room in rooms.items()})
+            wait = sum((more[level] - counts[level]) * one.cost for level, one in found.levels.items())
+        bench.tell(f"{found.draws()}: {found.words(targets)}")
+        if short and not refine:
+            if not targets and best is not None:
+                return best
+            raise _refusal(case, [f"{found.words(targets)}: the grids alone leave too much, with the finest there is"])
+        if more == counts:
+            if targets:
+                return found
+            best, goals = found, {name: 0.7 * goal for name, goal in goals.items()}
+            continue
+        if found.spent + wait > limit or sum(more.values()) > MOST:
+            if not targets and best is not None:
+                return best
+            limits = f"{limit:g} s" if math.isfinite(limit) else f"{MOST} draws"
+            needed = f"{sum(more.values())} draws and some {found.spent + wait:.2g} s at least"
+            raise _refusal(
+                case, [f"population: found a limit of {limits}: expected {needed}; so far {found.words(targets)}"]
+            )
+        counts = more
+
+
+def _reasons(grids: Grids, around: Around | OfPopulation, targets: Mapping[str, float], limit: float) -> Iterator[str]:
     """What was chosen, and why."""
     yield f"grid: {grids.words(around.level)}"
+    if isinstance(around, OfPopulation):
+        yield around.draws()
     for one in around.quantities:
         parts = f"{_percent(around.error(one, _RULED))} by grid and solver, {_percent(around.floor(one))} by all else"
+        if isinstance(around, OfPopulation):
+            parts += f", {_percent(around.error(one, ['sample']))} by the draws"
         yield f"{around.words(targets, [one])}: {parts}"
     tolerance = grids.variants.case.settings.solve.tolerance
     least = _TOLERANCE * min(targets.values(), default=0.0)

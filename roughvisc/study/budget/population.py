@@ -1,0 +1,205 @@
+r"""The number of all surfaces of a recipe: multilevel Monte Carlo over draws and grids.
+
+Many draws are computed on a coarse grid, and few on finer ones, each of these together with the next coarser grid, on
+which the same draw has the same waves: the mean of the logarithm is :math:`\sum_l \overline{Y_l}`, with
+:math:`Y_l = \ln Q_l - \ln Q_{l-1}` of draws that no other level has. With the variances :math:`V_l` and the costs
+:math:`C_l` of a draw, the cheapest numbers of draws for a half-width :math:`\epsilon` at 95 % are
+
+.. math:: N_l = \frac{t^2}{\epsilon^2} \sqrt{V_l / C_l} \sum_k \sqrt{V_k C_k}.
+
+References
+----------
+.. [1] M. B. Giles, Oper. Res. 56 (2008) 607.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import stats
+
+from roughvisc.errors import InputError
+from roughvisc.study.budget.budget import observed_with
+from roughvisc.study.execution.run import compute
+from roughvisc.study.quantities import QUANTITIES, Observable
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.store import write_dataset
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Array = NDArray[np.float64]
+#: Draws of a level before their variance is believed.
+PILOT = 20
+#: Draws of all levels, beyond which a target is refused.
+MOST = 10_000
+#: Seeds of a level, none of which another has.
+_SEEDS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Level:
+    """The draws of one grid, and what they give of the mean of a logarithm.
+
+    Attributes
+    ----------
+    differences : dict
+        Name of each quantity -> its logarithm less that on the next coarser grid, over draws and rows; on the coarsest
+        grid of all the logarithm itself.
+    seconds : float
+        Wall time of all draws. [s]
+    """
+
+    differences: Mapping[str, Array]
+    seconds: float
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return len(next(iter(self.differences.values())))
+
+    @property
+    def cost(self) -> float:
+        """Wall time of a draw. [s]"""
+        return self.seconds / self.count
+
+    def mean(self, name: str) -> Array:
+        """Mean over the draws, at each row."""
+        return np.asarray(self.differences[name].mean(axis=0))
+
+    def variance(self, name: str) -> Array:
+        """Variance over the draws, at each row."""
+        return np.asarray(self.differences[name].var(axis=0, ddof=1))
+
+
+def mean_of(levels: Mapping[int, Level], name: str) -> Array:
+    """Mean of the logarithm of a quantity on the finest grid."""
+    return np.asarray(sum(one.mean(name) for one in levels.values()))
+
+
+def scatter_of(levels: Mapping[int, Level], name: str) -> tuple[Array, Array]:
+    """Half-width of that mean at 95 %, by Student's distribution, and the quantile that it takes."""
+    parts = np.array([one.variance(name) / one.count for one in levels.values()])
+    free = np.array([one.count - 1.0 for one in levels.values()])[:, None]
+    total = parts.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        freedom = np.where(total > 0, total**2 / (parts**2 / free).sum(axis=0), 1e6)
+    quantile = np.asarray(stats.t.ppf(0.975, freedom))
+    return quantile * np.sqrt(total), quantile
+
+
+def counts_for(levels: Mapping[int, Level], rooms: Mapping[str, Array]) -> dict[int, int]:
+    """Level -> number of draws, at least those that it has, so that the half-width of each quantity fits its room."""
+    wanted = {level: float(one.count) for level, one in levels.items()}
+    for name, room in rooms.items():
+        _, quantile = scatter_of(levels, name)
+        work = sum(np.sqrt(one.variance(name) * one.cost) for one in levels.values())
+        for level, one in levels.items():
+            needed = float(((quantile / room) ** 2 * np.sqrt(one.variance(name) / one.cost) * work).max())
+            if needed > one.count:  # a little more, since the variances change with the draws
+                wanted[level] = max(wanted[level], 1.05 * needed)
+    return {level: math.ceil(one) for level, one in wanted.items()}
+
+
+def draw(
+    level: int,
+    count: int,
+    fine: Case,
+    coarse: Case | None,
+    quantities: Sequence[Observable],
+    places: Array,
+    folder: Path,
+    client: Client | None = None,
+    threads: int | None = None,
+) -> Level:
+    """So many draws of a level; those that are kept in the folder are not computed again.
+
+    Parameters
+    ----------
+    level : int
+        Of the grid.
+    count : int
+        Number of draws.
+    fine, coarse : Case
+        Of the grid and of the next coarser one, None where there is none; the seed is another in each draw.
+    quantities, places
+        What is read off each draw, and at which places of the axis.
+    folder : Path
+        Where they are kept.
+    client : distributed.Client, optional
+        Where they are computed; without one in this process.
+    threads : int, optional
+        Of each solve.
+
+    Raises
+    ------
+    InputError
+        If a quantity is zero in a draw, and has no logarithm.
+    """
+    names = [one.name for one in quantities]
+    path = folder / f"draws-{fine.key}-{'single' if coarse is None else coarse.key}.nc"
+    kept = _kept(path, names, places)
+    known = 0 if kept is None else kept.sizes["draw"]
+    if known < count:
+        first = _SEEDS * (1 + abs(fine.settings.surface.seed) * 16 + level + 8)
+        stated = [json.loads(one.to_json()) for one in (fine, coarse) if one is not None]
+        seeds = range(first + known, first + count)
+        texts = [[json.dumps(one | {"surface": one["surface"] | {"seed": seed}}) for one in stated] for seed in seeds]
+        if client is None:
+            found = [_values(text, names, places, threads) for text in texts]
+        else:
+            found = client.gather(client.map(_values, texts, names=names, places=places, threads=1, pure=False))
+        new = xr.Dataset(
+            {
+                **{name: (("draw", "grid", "row"), np.array([values[name] for values, _ in found])) for name in names},
+                "seconds": ("draw", [seconds for _, seconds in found]),
+                "places": ("row", places),
+            }
+        )
+        kept = new if kept is None else xr.concat([kept, new], "draw", data_vars="minimal")
+        write_dataset(kept, path)
+    assert kept is not None
+    kept = kept.isel(draw=slice(count))
+    differences = {}
+    for name in names:
+        values = kept[name].values
+        if bad := int((~(values > 0)).any(axis=(1, 2)).sum()):
+            told = f"{name}: found zero, or less, in {bad} of {count} draws: how often it is zero is to be asked"
+            raise InputError(f"{told}, and not how large it is")
+        logs = np.log(values)
+        differences[name] = logs[:, 0] - logs[:, 1] if coarse is not None else logs[:, 0]
+    return Level(differences, float(kept["seconds"].sum()))
+
+
+def _kept(path: Path, names: Sequence[str], places: Array) -> xr.Dataset | None:
+    """The draws in a file, if they are of these quantities and places."""
+    if not path.exists():
+        return None
+    with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+        kept = file.load()
+    there = set(names) <= set(kept) and kept.sizes["row"] == len(places) and np.allclose(kept["places"], places)
+    return kept[[*names, "seconds", "places"]] if there else None
+
+
+def _values(
+    texts: Sequence[str], names: Sequence[str], places: Array, threads: int | None = None
+) -> tuple[dict[str, list[Any]], float]:
+    """Values of the quantities on each grid of a draw, at these places, and the wall time of their solves. [s]"""
+    values: dict[str, list[Any]] = {name: [] for name in names}
+    seconds = 0.0
+    for text in texts:
+        case = Case.from_json(text)
+        found = compute(case, progress=False, threads=threads)
+        rows = np.abs(found[case.experiment().axis].values[:, None] - places).argmin(axis=0)
+        for name in names:
+            values[name].append(QUANTITIES[name].of(found, observed_with(case))[rows])
+        seconds += float(found["wall_time"].values[-1])
+    return values, seconds
