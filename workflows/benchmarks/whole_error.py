@@ -1,6 +1,7 @@
 """Does the stated interval hold the truth? Rough surfaces whose true numbers are known, each measured coarsely.
 
     python workflows/benchmarks/whole_error.py [--first N] [--count N] [--out whole_error.jsonl] [--friction] [--seed N]
+        [--cells N] [--step N]
 
 A true surface has waves down to a cut-off of its own on a grid four times finer than that of its scan, which holds the
 waves of two of its cells and longer ones. ``rv.budget`` sees the scan and the cut-off. It is compared with the number
@@ -25,7 +26,7 @@ import roughvisc as rv
 from roughvisc.groups import whole_of
 from roughvisc.study.quantities import QUANTITIES
 
-CELLS, SIDE, PATCHES = 64, 1e-3, 24
+SIDE, PATCHES = 1e-3, 24
 #: Hurst exponent, cut-off in cells of the scan, roll-off over the side.
 FAMILIES = {
     "smooth": (0.8, 8, 0.25),
@@ -45,17 +46,17 @@ LOADED = ("contact_area", "mean_gap", "leak_rate", "thermal_conductance")
 SLIDING = ("friction_coefficient", "contact_area", "mean_gap")
 
 
-def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2):
+def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2, cells=64, step=1):
     """Run the scenes that are not in the record yet, and print what was found."""
     record = Path(out)
     lines = [json.loads(line) for line in record.read_text().splitlines()] if record.exists() else []
     known = {(line["scene"], line["friction"]) for line in lines}
     scenes = list(itertools.product(FAMILIES, LOADS, MATERIALS))
-    for number in range(first, min(first + count, len(scenes))):
+    for number in range(first, min(first + count, len(scenes)), step):
         if (number, friction) in known:
             continue
         began = time.perf_counter()
-        line = {"scene": number, "friction": friction, **scene(*scenes[number], number, friction, seed)}
+        line = {"scene": number, "friction": friction, **scene(*scenes[number], number, friction, seed, cells)}
         lines.append(line)
         with record.open("a") as file:
             file.write(json.dumps(line) + "\n")
@@ -63,21 +64,21 @@ def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2):
     summary([line for line in lines if line["friction"] == friction])
 
 
-def study(family, load, material, seed, cells, friction):
-    """A study of a surface of a family, on so many cells, as text."""
+def study(family, load, material, seed, cells, friction, scanned):
+    """A study of a surface of a family, on so many cells where its scan has so many, as text."""
     hurst, cutoff, rolloff = FAMILIES[family]
     surface = {
         "generate": "self_affine",
         "size": [SIDE, SIDE],
-        "shape": [4 * CELLS, 4 * CELLS],
+        "shape": [4 * scanned, 4 * scanned],
         "hurst": hurst,
         "rms_slope": 0.2,
         "rolloff": rolloff * SIDE,
-        "shortcut": cutoff * SIDE / CELLS,
+        "shortcut": cutoff * SIDE / scanned,
         "amplitudes": "gaussian",
         "seed": seed,
     }
-    if cells != 4 * CELLS:
+    if cells != 4 * scanned:
         surface["band_limit"] = [cells, cells]
     done = (
         f"[friction]\nspeeds = {SPEEDS}\npressure = {load}\n"
@@ -102,13 +103,13 @@ def numbers(text, names, folder):
     return {name: QUANTITIES[name].of(result, {}) for name in names}
 
 
-def scene(family, load, material, number, friction, start):
+def scene(family, load, material, number, friction, start, cells):
     """Budgets of one scene, and its truths."""
     names = SLIDING if friction else LOADED
     cutoff, seed = FAMILIES[family][1], 1000 * start + number
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scan.toml"
-        path.write_text(study(family, load, material, seed, CELLS, friction))
+        path.write_text(study(family, load, material, seed, cells, friction, cells))
         found = {"family": family, "load": load, "material": material, "budgets": {}, "truth": {}}
         for population, sharp in (("patch", False), ("patch", True), ("ensemble", False), ("ensemble", True)):
             stated = rv.budget(
@@ -117,7 +118,7 @@ def scene(family, load, material, number, friction, start):
                 sharp=sharp,
                 modulus_error=0.0,
                 time_scale_error=0.0,
-                cutoff=cutoff * SIDE / CELLS,
+                cutoff=cutoff * SIDE / cells,
                 population=population,
                 out=Path(folder) / "budget",
                 workers=0,
@@ -137,11 +138,11 @@ def scene(family, load, material, number, friction, start):
                 for name, one in ((name, stated.sel(quantity=name)) for name in names)
             }
         found["truth"]["patch"] = _lists(
-            numbers(study(family, load, material, seed, 4 * CELLS, friction), names, folder)
+            numbers(study(family, load, material, seed, 4 * cells, friction, cells), names, folder)
         )
         others = [
             numbers(
-                study(family, load, material, 10_000 * start + PATCHES * number + one, 2 * CELLS, friction),
+                study(family, load, material, 10_000 * start + PATCHES * number + one, 2 * cells, friction, cells),
                 names,
                 folder,
             )
@@ -189,4 +190,6 @@ if __name__ == "__main__":
     parser.add_argument("--out", default="whole_error.jsonl")
     parser.add_argument("--friction", action="store_true")
     parser.add_argument("--seed", type=int, default=2)
+    parser.add_argument("--cells", type=int, default=64, help="of the scan along a side")
+    parser.add_argument("--step", type=int, default=1, help="take every so many scenes")
     main(**vars(parser.parse_args()))
