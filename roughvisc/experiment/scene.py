@@ -294,8 +294,8 @@ def build_scene(profile: Profile, body: Body, program: Program, settings: Settin
     foreseen = 0.0 if profile.window.whole else _foreseen(profile, program, material)
     while profile.window.outside <= foreseen:
         profile.widen_window()
-    grows = not profile.window.whole or (
-        settings.boundary == "free" and settings.edge == "error" and profile.can_grow()
+    grows = body.separates and (
+        not profile.window.whole or (settings.boundary == "free" and settings.edge == "error" and profile.can_grow())
     )
     operator = profile.operator(settings.boundary)
     options = memory_options(program, settings, "pressure" if grows else "displacement")
@@ -306,7 +306,7 @@ def build_scene(profile: Profile, body: Body, program: Program, settings: Settin
                 f"method is {settings.method!r} and the body is {body!r}, in which space and time do not separate: "
                 "expected method = 'fast'"
             )
-        grows, operator = False, choice.memory.grid
+        operator = choice.memory.grid
     scene = Scene(
         operator=operator,
         material=choice.material,

@@ -63,6 +63,11 @@ class Body:
                 raise InputError(f"kernel is a {found}: expected a Kernel; it has no {name}")
 
     @property
+    def separates(self) -> bool:
+        """Whether space and time do: all waves creep alike, and the kernel and the material say how."""
+        return True
+
+    @property
     def materials(self) -> tuple[Material, ...]:
         """What it is made of."""
         return (complete(self.material),)

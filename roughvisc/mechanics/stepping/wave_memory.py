@@ -233,8 +233,9 @@ def choose_body_memory(
     InputError
         As there; and if a direct history of waves is asked for.
     """
-    if not isinstance(body, LayeredBody) or body.separates:
+    if body.separates:
         return choose_memory(body.material, duration, tolerance, acts_on, kind, shortest)
+    assert isinstance(body, LayeredBody)
     if kind == "direct":
         raise InputError(
             f"memory is 'direct' and the body is {body!r}, in which space and time do not separate: expected 'auto'"

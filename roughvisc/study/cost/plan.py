@@ -338,7 +338,7 @@ def _row(
     row = _blank(settings, marched, problem)
     if surface is None or surface.height is None:
         return row
-    height, grows = surface.height, surface.grows and uses_window(settings)
+    height, grows = surface.height, surface.grows and uses_window(settings) and case.body().separates
     whole = next(i for i, stage in enumerate(surface.stages) if stage.outside == math.inf)
     window = whole > 0 and uses_window(settings)
     mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides

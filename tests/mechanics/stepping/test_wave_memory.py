@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.errors import InputError
+from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.bodies.body import body_of
 from roughvisc.problem import Problem
@@ -174,3 +174,9 @@ def test_body_note__says_whether_one_material_would_do(thickness, expected):
     for alone, at in ((base, 1e-12), (RUBBER, 1e2)):
         if thickness == at:
             assert off(found, pressed(alone, boundary="periodic")) < TOLERANCE
+
+
+def test_free_space__contact_beyond_the_grid_is_an_error_and_not_a_larger_grid():
+    ball, program = rv.sphere(radius=1e-3, size=4e-5, shape=(9, 9)), rv.Program().load(5e-4, over=0.05)
+    with pytest.raises(EdgeContactError, match="contact reaches the border"):
+        pressed(rv.layer(RUBBER, 5e-5, on=rv.elastic(1e7)), ball, program)
