@@ -31,14 +31,18 @@ def depth_matrix(poisson, modulus):
     )
 
 
-def elastic_factor(x, poisson, base_poisson, modulus_ratio, digits=60):
-    """Displacement of a wave over that of a half-space of the layer's material, by the equations of elasticity."""
+def elastic_factor(x, poissons, moduli, digits=60):
+    """Displacement of a wave over that of a half-space of the top layer's material, by the equations of elasticity.
+
+    Wave number times thickness of the layers, from the top; Poisson's ratios and shear moduli of one material more.
+    """
     with mp.workdps(digits):
-        below = (depth_matrix(base_poisson, 1) - mp.eye(4)) ** 2  # its columns are what decays as (1, s) exp(-s)
-        top = mp.expm(-mp.mpf(x) * depth_matrix(poisson, modulus_ratio)) * below[:, 0:2]
-        weights = mp.lu_solve(top[2:4, :], mp.matrix([0, -1]))
-        displacement = top[1, 0] * weights[0] + top[1, 1] * weights[1]
-        return complex(displacement * mp.mpmathify(modulus_ratio) / (1 - mp.mpf(poisson)))
+        field = (depth_matrix(poissons[-1], moduli[-1]) - mp.eye(4)) ** 2  # its columns decay as (1, s) exp(-s)
+        for one, poisson, modulus in zip(x[::-1], poissons[-2::-1], moduli[-2::-1], strict=True):
+            field = mp.expm(-mp.mpf(one) * depth_matrix(poisson, modulus)) * field
+        weights = mp.lu_solve(field[2:4, 0:2], mp.matrix([0, -1]))
+        displacement = field[1, 0] * weights[0] + field[1, 1] * weights[1]
+        return complex(displacement * mp.mpmathify(moduli[0]) / (1 - mp.mpf(poissons[0])))
 
 
 def laplace_compliance(material, s):

@@ -39,7 +39,7 @@ SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(5e6, 5e6, 3e6, 0.3)
 @pytest.mark.parametrize("ratio", [1e-4, 0.1, 3.0, 1e4, 0.3 + 0.5j, 20 - 40j])
 def test_factor__solves_the_equations_of_elasticity(poisson, base_poisson, ratio):
     x = np.array([1e-6, 0.01, 0.3, 0.49, 0.51, 2.0, 7.0])
-    exact = [elastic_factor(one, poisson, base_poisson, ratio) for one in x]
+    exact = [elastic_factor([one], (poisson, base_poisson), (ratio, 1)) for one in x]
     np.testing.assert_allclose(layer_factor(x, poisson, base_poisson, ratio), exact, rtol=1e-14)
 
 

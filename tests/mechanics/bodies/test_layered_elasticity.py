@@ -1,0 +1,34 @@
+"""The response of layers, against the equations of elasticity integrated through the depth at high precision."""
+
+import numpy as np
+import pytest
+from layered import elastic_factor
+
+from roughvisc.mechanics.bodies.layered import effective_compliance
+from roughvisc.mechanics.closed_forms.layer import layer_factor
+
+X = np.array([1e-6, 1e-3, 0.05, 0.4, 1.5, 6.0])
+
+
+@pytest.mark.parametrize(
+    ("poissons", "moduli"),
+    [
+        ((0.5, 0.3, 0.4), (1.0, 50.0, 0.2)),
+        ((0.0, 0.5, 0.5), (1.0, 0.02, 7.0)),
+        ((0.5, 0.45, 0.0), (1.0, 3 + 4j, 0.5 + 0.1j)),
+        ((0.3, 0.5, 0.2, 0.5), (1.0, 100.0, 0.01, 30 - 20j)),
+    ],
+)
+def test_effective_compliance__of_several_layers_solves_the_equations_of_elasticity(poissons, moduli):
+    thicknesses = (1.0, 0.3, 2.0)[: len(poissons) - 1]
+    found = effective_compliance(X, thicknesses, poissons, [1 / one for one in moduli]) / ((1 - poissons[0]) / 2)
+    exact = [elastic_factor([x * h for h in thicknesses], poissons, moduli) for x in X]
+    np.testing.assert_allclose(found, exact, rtol=1e-11)
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 0.1, 1.0, 10.0, 1e3, 0.3 + 0.5j])
+@pytest.mark.parametrize(("poisson", "base_poisson"), [(0.0, 0.5), (0.3, 0.3), (0.5, 0.2), (0.5, 0.5)])
+def test_effective_compliance__of_one_layer_is_the_published_one(ratio, poisson, base_poisson):
+    x = np.geomspace(1e-7, 60, 60)
+    found = effective_compliance(x, (1.0,), (poisson, base_poisson), (1.0, ratio)) / ((1 - poisson) / 2)
+    np.testing.assert_allclose(found, layer_factor(x, poisson, base_poisson, ratio), rtol=2e-12)
