@@ -64,7 +64,7 @@ def test_growing_contact_of_a_ball__is_that_of_the_march(pair, wide):
     ball = rv.sphere(radius * thickness, 2.6 * exact.radius[-1] * thickness, cells)
     program = rv.Program().load(force * thickness**2, over=0).hold(10.0)
     ds = simulated(ball, PAIRS[pair], thickness, program, boundary="free", times=t, fields=(), tolerance=1e-3)
-    np.testing.assert_allclose(ds.approach, thickness * np.array(exact.approach), rtol=1.5e-3)
+    np.testing.assert_allclose(ds.approach, thickness * np.array(exact.approach), rtol=1e-3)
     radii = np.sqrt(ds.contact_area / math.pi) / thickness
     np.testing.assert_allclose(radii, exact.radius, atol=0.35 * 2.6 * exact.radius[-1] / cells)
 
