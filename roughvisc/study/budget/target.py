@@ -426,10 +426,11 @@ def first_grids(case: Case, bench: Bench, targets: Mapping[str, float], limit: f
             known["population"] = "patch"
         asked = Asked(Variants(held, held.height()), False, **known)
         around = Around(grids.held + 3, grids.held, {}, {}, asked, bench.quantities).finer(bench, grids)
-        wait = around.seconds_of_next(len(around.changed_cases()))
-        if around.spent + wait > limit:
-            raise _refusal(case, [_short_of_time(around, targets, limit, wait)])
-        around = around.finer(bench, grids).finer(bench, grids)
+        while around.level > around.held:
+            wait = around.seconds_of_next(len(around.changed_cases()))
+            if around.spent + wait > limit:
+                raise _refusal(case, [_short_of_time(around, targets, limit, wait)])
+            around = around.finer(bench, grids)
         stated = around.solves[around.level].stated
         left = max((_largest(stated[name]) / math.log1p(part) for name, part in targets.items()), default=0.0)
         if left <= 0.5 or tolerance <= least:
@@ -479,11 +480,11 @@ class Around:
         return sum(one.seconds for one in (*self.solves.values(), *self.parts.values()))
 
     def seconds_of_next(self, parts: int) -> float:
-        """Expected wall time of the next grid, or of all down to that which is the first to be judged. [s]"""
-        last, down = self.solves[self.level].seconds, self.level - self.held
-        if down <= 0:
-            return max(_DEARER, last / self.solves[self.level + 1].seconds) * last
-        return last * (sum(_DEARER**n for n in range(1, down + 1)) + parts * _DEARER**down)
+        """Expected wall time of the next grid, and of so many changed cases where they are made on it. [s]"""
+        last = self.solves[self.level].seconds
+        before = self.solves.get(self.level + 1)
+        wait = last * (_DEARER if before is None else max(_DEARER, last / before.seconds))
+        return wait * (1 + parts) if self.level == self.held + 1 else wait
 
     def if_next_were_the_same(self) -> Around:
         """What it would be around the next grid if that changed nothing: the least error that it may have."""

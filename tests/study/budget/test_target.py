@@ -1,6 +1,7 @@
 """The grid and the tolerance that are chosen for what is wanted of a number."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -165,8 +166,14 @@ def test_indenter__has_no_floor_by_sample_and_waves(tmp_path):
     assert [str(states.sel(source=name).values) for name in ("sample", "next octave of waves")] == ["none"] * 2
 
 
-def test_time__gives_the_best_within_it(tmp_path):
-    assert got(case(BALL, tmp_path), tmp_path, {"time": "1 h"}).sizes["x"] == 205
+def test_time__gives_the_best_within_it(tmp_path, monkeypatch):
+    """A solve takes a second for each cell: four times that of the last grid is expected of the next."""
+    read = Bench._read
+    a_second_each = lambda self, one, case: replace(read(self, one, case), seconds=float(one["height"].size))  # noqa: E731
+    monkeypatch.setattr(Bench, "_read", a_second_each)
+    spent = 13 * 13 + 27 * 25 + 51 * 49 + 103 * 99
+    for time, cells in (("1 d", 205), (spent + 4.2 * 103 * 99, 205), (spent + 3.9 * 103 * 99, 103)):
+        assert got(case(BALL, tmp_path), tmp_path, {"time": time}).sizes["x"] == cells
     with pytest.raises(InputError, match=r"want\.time: found 1e-06 s: expected some .* s at least, for the coarsest"):
         got(case(BALL, tmp_path), tmp_path, {"time": 1e-6})
     with pytest.raises(InputError, match=r"want\.time: found 1e-06 s"):
