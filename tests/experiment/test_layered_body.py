@@ -29,7 +29,7 @@ def test_elastic_ball__agrees_with_the_integral_equation(ratio, wide, poissons):
 @pytest.mark.parametrize("cells", [128, 129])
 @pytest.mark.parametrize("poissons", [(0.5, 0.3), (0.3, 0.5), (0.0, 0.0), (0.5, 0.5)])
 @pytest.mark.parametrize("wide", [0.03, *WIDTHS, 30.0])
-@pytest.mark.parametrize("ratio", [0.001, *RATIOS, 1000.0])
+@pytest.mark.parametrize("ratio", [0.001, *RATIOS])
 def test_elastic_ball__agrees_everywhere(ratio, wide, poissons, cells):
     assert max(errors(ratio, wide, poissons, cells)) < 3e-3
 
