@@ -193,7 +193,9 @@ def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -
     if not asked.variants.is_rough:
         return Found(_nothing(values), "the surface is the whole body, and no sample", counts=False)
     if asked.population == "patch":
-        return Found(_nothing(values), "the number is of this patch", counts=False)
+        return Found(
+            _nothing(values), "the number is of this patch; population 'ensemble' asks for its roughness", counts=False
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         scatter = np.std(np.log([values[name] for name in SURROGATES]), axis=0, ddof=1)
     words = f"{PATCHES} Gaussian surrogates on cells twice as long"

@@ -37,12 +37,13 @@ def budget_table(dataset: xr.Dataset) -> Group:
     for place in dataset[axis].values:
         at = dataset.sel({axis: place})
         low, value, high = (unit.text(float(at[end]), 3) for end in ("lower", "value", "upper"))
-        parts.append(Text(f"{AXES[axis].place(float(place))}: {value}, at 95 % from {low} to {high}"))
+        interval = f"at 95 % from {low} to {high}"
+        if not np.isfinite(at["upper"]):
+            interval = "without an interval" + (", as zero has no logarithm" if at["value"] == 0 else "")
+        parts.append(Text(f"{AXES[axis].place(float(place))}: {value}, {interval}"))
     parts += [Text(), table]
     spent = float(dataset["case_cost"])
     notes = [f"The case itself took {spent:.2g} s. Errors are those of the {AXES[axis].rows}, least and largest."]
-    if dataset.attrs["population"] == "patch":
-        notes.append("The number is of this patch; population = 'ensemble' asks for that of its roughness.")
     if "surrogate_ratio" in dataset:
         ratio, kurtosis = dataset["surrogate_ratio"].values, dataset.attrs["kurtosis"]
         if np.isfinite(ratio).any():

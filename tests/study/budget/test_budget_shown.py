@@ -72,11 +72,18 @@ def test_table__says_how_large_each_source_is():
     assert "-20 by next octave" in lines["next octave of waves"]
     assert "open" in lines["modulus"]
     assert "t = 1 s: 4000 µm², at 95 % from 3255 µm² to 4205 µm²" in text
-    assert "this patch" in text
 
 
 def test_table__says_large_errors_as_factors():
     assert "factor 4.5 by sample" in printed(made_up([0.05, 1.5, 0.0, 0.1]))
+
+
+def test_table__says_that_zero_has_no_interval():
+    shown = made_up([0.1] * 4, value=(0.0, 4e-9))
+    shown["upper"] = shown["upper"].where(shown["value"] > 0)
+    text = " ".join(printed(shown).split())
+    assert "t = 0.1 s: 0 µm², without an interval, as zero has no logarithm" in text or "t = 100 ms: 0 µm², w" in text
+    assert "nan" not in text
 
 
 @pytest.mark.parametrize("half_width", [[0.05, 0.0, 0.2, np.nan], [0.05, 1.5, 0.2, 0.1]], ids=["percent", "factors"])
