@@ -5,11 +5,12 @@
 The gap of a rough surface on an elastic body, out of contact and with a few parts of the area in contact, on 512
 squared cells unless other numbers are given, between walls. Each solver has a process of its own, which goes from the
 gap to the conductance: `factors` and `dissection` of this package, with bounds that close; and reynoldsflow
-(`pip install reynoldsflow`), without. Printed are processor and wall time, the memory that it took beyond what was
-there before. Conductances of the two agree to rounding; reynoldsflow has whole cells between its sides and the first
-centres, where this package has half ones.
+(`pip install reynoldsflow`), without. Printed are the bounds, processor and wall time, and the memory that it took
+beyond what was there before. Conductances of the two agree to rounding; reynoldsflow has whole cells between its sides
+and the first centres, where this package has half ones.
 """
 
+import math
 import multiprocessing
 import resource
 import sys
@@ -38,12 +39,17 @@ def gaps(cells):
 
 
 def by_this_package(gap, solver):
-    """Conductance by one of the two solvers. [m3]"""
+    """Lower and upper bound of the conductance by one of the two solvers. [m3]"""
     from roughvisc.mechanics.transport import flow
 
     flow._LARGE, flow._OPEN = (0, 0.0) if solver == "dissection" else (np.inf, 1.0)
     spacing = (SIDE / gap.shape[0], SIDE / gap.shape[1])
-    return lambda: flow.flow(gap, spacing).conductance
+
+    def solve():
+        found = flow.flow(gap, spacing)
+        return found.lower, found.upper
+
+    return solve
 
 
 def by_reynoldsflow(gap):
@@ -52,7 +58,7 @@ def by_reynoldsflow(gap):
 
     def solve(gap):
         open_, _, flux = transport.solve_fluid_problem(gap, p_west=1.0, p_east=0.0)
-        return transport.compute_total_flux(open_, flux, len(gap))[0] / 12
+        return (math.nan, transport.compute_total_flux(open_, flux, len(gap))[0] / 12)
 
     gap = np.maximum(gap, 0.0)
     solve(np.ones((16, 16)))
@@ -88,7 +94,9 @@ def main(*sizes):
                 if found is None:
                     continue
                 row = {"cells": cells, "contact": round(fraction, 3), "solver": solver}
-                row |= dict(zip(("conductance", "processor", "wall", "memory"), found, strict=True))
+                row |= dict(
+                    zip(("lower", "upper", "processor", "wall", "memory"), (*found[0], *found[1:]), strict=True)
+                )
                 print(row, flush=True)
                 rows.append(row)
     return rows
