@@ -232,6 +232,7 @@ assert "largest_pressure [Pa]" in open(sys.argv[2] + "/ball.csv").readline()
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("group", ["", "cost"])
 def test_new_variable__touches_two_files(tmp_path, group):
     """Its entry and where it is computed: file, groups, index, table and labels follow, as the page about it has it."""

@@ -236,6 +236,7 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatc
     assert (seal.leak_rate_solver_upper[~closed] / seal.leak_rate_solver_lower[~closed] < 1 + 1e-9).all()
 
 
+@pytest.mark.thorough
 def test_leakage_benchmark__certifies_what_it_times(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     rows = importlib.import_module("leakage").main(32)

@@ -47,6 +47,7 @@ def test_cone_and_punch__agree_with_the_integral_equation():
     assert float(found) == pytest.approx(PunchOnSheet(a, layer).scaled_stiffness / (2 * a), rel=1.3 / 65)
 
 
+@pytest.mark.thorough
 def test_pressure__is_that_of_the_integral_equation_and_converges():
     a = 1.2 * THICKNESS
     exact = OnSheet(Paraboloid(20 * a), ElasticLayer(THICKNESS, 0.5, 0.3, 20.0))

@@ -111,6 +111,7 @@ def test_all_work__is_dissipated_when_everything_has_relaxed(boundary):
 QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("pair", "cells"),
     [

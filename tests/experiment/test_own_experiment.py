@@ -131,6 +131,7 @@ def test_sweep__has_a_table_and_results_over_the_axis(study, tmp_path):
     assert table["status"].tolist() == ["converged"] * 2
 
 
+@pytest.mark.thorough
 def test_command_line__plans_runs_draws_reports_and_audits(study, tmp_path, invoke):
     out = tmp_path / "out"
     assert "3" in invoke("plan", study)
@@ -162,6 +163,7 @@ def test_observables__are_derived_of_every_row(study, tmp_path):
     assert rv.observables.clusters(ds).cluster_count.dims == ("load",)
 
 
+@pytest.mark.thorough
 def test_trade__measures_tolerances_and_grids(study):
     settings = [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=2.0), Setting(0.1, memory="direct")]
     ds = rv.trade(read_study(study), settings, progress=False)

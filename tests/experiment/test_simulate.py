@@ -105,6 +105,7 @@ def test_westergaard__wavy_surface_under_periodic_boundaries():
     assert np.abs(ds.pressure.values[0, :, 1] - expected).sum() < 5e-3 * expected.sum()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("program", [rv.Program().load(0.1, over=0), rv.Program().load(0.1, over=0.2).hold(1.0)])
 def test_analytic_profile__grows_and_ends_as_on_a_large_grid(program):
     """Growth changes nothing but cost; what was kept before it is reported on the final grid."""

@@ -128,6 +128,7 @@ def test_report__a_damaged_result_is_warned_of_once(tmp_path, invoke, caplog):
     assert (said + err + caplog.text).count("is damaged") == 1
 
 
+@pytest.mark.thorough
 def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke):
     path, out = study(tmp_path, TWO), tmp_path / "out"
     out.mkdir()

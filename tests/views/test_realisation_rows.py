@@ -3,6 +3,7 @@
 from io import StringIO
 
 import pandas as pd
+import pytest
 from rich.console import Console
 
 from roughvisc.study.execution.sweep import sweep
@@ -57,6 +58,7 @@ def test_realisation_rows__mark_a_scan_that_stands_outside():
     assert realisation_rows(pd.DataFrame()) == ([], [], [])
 
 
+@pytest.mark.thorough
 def test_a_sweep_of_realisations__is_told_on_the_screen_and_in_the_report(tmp_path):
     rough = self_affine(1e-3, (9, 7), hurst=0.8, rms_slope=0.1, seed=1)
     write_dataset(rough.to_dataset(name="height"), tmp_path / "scan.nc")

@@ -55,6 +55,7 @@ def one_by_one():
     return steps[-1].work
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kept", [8, pytest.param(0, marks=pytest.mark.thorough), pytest.param(50, marks=pytest.mark.thorough)]
 )

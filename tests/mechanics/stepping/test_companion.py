@@ -89,6 +89,7 @@ def matrix():
     return cases
 
 
+@pytest.mark.thorough
 def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     true = np.concatenate([true_errors(*rows) for rows in matrix.values()])
     said = np.array([step.time_error for found, _ in matrix.values() for step in found.values()])

@@ -158,6 +158,7 @@ def test_budget__holds_the_waves_that_a_finer_grid_shows(tmp_path):
         assert (true[name] < found["upper"]).all()
 
 
+@pytest.mark.thorough
 def test_budget__sample_is_the_scatter_of_other_patches(tmp_path):
     study = case(ROUGH, tmp_path)
     patch, ensemble = (stated(study, tmp_path, "mean_gap", population=one) for one in ("patch", "ensemble"))
@@ -241,6 +242,7 @@ def test_budget__of_a_mirrored_scan_takes_patches_of_its_own_size(tmp_path):
     assert {shape[1:] for shape in shapes if not shape[0]} == {(80, 72), (40, 36), (160, 144)}
 
 
+@pytest.mark.thorough
 def test_budget__a_surface_with_plateaus_is_no_random_phase_surface(tmp_path):
     """Cut off at its mean, a surface touches over far more area than random surfaces with its spectrum."""
     rough = rv.self_affine((1e-3, 0.9e-3), (54, 50), hurst=0.8, rms_slope=0.2, rolloff=3e-4, shortcut=8e-5, seed=1)

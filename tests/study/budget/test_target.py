@@ -113,6 +113,7 @@ def test_choice__is_a_case_like_any_other(tmp_path, monkeypatch):
     assert same.attrs["choice"] == found.attrs["choice"]
 
 
+@pytest.mark.thorough
 def test_choice__is_where_the_rule_of_three_grids_first_fits(tmp_path):
     """Of a gap: the larger of the last change and a quarter of the one before."""
     study, cells = case(ROUGH, tmp_path), [[7, 6], [14, 12], [27, 25], [54, 50], [108, 100]]
@@ -192,6 +193,7 @@ def test_closed_gap__has_no_relative_error(tmp_path):
         got(study, tmp_path, {"leak_rate": "10 %"})
 
 
+@pytest.mark.thorough
 def test_tolerance__is_sharpened_where_steps_and_solver_take_much_of_the_target(tmp_path):
     """A leak rate changes by up to six times as much as the mean gap, of which the steps leave a part."""
     study = case(ROUGH, tmp_path, **{"program.0.over": "10 ms", "program.0.pressure": "100 kPa"})

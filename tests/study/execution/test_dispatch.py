@@ -250,6 +250,7 @@ def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
     xr.testing.assert_equal(whole_of(ds).drop_vars("wall_time").load(), whole_of(wanted).drop_vars("wall_time").load())
 
 
+@pytest.mark.thorough
 def test_sweep__gives_up_for_now_a_case_whose_workers_die(study, tmp_path, by_hand):
     cases = study(LONG + LOADS)[:2]
     with connect(file=by_hand) as client:

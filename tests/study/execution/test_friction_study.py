@@ -129,6 +129,7 @@ def test_sweep__opens_as_one_and_as_a_table(tmp_path):
     assert (tmp_path / "one.csv").read_text().startswith("speed [m/s],")
 
 
+@pytest.mark.thorough
 def test_sweep__on_a_cluster_ends_with_the_same_bits(tmp_path, by_hand):
     (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES + '"friction.direction" = ["x", "-y"]\n')
     cases = read_cases(tmp_path / "slide.toml")

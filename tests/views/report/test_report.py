@@ -261,6 +261,7 @@ def test_study_text__is_the_case():
     assert tomllib.loads(study_text(case | {"origin": "here", "varied": {}})) == case
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("asked", ["#check", "#case=2&time=3"])
 def test_browser__picks_every_case_and_time_without_complaint(page, tmp_path, asked):
@@ -277,6 +278,7 @@ def test_browser__picks_every_case_and_time_without_complaint(page, tmp_path, as
     assert ('data-checked="12"' if asked == "#check" else 'data-shown="1,2"') in body
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_browser__would_tell_of_an_error(page, tmp_path):
     broken = tmp_path / "broken.html"
@@ -291,6 +293,7 @@ def test_browser__would_tell_of_an_error(page, tmp_path):
     assert "nothing is not defined" in done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("width", [400, 1100, 1600])
 def test_browser__shows_the_page_without_horizontal_overflow(page, tmp_path, width):
