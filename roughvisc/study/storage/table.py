@@ -193,11 +193,11 @@ def _as_written(key: str, values: list[float], si: str, stated: Sequence[Mapping
     texts = [case.get("written", {}).get(key, f"{value!r} {si}") for case, value in zip(stated, values, strict=True)]
     unit = next((number_and_unit(case["written"][key])[1] for case in stated if key in case.get("written", {})), si)
     numbers = [
-        number_and_unit(text)[0]
+        value
+        if not math.isfinite(value)
+        else number_and_unit(text)[0]
         if text.endswith(f" {unit}")
         else quantity(text, unit)
-        if math.isfinite(value)
-        else value
         for text, value in zip(texts, values, strict=True)
     ]
     return unit, numbers
