@@ -264,6 +264,7 @@ def test_grid_error__is_stated_in_every_row(kind, done):
     assert (abs(one.values - other.values) <= own * unit).all()
 
 
+@pytest.mark.thorough
 @plain_load_is_thorough
 def test_trade__measures_each_setting(kind, done):
     ds = rv.trade(done.case, [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=1.5)], progress=False)

@@ -45,6 +45,7 @@ HEIGHTS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks an interpreter that has imported both")
 @pytest.mark.parametrize("first", ["roughvisc as rv, xarray as xr", "xarray as xr, roughvisc as rv"])
 def test_accessor__is_there_wherever_heights_are(first, tmp_path):

@@ -117,6 +117,7 @@ def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on(
     assert np.mean(stated >= 0.8 * true) >= 0.95, np.sort(stated / true)
 
 
+@pytest.mark.thorough
 def test_force_error__is_nothing_where_the_load_is_given(matrix):
     for (_, what, _), (found, _) in matrix.items():
         rows = [error_columns(step, 0.0) for step in found.values() if step.shown.force > 0]

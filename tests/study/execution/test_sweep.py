@@ -70,6 +70,7 @@ def leftovers(folder):
 # where it is computed
 
 
+@pytest.mark.thorough
 def test_sweep__same_bits_here_and_on_workers_and_on_a_cluster(study, tmp_path, by_hand):
     cases = study()
     here = sweep(cases, tmp_path / "here", workers=0, progress=False)

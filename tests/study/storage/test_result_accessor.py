@@ -77,6 +77,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks an interpreter that has imported both")
 def test_accessor__is_there_wherever_results_are(tmp_path):
     """A new interpreter for each source, whose imports are made once; nothing heavy comes with the last."""
