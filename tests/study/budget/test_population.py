@@ -167,7 +167,7 @@ def test_run__of_a_population_ends_with_its_mean(tmp_path, made_up):
         assert float(one["upper"][0] / one["value"][0]) <= 1.05 * (1 + 1e-9)
 
 
-@pytest.mark.thorough
+@pytest.mark.long
 def test_mean__of_solves_is_that_of_many_draws(tmp_path):
     """Against the plain mean over draws of the finest grid, with other seeds."""
     (tmp_path / "study.toml").write_text(STUDY)
