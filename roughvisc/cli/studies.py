@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.console import Console
 
+    from roughvisc.study.budget.target import Choice
     from roughvisc.study.statement.case import Case
 
 
@@ -84,12 +85,14 @@ def run(
             "--profile: measures this process only: expected no --scheduler, --scheduler-file or --workers"
         )
     with _profile(console) if profile else nullcontext():
-        budgets = _choose(cases, folder, console, **where) if chosen else {}
-        if len(cases) == 1 and (chosen or not elsewhere):
+        choice = _choose(chosen[0], folder, console, **where) if chosen else None
+        if len(cases) == 1 and (choice or not elsewhere):
+            case = cases[0] if choice is None else choice.case
             complaint = _run_one(
-                cases[0], folder, study.stem, console, not no_plots, where["same_bits"], where["threads"], bool(chosen)
+                case, folder, study.stem, console, not no_plots, where["same_bits"], where["threads"], bool(choice)
             )
-            _show_budgets(budgets, folder, console, not no_plots)
+            if choice is not None:
+                _show_budgets(choice.budgets, folder, console, not no_plots)
             if complaint:
                 complain(f"{study.stem}: {complaint}")
                 raise Failure("1 of 1 cases failed", 1)
@@ -109,7 +112,7 @@ def _profile(console: Console) -> Iterator[None]:
 
 
 def _choose(
-    cases: list[Case],
+    case: Case,
     folder: Path,
     console: Console,
     *,
@@ -119,8 +122,8 @@ def _choose(
     threads: int | None,
     same_bits: bool,
     **_: Any,
-) -> dict[str, xr.Dataset]:
-    """Put what is chosen for the target of a case in its place, say what it is and why; the budgets around it."""
+) -> Choice:
+    """Choose what the target of a case takes, and say what it is and why."""
     from functools import partial
 
     from roughvisc.study.budget.target import choose
@@ -133,7 +136,7 @@ def _choose(
     elsewhere = connect(scheduler, scheduler_file) if scheduler or scheduler_file else nullcontext()
     with elsewhere as client:
         choice = choose(
-            cases[0],
+            case,
             folder,
             watch=partial(watcher, not console.quiet, console, summary=False),
             tell=tell,
@@ -142,17 +145,14 @@ def _choose(
             threads=threads,
             same_bits=same_bits,
         )
-    cases[:] = [choice.case]
     tell("Chosen")
     for reason in choice.reasons:
         tell(f"  {reason}")
-    return choice.budgets
+    return choice
 
 
 def _show_budgets(budgets: Mapping[str, xr.Dataset], folder: Path, console: Console, plots: bool) -> None:
     """Print, keep and draw the whole errors around what was chosen."""
-    if not budgets:
-        return
     from roughvisc.cli.budgets import show
 
     for name, one in budgets.items():

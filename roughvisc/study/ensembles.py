@@ -96,7 +96,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         itself = values.sel({REALISATION: ITSELF}).transpose(*dims).values
         variables |= {
             "itself": (dims, itself, units | {"long_name": f"{called} of the measured surface itself"}),
-            "ratio": (dims, _ratio(itself, found["mean"]), {"units": "1", "long_name": "ratio to the mean"}),
+            "ratio": (dims, ratio(itself, found["mean"]), {"units": "1", "long_name": "ratio to the mean"}),
             "standing": (dims, standing(itself, drawn.transpose(REALISATION, ...).values), STANDING_ATTRIBUTES),
         }
     return xr.Dataset(variables, rest.coords, {"quantity": str(values.name or ""), "confidence": LEVEL})
@@ -160,6 +160,7 @@ def standing(itself: Array, values: Array) -> NDArray[np.int8]:
     return np.where(known, np.where(below, 1, np.where(above, 2, 0)), _NOT_KNOWN).astype("int8")
 
 
-def _ratio(itself: Array, mean: Array) -> Array:
+def ratio(itself: Array, mean: Array) -> Array:
+    """A value over the mean of others; missing where that is zero. [-]"""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(mean != 0, itself / mean, np.nan)

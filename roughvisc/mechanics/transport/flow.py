@@ -153,9 +153,8 @@ def _by_dissection(faces: Faces, network: Network) -> Callable[[Array], Array]:
     halves[3] = 2 * np.where(kept & np.roll(kept, -1, axis=1), faces.across, 0.0)
     halves[1] = np.roll(halves[3], 1, axis=1)
     ground = np.zeros(kept.shape)
-    ground[0], ground[-1] = faces.along[0], faces.along[-1]
-    if len(ground) == 1:
-        ground += faces.along[0]
+    ground[0] += faces.along[0]
+    ground[-1] += faces.along[-1]
     ground[~kept] = 0.0
 
     def solve(source: Array) -> Array:

@@ -47,8 +47,9 @@ def stated_by(path: Path, quantities: Sequence[Observable], axis: str, places: A
     if not path.is_file():
         return Stated()
     try:
-        with whole_result(path) as opened:
-            whole = opened.load()
+        with whole_result(path) as opened:  # without the fields that no quantity is derived from
+            needed = {one for quantity in quantities for one in quantity.fields}
+            whole = opened.drop_vars([name for name in opened if opened[name].ndim > 2 and name not in needed]).load()
     except (InputError, OSError) as error:
         log.info("budget: %s: %s: the case is solved again", path, error)
         return Stated()

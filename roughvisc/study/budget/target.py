@@ -373,7 +373,7 @@ def choose(
         )
 
     while True:
-        tell(f"{grids.words(around.level)}: {around.words(targets)}")
+        tell(f"{grids.words(around.level)}: {_words(around, targets)}")
         told, wait = list(around.missed(targets)), around.seconds_of_next(0)
         if targets and not told:
             break
@@ -595,14 +595,6 @@ class Around:
             return "; mirror = true in place of the taper would help"
         return ""
 
-    def words(self, targets: Mapping[str, float], quantities: Sequence[Observable] | None = None) -> str:
-        """The error of quantities on this level, all of them where None, and what is wanted."""
-        told = []
-        for one in self.quantities if quantities is None else quantities:
-            wanted = f", wanted {_percent(math.log1p(targets[one.name]))}" if one.name in targets else ""
-            told.append(f"{one.name} {_percent(self.error(one))}{wanted}")
-        return "; ".join(told)
-
     def budget(self, quantity: Observable, chosen: Case) -> xr.Dataset:
         """The budget of a quantity on this level."""
         seconds = {name: one.seconds for name, one in self.parts.items()}
@@ -699,10 +691,6 @@ class OfPopulation:
             found[one.name] = self.targets[one.name] ** 2 - others**2 - self.grid(one) ** 2
         return found
 
-    def words(self, targets: Mapping[str, float], quantities: Sequence[Observable] | None = None) -> str:
-        """The error of quantities, all of them where None, and what is wanted."""
-        return Around.words(self, targets, quantities)  # type: ignore[arg-type]
-
     def budget(self, quantity: Observable, chosen: Case) -> xr.Dataset:
         """The budget of a quantity, whose value is the mean of the logarithm over all surfaces."""
         seconds = {name: one.seconds for name, one in self.around.parts.items()}
@@ -762,11 +750,13 @@ def mean_of_population(
         elif not short:
             more = counts_for(found.levels, {name: np.sqrt(room) for name, room in rooms.items()})
             wait = sum((more[level] - counts[level]) * one.cost for level, one in found.levels.items())
-        bench.tell(f"{found.draws()}: {found.words(targets)}")
+        bench.tell(f"{found.draws()}: {_words(found, targets)}")
         if short and not refine:
             if not targets and best is not None:
                 return best
-            raise _refusal(case, [f"{found.words(targets)}: the grids alone leave too much, with the finest there is"])
+            raise _refusal(
+                case, [f"{_words(found, targets)}: the grids alone leave too much, with the finest there is"]
+            )
         if more == counts:
             if targets:
                 return found
@@ -778,7 +768,7 @@ def mean_of_population(
             limits = f"{limit:g} s" if math.isfinite(limit) else f"{MOST} draws"
             needed = f"{sum(more.values())} draws and some {found.spent + wait:.2g} s at least"
             raise _refusal(
-                case, [f"population: found a limit of {limits}: expected {needed}; so far {found.words(targets)}"]
+                case, [f"population: found a limit of {limits}: expected {needed}; so far {_words(found, targets)}"]
             )
         counts = more
 
@@ -792,7 +782,7 @@ def _reasons(grids: Grids, around: Around | OfPopulation, targets: Mapping[str, 
         parts = f"{_percent(around.error(one, _RULED))} by grid and solver, {_percent(around.floor(one))} by all else"
         if isinstance(around, OfPopulation):
             parts += f", {_percent(around.error(one, ['sample']))} by the draws"
-        yield f"{around.words(targets, [one])}: {parts}"
+        yield f"{_words(around, targets, [one])}: {parts}"
     tolerance = grids.variants.case.settings.solve.tolerance
     least = _TOLERANCE * min(targets.values(), default=0.0)
     why = {
@@ -811,11 +801,22 @@ def _reasons(grids: Grids, around: Around | OfPopulation, targets: Mapping[str, 
         yield f"open, and not counted: {', '.join(unknown)}"
 
 
+def _words(
+    found: Around | OfPopulation, targets: Mapping[str, float], quantities: Sequence[Observable] | None = None
+) -> str:
+    """The error of quantities as far as it was found, all of them where None, and what is wanted."""
+    told = []
+    for one in found.quantities if quantities is None else quantities:
+        wanted = f", wanted {_percent(math.log1p(targets[one.name]))}" if one.name in targets else ""
+        told.append(f"{one.name} {_percent(found.error(one))}{wanted}")
+    return "; ".join(told)
+
+
 def _short_of_time(around: Around, targets: Mapping[str, float], limit: float, wait: float) -> str:
     needed = f"time: found {limit:g} s: expected some {around.spent + wait:.2g} s at least"
     if around.level > around.held:
         return f"{needed}, for the coarsest grid that holds the waves of the surface and what its error is judged by"
-    return f"{needed}, for the next grid; so far {around.words(targets)}"
+    return f"{needed}, for the next grid; so far {_words(around, targets)}"
 
 
 def _percent(half: float) -> str:
