@@ -248,6 +248,14 @@ def test_leakage_benchmark__certifies_what_it_times(monkeypatch):
         assert abs(one["upper"] - other["upper"]) <= 1e-9 * one["upper"]
 
 
+@pytest.mark.thorough
+def test_layers_benchmark__compares_bodies_of_as_many_exponentials(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    layer, as_many, own = importlib.import_module("layers").main(24, 1e-2)
+    assert layer["exponentials"] == as_many["exponentials"] > own["exponentials"] == 5
+    assert all(row["stated_error"] <= 1e-2 for row in (layer, as_many, own))
+
+
 def test_big_scans_and_results__are_measured(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     scans, results = importlib.import_module("big_scans"), importlib.import_module("big_results")
