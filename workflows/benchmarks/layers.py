@@ -44,7 +44,7 @@ def measure(kind, cells, tolerance, sender):
     """Send the row of one body."""
     surface = rv.self_affine(SIDE, cells, hurst=0.8, rms_slope=0.1, rolloff=SIDE / 4, seed=1)
     program = rv.Program().pressure(1e5, over=0.05).hold(10.0)
-    settings = Settings(boundary="periodic", times=TIMES, tolerance=tolerance)
+    settings = Settings(boundary="periodic", times=TIMES, tolerance=tolerance, fields=())
     pressed = body(kind, program, settings)
     memory = choose_body_memory(pressed, **memory_options(program.on_area(SIDE**2), settings)).memory
     began = time.process_time()
