@@ -7,6 +7,7 @@ Energies are sums over the steps, whose error follows the second order closely: 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from typing import Any
 
@@ -17,16 +18,15 @@ from roughvisc.mechanics.arrays import cut_at_zero, empty, over_blocks, weighted
 from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.controller import rule_for
+from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import (
     ControllerState,
     Guess,
-    Held,
     Instant,
     Scene,
     State,
     Step,
-    Through,
     Trajectory,
     Trial,
     Uncertainty,
@@ -127,7 +127,7 @@ def difference(
     fine, coarse = step.state.now, companion.now
     area = scene.operator.cell_area
     inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
-    (kept, lost), (companion_kept, companion_lost) = _energies(step.state), _energies(companion)
+    own, other = step.state.energy or Energy(), companion.energy or Energy()
     entered, soft = 0.0, scene.is_soft
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))
@@ -136,18 +136,17 @@ def difference(
     stated, force, energy = STATED, _STATED_FORCE, _STATED_ENERGY
     if soft:
         stated, force, energy = _STATED_SOFT, _STATED_SOFT, _STATED_SOFT_ENERGY
-    unresolved = 0.0 if step.state.energy is None else step.state.energy.unresolved
     return Uncertainty(
         pressure=stated * area * fine.contact.apart_from(coarse.contact) + entered,
         approach=stated * abs(fine.approach - coarse.approach),
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
-        work=energy * abs(step.state.work - companion.work) + unresolved,
-        dissipated=energy * abs(lost - companion_lost) + unresolved,
+        work=energy * abs(step.state.work - companion.work) + own.unresolved,
+        dissipated=energy * abs(own.dissipated - other.dissipated) + own.unresolved,
         friction=stated * _friction_apart(scene, step, coarse.pressure, moved.field()) if scene.motions else 0.0,
         inside=area * inside,
         outside=area * outside,
-        stored_excess=(kept - companion_kept) / -3,
-        dissipated_excess=(lost - companion_lost) / -3,
+        stored_excess=(own.stored - other.stored) / -3,
+        dissipated_excess=(own.dissipated - other.dissipated) / -3,
     )
 
 
@@ -187,11 +186,6 @@ def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Arr
     slide = scene.motions[segment_number(step.state)]
     fine = tangential_force(scene.operator, step.shown.pressure, step.displacement, slide)
     return abs(fine - tangential_force(scene.operator, pressure, displacement, slide))
-
-
-def _energies(state: Trajectory) -> tuple[float, float]:
-    """Stored and dissipated. [J]"""
-    return (0.0, 0.0) if state.energy is None else (state.energy.stored, state.energy.dissipated)
 
 
 def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[int, int]:
@@ -262,20 +256,23 @@ def with_uncertainty(step: Step, uncertainty: Uncertainty, **more: Any) -> Step:
     return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty, **more))
 
 
-def in_pairs(steps: Held) -> Through:
+def in_pairs(steps: Iterator[Step | None]) -> Iterator[Step]:
     """The same steps, the first of a pair held until the second one tells how far off both are.
 
     Only a step that is kept or that follows an event is held; any other goes on at once with the error stated last.
-    Before the grid grows the step that is held goes on, since its fields are those of the smaller grid.
+    None comes before the grid grows: then the step that is held goes on, since its fields are those of the smaller
+    grid.
     """
-    first = None
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as end:
-            return end.value
+    first: Step | None = None
+    for step in steps:
         if first is not None:
-            yield first if step is None else assign_pair_error(first, step)
+            if step is not None:
+                assert first.state.companion is not None  # it waits where the pair began
+                began, middle, end = first.state.companion.now.time, first.shown.time, step.shown.time
+                # of what both add to the energies, by the cubes of their lengths
+                part = (middle - began) ** 3 / ((middle - began) ** 3 + (end - middle) ** 3)
+                first = replace(first, uncertainty=first.uncertainty.or_worse(step.uncertainty, part))
+            yield first
             first = None
         if (
             step is not None
@@ -286,12 +283,3 @@ def in_pairs(steps: Held) -> Through:
         elif step is not None:
             yield step
         del step  # its fields are not needed while the next one is computed
-
-
-def assign_pair_error(first: Step, second: Step) -> Step:
-    """The first step of a pair, with what is stated of it by the second."""
-    companion = first.state.companion
-    assert companion is not None  # it waits where the pair began
-    lengths = first.shown.time - companion.now.time, second.shown.time - first.shown.time
-    part = lengths[0] ** 3 / (lengths[0] ** 3 + lengths[1] ** 3)  # of what both add to the energies, by their cubes
-    return replace(first, uncertainty=first.uncertainty.or_worse(second.uncertainty, part))

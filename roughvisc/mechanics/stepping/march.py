@@ -1,4 +1,4 @@
-"""The march through time: predict, solve, accept, yield.
+"""The march through time: predict, solve, accept, yield; jumps, and when surfaces that are apart close.
 
 :func:`march` presses a profile on a half-space through a loading program and yields every accepted step. It reduces
 each step to an elastic contact problem by the memory. :mod:`~roughvisc.mechanics.stepping.controller` chooses how long
@@ -11,10 +11,12 @@ no state, and a march goes on from any state that it yielded.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
+from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.companion import (
     adapt_tolerance_share,
     behind,
@@ -35,9 +37,8 @@ from roughvisc.mechanics.stepping.controller import (
     step_length,
     suggestion,
 )
-from roughvisc.mechanics.stepping.events import closing_time, jump, next_event, start_segment
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Held, Scene, State, Step, Through, Trial
+from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Scene, State, Step, Trial
 from roughvisc.mechanics.stepping.slide_march import through_slide
 from roughvisc.mechanics.stepping.step import (
     accept,
@@ -48,6 +49,7 @@ from roughvisc.mechanics.stepping.step import (
     initial_state,
     is_outgrown,
     restarted,
+    start_segment,
     step_of,
     trial_at_rest,
     trial_step,
@@ -55,6 +57,10 @@ from roughvisc.mechanics.stepping.step import (
 )
 
 _MAGNIFIED = 1e-5  # share of the solver's tolerance that a step gets before the short one that shows its end
+# Times are found to this part of the way to the next event.
+_RESOLVED = 1e-9
+# Surfaces that are apart for less than this part of the way touch at once.
+_AT_ONCE = 1e-6
 
 
 def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
@@ -87,37 +93,66 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         if segments and segments[0].duration > 0:
             yield step_of(scene, state, trial_at_rest(scene, state))
     while state.segment < len(segments):
-        segment = segments[state.segment]
+        number, segment = state.segment, segments[state.segment]
         if segment.duration == 0:
             scene, step = jump(scene, state, segment)
             state = step.state
-            following = segments[state.segment : state.segment + 1]
-            right_hand = scene.can_jump or state.now.time == 0
-            if right_hand and not (following and following[0].duration == 0):
+            if (scene.can_jump or state.now.time == 0) and not _jumps_next(scene, state):
                 yield step
             del step  # its fields are not needed while the next one is computed
-        else:
-            through = (_steps_of_segment if segment.slide is None else through_slide)(scene, state, segment)
-            del state  # nor are its
-            scene, state = yield from _without_jumps(in_pairs(through))
+            continue
+        steps = (_steps_of_segment if segment.slide is None else through_slide)(scene, state, segment)
+        del state  # nor are its
+        for step in in_pairs(steps):
+            ends = step.state.segment > number
+            if ends:
+                scene, state = step.scene, step.state
+            # of a jump that the material follows at once only the right-hand state is a step
+            if not (ends and step.scene.can_jump and _jumps_next(step.scene, step.state)):
+                yield step
+            del step
 
 
-def _without_jumps(steps: Through) -> Through:
-    """The same but for the left-hand state of a jump that the material follows at once."""
+def _jumps_next(scene: Scene, state: State) -> bool:
+    """Whether the segment that a state has entered is a jump."""
+    segments = scene.program.segments
+    return state.segment < len(segments) and segments[state.segment].duration == 0
+
+
+def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
+    """Zero-length segment: solved with the instantaneous compliance; left for the next step if there is none."""
+    value = segment.value(0.0, state.start)
+    if not scene.can_jump:
+        return scene, step_of(scene, _defer_jump(scene, state, segment, value), trial_at_rest(scene, state))
     while True:
-        try:
-            step = next(steps)
-        except StopIteration as end:
-            return end.value
-        state, segments = step.state, step.scene.program.segments
-        corner = state.segment < len(segments) and state.now.time == state.began
-        if not (corner and segments[state.segment].duration == 0 and step.scene.can_jump):
-            yield step
-        del step, state
+        trial = trial_step(scene, state, segment.control, value, 0.0, "linear", stated=True)
+        if not is_outgrown(scene, trial.instant):
+            jumped = accept(scene, state, trial, replace(state.pace, ignore_pressure_error=False))
+            found = followed(scene, jumped, segment, coarse_initial_guess(trial.instant), "linear")
+            if found is not None:
+                break
+        scene, state = enlarged(scene, replace(state, **cost_after(state, trial)), state.now.time)
+    state, companion_trial = found
+    return scene, with_error_estimate(scene, step_of(scene, start_segment(scene, state), trial), companion_trial)
 
 
-def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
-    """Accepted steps through a segment; the last one has entered the next segment. In the end scene and state.
+def _defer_jump(scene: Scene, state: State, segment: Segment, value: float) -> State:
+    """State after a jump that the material cannot follow at once: the next step takes it."""
+    if value == (state.now.force if segment.control == "load" else state.now.approach):
+        return start_segment(scene, state)
+    if segment.control == "approach":
+        raise InputError(
+            f"at {state.now.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
+            "compliance: expected a ramp (over > 0), or a material that can jump"
+        )
+    entered = start_segment(scene, state)
+    following = scene.program.segments[entered.segment : entered.segment + 1]
+    held = bool(following) and following[0].control == "load"
+    return entered.with_each(lambda one: {"unresolved": True, "start": value if held else one.start})
+
+
+def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[Step | None]:
+    """Accepted steps through a segment; the last one has entered the next segment. None before the grid may grow.
 
     Steps go in pairs: the companion takes both as one. The first step after an event extrapolates from nothing; it is
     accepted when the second one is, and both are rolled back together.
@@ -126,8 +161,10 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
     first: Step | None = None  # after an event
     base = state  # before it
     while state.now.time < end:
-        event = next_event(scene, state, end)
-        closing = _closing(scene, state, segment, event)
+        event = min(scene.next_kept(state.now.time), end)
+        closing = state.now.time  # till when surfaces that are apart stay so
+        if not (state.now.force > 0 or state.unresolved):
+            closing = closing_time(scene, state, segment, event, partial(_touched, scene, state))
         if closing > state.now.time:
             if first is not None:
                 yield first
@@ -155,7 +192,8 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
             if state.companion is not None and not waits:
                 guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
-                    state = base = _without_fields(state)
+                    numbers = state.now.without_fields()
+                    state = base = replace(state, now=numbers, before=None, displacement=NO_FIELD, memory=None)
             judged = _step_with_companion(scene, state, accepted, segment, trial, guess)
             del accepted, guess
         if first is not None:
@@ -172,14 +210,6 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Held:
             base = state
             yield judged
         del trial, judged  # their fields are not needed while the next step is computed
-    return scene, state
-
-
-def _closing(scene: Scene, state: State, segment: Segment, event: float) -> float:
-    """Till when surfaces that are apart stay apart; the present time where they touch. [s]"""
-    if state.now.force > 0 or state.unresolved:
-        return state.now.time
-    return closing_time(scene, state, segment, event, partial(_touched, scene, state))
 
 
 def _tried(scene: Scene, state: State, segment: Segment, event: float, end: float) -> tuple[Trial, float]:
@@ -218,11 +248,6 @@ def _shortened(
     error = math.nan if _seems_to_open(state, segment, trial) else error
     pace = start.pace.rejected(length, error, error_limit(scene, state, trial.instant.time))
     return replace(start, pace=pace, **cost_after(state, trial))
-
-
-def _without_fields(state: State) -> State:
-    """Its numbers, and its companion."""
-    return replace(state, now=state.now.without_fields(), before=None, displacement=NO_FIELD, memory=None)
 
 
 def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
@@ -266,15 +291,9 @@ def _step_with_companion(
     unknown = difference(scene, step, accepted.companion, moved, state.companion.now.contact, asked)
     if companion_trial.length <= trial.length:  # it took the same step
         return with_uncertainty(step, unknown.or_worse(state.uncertainty, 0.0))
-    ahead = max(1.0, growth(state, segment, time, next_event(scene, accepted, end))) if time < end else 1.0
+    ahead = max(1.0, growth(state, segment, time, min(scene.next_kept(time), end))) if time < end else 1.0
     left = 1.0 if asked else remaining(scene, accepted)
     return with_uncertainty(step, unknown, pace=adapt_tolerance_share(scene, state, accepted, ahead, left, unknown))
-
-
-def _touched(scene: Scene, state: State, time: float) -> float:
-    """Approach at which surfaces that are apart would touch at a time to come. [m]"""
-    carried = carried_into_step(scene, state.memory, time - state.now.time, "linear")[3]
-    return scene.lowest(scene.gap + carried)
 
 
 def _step_while_open(scene: Scene, state: State, segment: Segment, until: float, end: float) -> Step:
@@ -287,15 +306,78 @@ def _step_while_open(scene: Scene, state: State, segment: Segment, until: float,
             state = found[0]
     value = segment.value(until - state.began, state.start)
     trial = trial_step(scene, state, segment.control, value, until - state.now.time, "linear", arrival=until)
-    carried = accept(scene, state, trial, state.pace.with_pressure_error())
+    carried = accept(scene, state, trial, replace(state.pace, ignore_pressure_error=False))
     in_contact = carried.companion is not None and carried.companion.now.force > 0
     found = followed(scene, carried, segment, coarse_initial_guess(carried.now), "right" if in_contact else "linear")
     if found is None:  # the companion is in contact, beyond the grid
         return _step_while_open(*enlarged(scene, state, until), segment, until, end)
     carried, companion_trial = found
     carried = carried.with_each(partial(without_past, scene))
-    carried = replace(carried, pace=carried.pace.after_event())
+    carried = replace(carried, pace=replace(carried.pace, suggestion=0.0))
     if until == end:
         carried = start_segment(scene, carried)
     step = step_of(scene, carried, trial)
     return with_error_estimate(scene, step, companion_trial) if scene.keeps(until) else step
+
+
+def closing_time(
+    scene: Scene, state: State, segment: Segment, event: float, touched: Callable[[float], float]
+) -> float:
+    """Time up to which the surfaces, apart now, stay apart; the present time if they touch at once. [s]
+
+    Parameters
+    ----------
+    scene, state, segment : Scene, State, Segment
+        What is prescribed, and how far it has come.
+    event : float
+        No later than this. [s]
+    touched : callable
+        Approach at which the surfaces would just touch at a time to come. [m]
+    """
+    now = state.now.time
+    if segment.control == "load":
+        return event if segment.is_nothing(state.start) else now
+    # the undeformed surface is the lowest that it recovers to
+    if segment.highest(state.start) <= min(scene.lowest(scene.gap), scene.outside):
+        return event
+
+    def prescribed(time: float) -> float:
+        return segment.value(time - state.began, state.start)
+
+    def limit(time: float) -> float:
+        return min(touched(time), scene.outside)
+
+    shortest = _RESOLVED * (event - now)
+    turns = (state.began + t for t in segment.turns(now - state.began, event - state.began))
+    begin = now
+    for end in chain(turns, (event,)):
+        crossing = _first_crossing(prescribed, limit, begin, end, shortest)
+        if crossing is not None:
+            return crossing if crossing - now > _AT_ONCE * (event - now) else now
+        begin = end
+    return event
+
+
+def _first_crossing(
+    prescribed: Callable[[float], float], limit: Callable[[float], float], begin: float, end: float, shortest: float
+) -> float | None:
+    """A time just before what is prescribed, monotone here, first exceeds a limit that never rises; None if never."""
+    pending = [(begin, end)]
+    while pending:
+        first, last = pending.pop()
+        lowest = limit(last)
+        if max(prescribed(first), prescribed(last)) <= lowest:
+            continue  # nowhere between can it be exceeded
+        if last - first <= shortest:
+            if prescribed(last) > lowest:
+                return first
+            continue
+        middle = 0.5 * (first + last)
+        pending += [(middle, last), (first, middle)]
+    return None
+
+
+def _touched(scene: Scene, state: State, time: float) -> float:
+    """Approach at which surfaces that are apart would touch at a time to come. [m]"""
+    carried = carried_into_step(scene, state.memory, time - state.now.time, "linear")[3]
+    return scene.lowest(scene.gap + carried)

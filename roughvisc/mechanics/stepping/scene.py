@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -125,14 +125,6 @@ class ControllerState:
         ignored = self.shortening_failed(error) and error > allowed
         rejected_error = self.rejected_error if fresh else math.inf
         return ControllerState(suggestion, self.sharpness, ignored, rejected_error)
-
-    def with_pressure_error(self) -> ControllerState:
-        """After a step: the next estimate sees the pressure."""
-        return replace(self, ignore_pressure_error=False)
-
-    def after_event(self, suggestion: float = 0.0) -> ControllerState:
-        """Where nothing is extrapolated, with the length of the next step if it is known. [s]"""
-        return replace(self, suggestion=suggestion)
 
     def adapt_sharpness(self, used: float, earlier: float) -> ControllerState:
         """By what is stated, over the tolerance, now and when it was last told."""
@@ -347,7 +339,7 @@ class Trajectory:
         now, before = self.now.contact, self.before
         if before is None or length == 0:
             return now.times(1.0), False
-        ratio = self._ratio(length)
+        ratio = length / (self.now.time - before.time)
         pressure = now.times(1 + ratio)
         before.contact.add_to(pressure, -ratio)
         return pressure, cut_at_zero(pressure, now.threads)
@@ -366,14 +358,9 @@ class Trajectory:
             return pressure, weighted([(1.0, known)], empty(known.shape), threads)
         if before.unit_displacement is None:
             return pressure, None
-        ratio = self._ratio(length)
+        ratio = length / (self.now.time - before.time)
         terms = [(1 + ratio, known), (-ratio, before.unit_displacement)]
         return pressure, weighted(terms, empty(known.shape), threads)
-
-    def _ratio(self, length: float) -> float:
-        """Of a step's length to that of the last one."""
-        assert self.before is not None
-        return length / (self.now.time - self.before.time)
 
 
 @dataclass(frozen=True)
@@ -536,9 +523,3 @@ class Trial:
     def is_open(self) -> bool:
         """Whether the surfaces are apart."""
         return self.instant.force == 0
-
-
-#: Steps through a part of a program, and the scene and the state in which they end.
-Through = Generator[Step, None, tuple[Scene, State]]
-#: The same, with None before the grid may grow: who holds a step back is to let it go.
-Held = Generator[Step | None, None, tuple[Scene, State]]

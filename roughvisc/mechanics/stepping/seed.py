@@ -19,7 +19,6 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.sparse import Sparse, Sum
-from roughvisc.mechanics.stepping.events import next_event
 from roughvisc.mechanics.stepping.scene import UNKNOWN, Instant, Scene, State, Step
 from roughvisc.mechanics.stepping.step import at_edge, edge_error, work_between
 
@@ -166,7 +165,7 @@ def march_seed(scene: Scene) -> Iterator[Step]:
         end = scene.program.corners[index + 1]
         following = scene.program.segments[index + 1 : index + 2]
         while True:
-            event = next_event(scene, state, end)
+            event = min(scene.next_kept(state.now.time), end)
             distance = event - state.now.time
             steps = max(1, math.ceil(distance / largest_step * (1 - 1e-9)))
             length = distance / steps

@@ -8,6 +8,7 @@ cells at once, and tells what the length of the steps leaves unknown: that falls
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -23,10 +24,9 @@ from roughvisc.mechanics.stepping.companion import (
     with_uncertainty,
 )
 from roughvisc.mechanics.stepping.controller import rule_for
-from roughvisc.mechanics.stepping.events import start_segment
 from roughvisc.mechanics.stepping.program import Segment, Slid, Slide, instant
-from roughvisc.mechanics.stepping.scene import Guess, Held, Instant, Scene, State, Step, Trajectory, Trial, Uncertainty
-from roughvisc.mechanics.stepping.step import accept, restarted, step_of, trial_step
+from roughvisc.mechanics.stepping.scene import Guess, Instant, Scene, State, Step, Trajectory, Trial, Uncertainty
+from roughvisc.mechanics.stepping.step import accept, restarted, start_segment, step_of, trial_step
 
 # Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
 # friction is a small part of it.
@@ -36,8 +36,8 @@ _COMPANION_SHARE = 2.5
 Moved = TypeVar("Moved", bound=Trajectory)
 
 
-def through_slide(scene: Scene, state: State, segment: Segment) -> Held:
-    """Accepted steps through a slide; the last one has entered the next segment. In the end scene and state.
+def through_slide(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
+    """Accepted steps through a slide; the last one has entered the next segment.
 
     Parameters
     ----------
@@ -62,7 +62,6 @@ def through_slide(scene: Scene, state: State, segment: Segment) -> Held:
         state = step.state
         yield step
         del step
-    return scene, state
 
 
 def _further(scene: Scene, state: State, segment: Segment, arrival: float, length: float) -> Step:
@@ -72,7 +71,7 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     trial = _tried(scene, state, segment, arrival, length, 1, _SHARE, coarse_initial_guess(state.now))
     moved = _moved(scene, state, segment.slide, 1)
     # the step before is kept as the profile saw it
-    accepted = accept(scene, moved, trial, moved.pace.with_pressure_error(), before=state.now)
+    accepted = accept(scene, moved, trial, replace(moved.pace, ignore_pressure_error=False), before=state.now)
     accepted = replace(accepted, slid=_path(scene, state, accepted, segment.slide))
     if state.unresolved:
         accepted = restarted(scene, accepted, 0.0)

@@ -1,4 +1,4 @@
-"""One time step: its elastic contact problem, the state after it, the row shown of it, and a grid it outgrows."""
+"""One time step: its elastic contact problem, the state after it, what is shown of it, and a grid that it outgrows."""
 
 from __future__ import annotations
 
@@ -314,9 +314,33 @@ def segment_number(state: State) -> int:
     return max(state.segment - (state.now.time <= state.began), 0)
 
 
+def start_segment(scene: Scene, state: State) -> State:
+    """State at the start of the next segment."""
+    segments = scene.program.segments
+    index = state.segment + 1
+    joined = segments[max(index - 1, 0) : index + 1]
+    neighbours = {segment.control for segment in joined}
+    # a corner of the approach is a jump of the load where the material cannot follow at once
+    jumps = "approach" in neighbours and not scene.can_jump
+    given = segments[index].control if index < len(segments) else None
+
+    def enter(one: Trajectory) -> dict[str, Any]:
+        start = 0.0 if given is None else one.now.force if given == "load" else one.now.approach
+        return {"start": start, "unresolved": jumps and one.now.force > 0, **without_past(scene, one)}
+
+    entered = state.with_each(enter)
+    # a corner in what is prescribed bends the histories and does not break them: the steps may stay as long, unless
+    # the first one is of first order
+    smooth = len(neighbours) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
+    smooth = smooth and scene.is_viscoelastic and not scene.lacks_instantaneous_compliance(state.pace.suggestion)
+    smooth = smooth and state.now.force > 0 and not entered.unresolved
+    pace = state.pace if smooth else replace(state.pace, suggestion=0.0)
+    return replace(entered, segment=index, began=state.now.time, pace=pace)
+
+
 def restarted(scene: Scene, state: State, suggestion: float) -> State:
     """State from which nothing is extrapolated."""
-    return replace(state, pace=state.pace.after_event(suggestion), **without_past(scene, state))
+    return replace(state, pace=replace(state.pace, suggestion=suggestion), **without_past(scene, state))
 
 
 def without_past(scene: Scene, state: Trajectory) -> dict[str, Any]:

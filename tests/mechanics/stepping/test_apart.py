@@ -13,10 +13,8 @@ from strategies import examples
 import roughvisc as rv
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping import events as apart
 from roughvisc.mechanics.stepping import march as marching
-from roughvisc.mechanics.stepping.events import _first_crossing, closing_time
-from roughvisc.mechanics.stepping.march import march
+from roughvisc.mechanics.stepping.march import _first_crossing, closing_time, march
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.step import initial_state
 
@@ -213,7 +211,7 @@ def test_turns_of_a_cycle__bound_the_search():
     lifted = 40  # periods until the surface has come down to the peaks
     found = closing_time(scene, state, segment, 500.0, lambda time: 0.0 if time > lifted else 1.0)
     assert found == pytest.approx(lifted + peak - half, abs=1e-5)
-    assert apart.closing_time(scene, state, segment, 500.0, lambda _: 1.0) == 500.0
+    assert closing_time(scene, state, segment, 500.0, lambda _: 1.0) == 500.0
 
 
 @pytest.mark.parametrize(("part", "apart_till"), [(1e-7, 0.0), (1e-4, 1e-4)], ids=["at_once", "later"])

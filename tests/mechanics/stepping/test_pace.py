@@ -44,7 +44,6 @@ def test_step_accepted_after_a_failed_one__blinds_the_next_estimate_once():
     rejected = ControllerState().rejected(1.0, 0.2, 0.1)
     blinded = rejected.accepted(0.3, 0.199, allowed=0.1, fresh=False)
     assert blinded.ignore_pressure_error
-    assert not blinded.with_pressure_error().ignore_pressure_error
     assert not rejected.accepted(0.3, 0.05, allowed=0.1, fresh=False).ignore_pressure_error  # it is good enough
     assert not rejected.accepted(0.3, 0.11, allowed=0.1, fresh=False).ignore_pressure_error  # it did not fail
     assert not blinded.accepted(0.3, 0.199, allowed=0.1, fresh=False).ignore_pressure_error
@@ -55,11 +54,6 @@ def test_accepted_step__is_the_end_of_what_was_rejected_unless_the_second_of_a_p
     assert rejected.accepted(0.3, 0.05, 0.1, fresh=False).rejected_error == math.inf
     assert rejected.accepted(0.3, 0.05, 0.1, fresh=True).rejected_error == 0.2
     assert rejected.accepted(0.3, 0.05, 0.1, fresh=False).suggestion == 0.3
-
-
-def test_event__forgets_the_length_and_keeps_the_sharpness():
-    assert ControllerState(2.0, 0.5).after_event() == ControllerState(0.0, 0.5)
-    assert ControllerState(2.0, 0.5).after_event(0.1) == ControllerState(0.1, 0.5)
 
 
 @given(st.lists(st.floats(0.0, 1e3), min_size=1, max_size=30))
