@@ -16,7 +16,7 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import STIFF, Rule
 from roughvisc.mechanics.materials.prony import Prony, by_size
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Trajectory, Trial
+from roughvisc.mechanics.stepping.scene import Scene, State, Trajectory, Trial
 
 Array = NDArray[np.float64]
 # Ages at which the weight of a step is tabulated, over the shortest time of the material, and how many in a decade.
@@ -88,10 +88,8 @@ class Fading:
         return max(mean, abs(end) / _LAST)
 
 
-@lru_cache(maxsize=8)
-def fading(series: Prony, duration: float) -> Fading:
-    """Of a material in a program; asked for at every step."""
-    return Fading(series, duration)
+#: Of a material in a program; asked for at every step.
+_fading_of = lru_cache(maxsize=8)(Fading)
 
 
 # Share of the tolerance that a step may use where it lands on a kept time; twice that between kept times.
@@ -135,7 +133,8 @@ def remaining_creep_fraction(scene: Scene, length: float) -> float:
 
 def counted(scene: Scene, state: State, length: float) -> float:
     """Part of the error of a step's pressure that counts, at the next kept time or a later one. [-]"""
-    share, left, known = remaining_creep_fraction(scene, length), _left(scene, state), _fading(scene)
+    share, known = remaining_creep_fraction(scene, length), _fading(scene)
+    left = scene.next_kept(state.now.time) - state.now.time
     if known is None or math.isinf(left):
         return share
     return min(share, max(known.weight(max(left, length), length), _NOT_FADING * share))
@@ -143,22 +142,17 @@ def counted(scene: Scene, state: State, length: float) -> float:
 
 def remaining(scene: Scene, state: State) -> float:
     """Part of the error of a state's pressure that is left at the next kept time. [-]"""
-    left, known = _left(scene, state), _fading(scene)
+    left, known = scene.next_kept(state.now.time) - state.now.time, _fading(scene)
     if known is None or math.isinf(left) or scene.keeps(state.now.time):
         return 1.0
     return known.remaining(left)
-
-
-def _left(scene: Scene, state: State) -> float:
-    """Time till the next kept time, infinite if there is none. [s]"""
-    return scene.next_kept(state.now.time) - state.now.time
 
 
 def _fading(scene: Scene) -> Fading | None:
     """How errors of the pressure fade; None where cells that enter make it jump, or the memory is no series."""
     if not (isinstance(scene.memory, Modes) and is_gentle(scene)):
         return None
-    return fading(scene.memory.material, scene.program.duration)
+    return _fading_of(scene.memory.material, scene.program.duration)
 
 
 def is_gentle(scene: Scene) -> bool:
@@ -264,9 +258,10 @@ def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment,
         elapsed = scene.compliance(trial.instant.time - since)
         soft = scene.compliance(max(event, trial.instant.time) - since) / elapsed if elapsed > 0 else 1.0
     force = max(state.largest_force, trial.instant.force * ahead)
-    approach = max(
-        state.largest_approach, abs(trial.instant.approach) * ahead * soft, _unresolved_approach(scene, trial.instant)
-    )
+    # rounding cannot tell a smaller approach from none: all that a flat surface has with periodic boundaries
+    mean_pressure = trial.instant.force / (trial.instant.contact.size * scene.operator.cell_area)
+    none = _ROUNDING * scene.compliance(trial.instant.time) * mean_pressure * scene.operator.largest_influence
+    approach = max(state.largest_approach, abs(trial.instant.approach) * ahead * soft, none)
     difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.operator.threads)
     counts = force > 0 and not state.pace.ignore_pressure_error
     pressure_error = difference * scene.operator.cell_area / force if counts else 0.0
@@ -285,12 +280,6 @@ def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment,
     if segment.control == "load" and scene.times is not None and is_gentle(scene) and not receding:
         scalar_error = 0.0  # while contact grows under a load the approach has none, whatever the steps
     return share * _error_constant(trial, last) * max(faded * pressure_error, scalar_error)
-
-
-def _unresolved_approach(scene: Scene, now: Instant) -> float:
-    """Approach that rounding cannot tell from none: all that a flat surface has with periodic boundaries. [m]"""
-    pressure = now.force / (now.contact.size * scene.operator.cell_area)
-    return _ROUNDING * scene.compliance(now.time) * pressure * scene.operator.largest_influence
 
 
 def _error_constant(trial: Trial, last: float) -> float:

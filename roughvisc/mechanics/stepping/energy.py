@@ -75,15 +75,45 @@ def at_rest(memory: Modes | WaveMemory) -> Energy:
     return Energy(0.0, 0.0, 0.0, memory.no_products, nothing, nothing, nothing, nothing, nothing)
 
 
+#: ``<p_n, p_n+1>`` and ``<p_n+1, p_n+1>``, numbers, or one for each kernel where the elements' differ; then
+#: ``<p_n+1, z_n>`` and ``<p_n+1, z_n-1>`` of each element.
+Products = tuple[Any, Any, Array, Array]
+
+
+def inner_products(
+    memory: Modes, state: ModesState, rule: Rule, start: Array, end: tuple[Sparse, Array], area: float
+) -> Products:
+    """Inner products of the pressure at the end of a step, from displacements that are known.
+
+    Parameters
+    ----------
+    memory, state : Modes, ModesState
+        The memory, and its state at the start.
+    rule : Rule
+        How pressure is taken to run within the step.
+    start : ndarray, shape (nx, ny)
+        Displacement at unit compliance at its start. [Pa m]
+    end : Sparse, and ndarray, shape (nx, ny)
+        Pressure at its end [Pa], and its displacement at unit compliance [Pa m].
+    area : float
+        Of a cell. [m2]
+    """
+    cells, pressure = end[0].not_zero()
+    both, last = (area * inner(field, cells, pressure, end[0].threads) for field in (start, end[1]))
+    ahead = area * memory.products(state.modes, end[1], cells, pressure)
+    behind = np.zeros_like(ahead)
+    if rule == "bdf2" and state.earlier is not None:
+        behind = area * memory.products(state.earlier, end[1], cells, pressure)
+    return both, last, ahead, behind
+
+
 def after_step(
     energy: Energy,
-    memory: Modes,
+    memory: Modes | WaveMemory,
     state: ModesState,
     step: float,
     rule: Rule,
-    start: Array,
-    end: tuple[Sparse, Array],
-    area: float,
+    products: Products,
     fresh: bool = False,
     jumped: bool = False,
     work: float | None = None,
@@ -94,18 +124,14 @@ def after_step(
     ----------
     energy : Energy
         At its start.
-    memory, state : Modes, ModesState
+    memory, state : Modes or WaveMemory, ModesState
         The memory, and its state at the start.
     step : float
         Length; zero is a jump, which is quasi-static: its work is stored. [s]
     rule : Rule
         How pressure is taken to run within the step.
-    start : ndarray, shape (nx, ny)
-        Displacement at unit compliance at its start. [Pa m]
-    end : Sparse, and ndarray, shape (nx, ny)
-        Pressure at its end [Pa], and its displacement at unit compliance [Pa m].
-    area : float
-        Of a cell. [m2]
+    products : tuple
+        Of the pressure at its end. [Pa2 m3]
     fresh : bool
         Whether the step is the first one after an event: elements that relax within it do so beside the pressure.
     jumped : bool
@@ -113,39 +139,11 @@ def after_step(
     work : float, optional
         Of the step, where it is known: what of it is not stored is dissipated. [J]
 
-    Returns
-    -------
-    Energy
-
     Notes
     -----
     Exact for ``linear`` and ``right``. By ``bdf2`` and ``euler``, and where a fresh step is longer than an element's
     time, what that dissipates is the work of the mean pressure on its change, less what it stores: exact where the
     load or the approach is held.
-    """
-    cells, pressure = end[0].not_zero()
-    both, last = (area * inner(field, cells, pressure, end[0].threads) for field in (start, end[1]))
-    ahead = area * memory.products(state.modes, end[1], cells, pressure)
-    behind = np.zeros_like(ahead)
-    if rule == "bdf2" and state.earlier is not None:
-        behind = area * memory.products(state.earlier, end[1], cells, pressure)
-    return by_products(energy, memory, state, step, rule, (both, last, ahead, behind), fresh, jumped, work)
-
-
-def by_products(
-    energy: Energy,
-    memory: Modes | WaveMemory,
-    state: ModesState,
-    step: float,
-    rule: Rule,
-    products: tuple[Any, Any, Array, Array],
-    fresh: bool = False,
-    jumped: bool = False,
-    work: float | None = None,
-) -> Energy:
-    """The same from ``<p_n, p_n+1>``, ``<p_n+1, p_n+1>``, ``<p_n+1, z_n>`` and ``<p_n+1, z_n-1>``.
-
-    The last two are of each element. The others are numbers, or one for each kernel where the elements' differ.
     """
     whole_both, whole_last, ahead, behind = products
     if step == 0:

@@ -209,29 +209,27 @@ def energy_after(scene: Scene, state: Trajectory, trial: Trial, memory: Any) -> 
     """Energies at the end of a step, with the state of the memory then; None where that is no series."""
     if state.energy is None:
         return None
-    before, now = state.now, trial.instant
-    circumstances: dict[str, Any] = {
-        "fresh": state.before is None,
-        "jumped": state.unresolved,
-        "work": work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
-    }
     if isinstance(scene.memory, WaveMemory):
         products = scene.memory.products(state.memory, memory.field, trial.rule)
-        step = trial.length, trial.rule
-        return energy.by_products(state.energy, scene.memory, state.memory, *step, products, **circumstances)
-    assert isinstance(scene.memory, Modes)
-    assert before.unit_displacement is not None
-    assert now.unit_displacement is not None
+    else:
+        assert isinstance(scene.memory, Modes)
+        start, end = state.now.unit_displacement, trial.instant.unit_displacement
+        assert start is not None
+        assert end is not None
+        pressed = trial.instant.contact, end
+        products = energy.inner_products(
+            scene.memory, state.memory, trial.rule, start, pressed, scene.operator.cell_area
+        )
     return energy.after_step(
         state.energy,
         scene.memory,
         state.memory,
         trial.length,
         trial.rule,
-        before.unit_displacement,
-        (now.contact, now.unit_displacement),
-        scene.operator.cell_area,
-        **circumstances,
+        products,
+        fresh=state.before is None,
+        jumped=state.unresolved,
+        work=work_while_held(state, trial) if scene.is_viscoelastic and trial.length > 0 else None,
     )
 
 

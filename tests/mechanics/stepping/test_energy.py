@@ -49,7 +49,8 @@ def carried(material, fields, lengths, rule, acts_on="displacement", boundary="f
     for number, (length, start, end) in enumerate(zip(lengths, *zip(*pairwise(pairs), strict=True), strict=True)):
         now = "euler" if rule == "bdf2" and number == 0 else rule
         held = Sparse.whole(end[0]), end[1]
-        found = energy.after_step(found, memory, state, length, now, start[1], held, AREA, fresh=fresh)
+        products = energy.inner_products(memory, state, now, start[1], held, AREA)
+        found = energy.after_step(found, memory, state, length, now, products, fresh=fresh)
         kept = {"displacement": end[1], "pressure": end[0], "both": np.stack(end)}[acts_on]
         state = memory.advance(state, length, now, kept)
     return found
@@ -151,9 +152,9 @@ def test_step_that_stands_for_a_jump__works_as_a_held_load():
     rest, pressure = pressures(1)
     state = memory.start(SHAPE)
     ends = rest, (Sparse.whole(pressure), operator.displacement(pressure))
-    found = energy.after_step(
-        energy.at_rest(memory), memory, state, step, "euler", *ends, AREA, fresh=True, jumped=True
-    )
+    products = energy.inner_products(memory, state, "euler", *ends, AREA)
+    at_rest = energy.at_rest(memory)
+    found = energy.after_step(at_rest, memory, state, step, "euler", products, fresh=True, jumped=True)
     crept = 0.25 * (sum(c * step / (tau + step) for c, tau in ((1.0, 0.3), (0.4, 2.0))) + 0.2 * step)
     work = crept * AREA * pressure.ravel() @ dense() @ pressure.ravel()
     assert found.stored + found.dissipated == pytest.approx(work, rel=1e-12)
