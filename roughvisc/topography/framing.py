@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -13,17 +13,23 @@ from roughvisc.topography.blocks import mean_of, row_blocks
 from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
+    filled_points,
     like,
     noted,
+    number,
     pair,
     require_heights,
     spacing,
     taper_weights,
     with_coordinates,
+    with_filled_points,
     with_taper_weights,
 )
-from roughvisc.topography.laying import laid_on
+from roughvisc.topography.resampling import Cells, lay_on_cells, marked
 from roughvisc.units import Quantity, quantities
+
+#: Part of a cell by which rounding may move a border of two faces.
+_ON_BORDER = 1e-9
 
 
 @quantities(x="m", y="m")
@@ -87,13 +93,11 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
     axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
-    weights = taper_weights(h)
+    weights, filled = taper_weights(h), filled_points(h)
     for _ in range(turns % 4 if weights is not None else 0):
         weights = weights[1][::-1], weights[0]
-    grid = with_taper_weights(with_coordinates(heights, *axes, h.attrs), weights)
-    if "filled" in h.coords:
-        turned = np.rot90(h["filled"].transpose("x", "y").values, turns)
-        grid = grid.assign_coords(filled=(("x", "y"), turned, h["filled"].attrs))
+    filled = None if filled is None else np.rot90(filled, turns)
+    grid = with_coordinates(heights, *axes, h.attrs, taper=weights, filled=filled)
     kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
     return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
 
@@ -173,7 +177,7 @@ def combine(
     h2 = h2 if flip is None else _reversed(h2, flip)
     line += f", reversed along {flip}" if flip else ""
     if align == "centre":
-        h1, h2, way = laid_on(h1, h2, offset)
+        h1, h2, way = _laid_on(h1, h2, offset)
         apart = ", ".join(f"{float(d):.6g}" for d in offset)
         line += f", its centre ({apart}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
         line += f", {way}"
@@ -187,16 +191,62 @@ def combine(
         both.attrs["missing"] = "absent"
     tapers = taper_weights(h1), taper_weights(h2)
     both = with_taper_weights(both, None if None in tapers else tuple(map(np.maximum, *tapers)))
-    marks = [_filled(h1), _filled(h2)]
-    if marks[0].any() or marks[1].any():
-        attrs = next(h["filled"].attrs for h in (h1, h2) if "filled" in h.coords)
-        both = both.assign_coords(filled=(("x", "y"), marks[0] | marks[1], attrs))
+    marks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
+    both = with_filled_points(both, np.logical_or.reduce(marks) if marks else None)
     methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
     return noted(
         both,
         line + (f"; the second face: {about}" if about else ""),
         **({"fill_method": ", ".join(methods)} if methods else {}),
     )
+
+
+def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataArray, xr.DataArray, str]:
+    """Both faces on those cells of the first that the second covers wholly, laid centre on centre.
+
+    Parameters
+    ----------
+    h1, h2 : xarray.DataArray
+        Heights over (x, y). [m]
+    offset : pair of float
+        How far the second's centre lies from that of the first, along x and y. [m]
+
+    Returns
+    -------
+    first, second : xarray.DataArray
+        On the coordinates of the first. The second is averaged by area where its cells are not larger than those of the
+        first, and by cubic spline between its cell centres where they are (linear, if points of it are missing). [m]
+    way : str
+        Which of these it was.
+
+    Raises
+    ------
+    InputError
+        If the offset is no pair of numbers, or fewer than two cells are covered along an axis.
+    """
+    if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
+        raise InputError(f"combine: offset is {offset!r}: expected a pair of lengths, along x and along y [m]")
+    apart = [number("offset", d, "m", low=-np.inf) for d in offset]
+    kept, cells = {}, []
+    for axis, d1, d2, by in zip(("x", "y"), spacing(h1), spacing(h2), apart, strict=True):
+        n1, n2 = h1.sizes[axis], h2.sizes[axis]
+        lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
+        side = d1 / d2
+        covered = (lower >= -_ON_BORDER) & (lower + side <= n2 + _ON_BORDER)
+        if covered.sum() < 2:
+            raise InputError(
+                f"combine: the second face covers {covered.sum()} of {n1} cells of the first along {axis}: they are "
+                f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected two cells at least"
+            )
+        kept[axis] = covered
+        cells.append(Cells(lower[covered], side, n2))
+    first = h1.isel(kept)
+    heights, way = lay_on_cells(h2, *cells)
+    weights = taper_weights(h2)
+    if weights is not None:
+        weights = cells[0].weights() @ weights[0], cells[1].weights() @ weights[1]
+    x, y = (first[axis].values for axis in ("x", "y"))
+    return first, with_coordinates(heights, x, y, h2.attrs, taper=weights, filled=marked(h2, *cells)), way
 
 
 def _absent_only(h: xr.DataArray) -> bool:
@@ -220,11 +270,6 @@ def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
 def _reversed(h: xr.DataArray, axis: str) -> xr.DataArray:
     """The heights and marks in the opposite order along an axis whose coordinate stays. [m]"""
     return h.isel({axis: slice(None, None, -1)}).assign_coords({axis: h[axis]})
-
-
-def _filled(h: xr.DataArray) -> np.ndarray:
-    """Mask of the points that were filled in."""
-    return h["filled"].transpose("x", "y").values if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
 
 
 @quantities(width="m")

@@ -45,16 +45,40 @@ def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] |
     return with_coordinates(values, x, y, attrs)
 
 
-def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] | None = None) -> xr.DataArray:
-    """Height over the given coordinates of the cell centres [m], with the declared attributes."""
-    declared = VARIABLES["height"].attributes()
-    return xr.DataArray(
+def with_coordinates(
+    values: np.ndarray,
+    x: Any,
+    y: Any,
+    attrs: dict[str, Any] | None = None,
+    *,
+    taper: tuple[np.ndarray, np.ndarray] | None = None,
+    filled: np.ndarray | None = None,
+) -> xr.DataArray:
+    """Height over the given coordinates of the cell centres, with the declared attributes.
+
+    Parameters
+    ----------
+    values : ndarray, shape (nx, ny)
+        Heights. [m]
+    x, y : array_like
+        Cell centres. [m]
+    attrs : dict, optional
+        Attributes beside the declared ones.
+    taper : pair of ndarray, optional
+        Weights along each axis, see :func:`taper_weights`. [-]
+    filled : ndarray of bool, shape (nx, ny), optional
+        See :func:`filled_points`.
+    """
+    coordinates = {"x": x, "y": y}
+    h = xr.DataArray(
         values,
-        coords={"x": ("x", x, VARIABLES["x"].attributes()), "y": ("y", y, VARIABLES["y"].attributes())},
+        coords={axis: (axis, at, VARIABLES[axis].attributes()) for axis, at in coordinates.items()},
         dims=("x", "y"),
         name="height",
-        attrs={**declared, **(attrs or {})},
+        attrs={**VARIABLES["height"].attributes(), **(attrs or {})},
     )
+    h = h if taper is None else with_taper_weights(h, taper)
+    return h if filled is None else with_filled_points(h, filled)
 
 
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
@@ -188,6 +212,18 @@ def with_taper_weights(h: xr.DataArray, weights: tuple[np.ndarray, np.ndarray] |
             for name, axis, along in zip(TAPER, ("x", "y"), weights, strict=True)
         }
     )
+
+
+def filled_points(h: xr.DataArray) -> np.ndarray | None:
+    """Mask over (x, y) of the points that were missing and filled in, None if nothing was ever filled."""
+    return h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else None
+
+
+def with_filled_points(h: xr.DataArray, filled: np.ndarray | None) -> xr.DataArray:
+    """The same grid with these points marked as filled in, without any mark if there is no mask."""
+    if filled is None:
+        return h.drop_vars("filled", errors="ignore")
+    return h.assign_coords(filled=(("x", "y"), filled, {"long_name": "height was missing and filled in"}))
 
 
 def resampled_taper(h: xr.DataArray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray] | None:

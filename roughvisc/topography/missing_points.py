@@ -12,8 +12,17 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import FILL, WINDOW
 from roughvisc.topography.blocks import extremes_of, median_of, row_blocks
-from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
-from roughvisc.topography.harmonic import harmonic
+from roughvisc.topography.bridging import harmonic
+from roughvisc.topography.grid import (
+    checked,
+    filled_points,
+    like,
+    noted,
+    number,
+    require_heights,
+    spacing,
+    with_filled_points,
+)
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
@@ -105,12 +114,9 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "ha
     heights = h.values.copy()
     if missing.any():
         heights[missing] = _FILLS[method](h.values, missing, spacing(h))
-    marked = missing | (h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else False)
-    filled = like(h, heights).assign_coords(
-        filled=(("x", "y"), marked, {"long_name": "height was missing and filled in"})
-    )
-    line = f"filled: {int(missing.sum())} missing points, {method}"
-    return noted(filled, line, fill_method=method)
+    before = filled_points(h)
+    marked = with_filled_points(like(h, heights), missing if before is None else missing | before)
+    return noted(marked, f"filled: {int(missing.sum())} missing points, {method}", fill_method=method)
 
 
 def in_large_holes(missing: np.ndarray) -> np.ndarray:

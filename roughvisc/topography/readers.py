@@ -12,7 +12,7 @@ import os
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,8 @@ FARTHEST = 1e3
 _PASS_UNITS = "pass unit= (such as unit='um'; or unit='mm', height_unit='um' where they differ)"
 _PASS_UNIT, _PASS_SPACING = "pass unit= (such as unit='um')", "pass spacing=(dx, dy) [m]"
 _READER = threading.RLock()
+#: Format of the grid files that are read through xarray.
+_GRID = "nc"
 
 
 def read_file(
@@ -59,9 +61,16 @@ def read_file(
     given = {"unit": unit, "height_unit": height_unit}
     units = _Units(*(None if one is None else quantity(f"1 {one}", "m", key) for key, one in given.items()))
     sides = None if spacing is None else pair("spacing", spacing)
-    read = _from_grid if _is_grid(path, format) else _from_instrument
     before = path.stat()
-    h, opened, chosen = read(path, format, channel, units, sides, heights)
+    with _reading(path), closing(_opened(path, format)) as opened:
+        chosen = _chosen(opened, channel)
+        _check_units(opened, chosen, units, sides)
+        if opened.format == _GRID:
+            h = checked(gridfiles.open_grid(path, chosen, units.lateral, units.heights, sides, heights), "grid")
+        else:
+            h = _labelled(opened, chosen, units, sides, heights)
+    for complaint in opened.complaints:
+        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
     now = path.stat()
@@ -132,11 +141,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
         If the file is absent, damaged or of an unknown format.
     """
     path = existing(path)
-    with _reading(path):
-        if _is_grid(path, format):
-            return gridfiles.grid_channels(path)
-        opened = instruments.open_instrument(path, format)
-        opened.close()
+    with _reading(path), closing(_opened(path, format)) as opened:
         return opened.channels
 
 
@@ -163,50 +168,27 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _from_instrument(
-    path: Path,
-    format: str | None,
-    channel: Any,
-    units: _Units,
-    sides: tuple[float, float] | None,
-    heights: bool,
-) -> tuple[xr.DataArray, Opened, Channel]:
-    with _reading(path):
-        opened = instruments.open_instrument(path, format)
-        try:
-            chosen = _chosen(opened, channel)
-            _check_units(opened, chosen, units, sides)
-            lateral, vertical = units.lateral, units.vertical
-            found = None if heights else sides or opened.sides(chosen, lateral)
-            values = np.broadcast_to(np.nan, chosen.shape)
-            if found is None:  # a few headers do not tell: their files are read for it
-                values, found = opened.load(chosen, vertical)
-                if sides is None and found is not None and lateral != vertical:
-                    found = opened.sides(chosen, lateral) or opened.load(chosen, lateral)[1]
-        finally:
-            opened.close()
-        if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
-            raise InputError(f"it states no size: {_PASS_SPACING}")
-        h = labelled(values, sides or found)
-    for complaint in opened.complaints:
-        warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
-    return h, opened, chosen
+def _opened(path: Path, format: str | None) -> Opened:
+    """Header of an instrument file or of a grid file, which is not left open."""
+    if _is_grid(path, format):
+        return Opened(_GRID, gridfiles.grid_channels(path), load=lambda *_: (np.empty(0), (1.0, 1.0)))
+    return instruments.open_instrument(path, format)
 
 
-def _from_grid(
-    path: Path,
-    format: str | None,
-    channel: Any,
-    units: _Units,
-    sides: tuple[float, float] | None,
-    heights: bool,
-) -> tuple[xr.DataArray, Opened, Channel]:
-    with _reading(path):
-        opened = Opened("nc", gridfiles.grid_channels(path), load=lambda *_: (np.empty(0), (1.0, 1.0)))
-        chosen = _chosen(opened, channel)
-        _check_units(opened, chosen, units, sides)
-        h = gridfiles.open_grid(path, chosen, units.lateral, units.heights, sides, heights)
-        return checked(h, "grid"), opened, chosen
+def _labelled(
+    opened: Opened, chosen: Channel, units: _Units, sides: tuple[float, float] | None, heights: bool
+) -> xr.DataArray:
+    """Grid of one channel of an instrument file. [m]"""
+    lateral, vertical = units.lateral, units.vertical
+    found = None if heights else sides or opened.sides(chosen, lateral)
+    values = np.broadcast_to(np.nan, chosen.shape)
+    if found is None:  # a few headers do not tell: their files are read for it
+        values, found = opened.load(chosen, vertical)
+        if sides is None and found is not None and lateral != vertical:
+            found = opened.sides(chosen, lateral) or opened.load(chosen, lateral)[1]
+    if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
+        raise InputError(f"it states no size: {_PASS_SPACING}")
+    return labelled(values, sides or found)
 
 
 def _chosen(opened: Opened, channel: int | str | None) -> Channel:
@@ -287,9 +269,8 @@ def existing(path: Any) -> Path:
 def _is_grid(path: Path, format: str | None) -> bool:
     suffix = path.suffix.lower().removeprefix(".")
     if format is None and suffix == "h5":  # a grid written by way of HDF5, or an instrument's
-        with _reading(path):
-            return gridfiles.is_labelled(path)
-    return format == "nc" or (format is None and suffix in instruments.OWN_SUFFIXES["nc"])
+        return gridfiles.is_labelled(path)
+    return format == _GRID or (format is None and suffix in instruments.OWN_SUFFIXES[_GRID])
 
 
 @contextmanager

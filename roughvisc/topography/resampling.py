@@ -21,13 +21,13 @@ from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
     counts,
+    filled_points,
     like,
     noted,
     number,
     resampled_taper,
     spacing,
     with_coordinates,
-    with_taper_weights,
 )
 from roughvisc.topography.missing_points import fill
 from roughvisc.units import Quantity, quantities
@@ -297,10 +297,10 @@ def lay_on_cells(h: xr.DataArray, along_x: Cells, along_y: Cells) -> tuple[np.nd
 
 def marked(h: xr.DataArray, along_x: Cells, along_y: Cells) -> np.ndarray | None:
     """Cells in which a point that was filled in has a part; None if the surface does not know of such points."""
-    if "filled" not in h.coords:
+    filled = filled_points(h)
+    if filled is None:
         return None
-    filled = h["filled"].transpose("x", "y").values.astype(float)
-    return _along_both(filled, _means(along_x), _means(along_y)) > 0
+    return _along_both(filled.astype(float), _means(along_x), _means(along_y)) > 0
 
 
 def _is_complete(h: xr.DataArray) -> bool:
@@ -401,9 +401,7 @@ def _on_cells(
     axes = []
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, heights.shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
-    grid = with_taper_weights(with_coordinates(heights, *axes, h.attrs), resampled_taper(h, heights.shape))
-    if filled is not None:
-        grid = grid.assign_coords(filled=(("x", "y"), filled, h["filled"].attrs))
+    grid = with_coordinates(heights, *axes, h.attrs, taper=resampled_taper(h, heights.shape), filled=filled)
     stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
     line = f"{done}: {h.shape[0]} x {h.shape[1]} to {heights.shape[0]} x {heights.shape[1]} cells, {way}"
     return noted(grid, line, **stated)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import xarray as xr
 
@@ -60,29 +61,21 @@ def open_scan(
     UserWarning
         If the checksum in an X3P file is wrong.
     """
-    options = {"format": format, "channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
-    return outline(path, heights=True, **options)
+    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
+    return outline(path, heights=True, format=format, **options)
 
 
 def outline(
-    path: str | os.PathLike[str],
-    *,
-    heights: bool = False,
-    format: str | None = None,
-    channel: int | str | None = None,
-    unit: str | None = None,
-    height_unit: str | None = None,
-    spacing: float | tuple[float, float] | None = None,
+    path: str | os.PathLike[str], *, heights: bool = False, format: str | None = None, **options: Any
 ) -> xr.DataArray:
     """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
 
     The heights are NaN that take no memory. A surface card is conditioned, which needs its heights: they are there.
     """
     path = existing(path)
-    if is_card(path, format):
-        h = open_card(path, channel=channel, unit=unit, height_unit=height_unit, spacing=spacing)
-        if heights:
-            finite(h, str(path))
-        return h
-    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
-    return read_file(path, heights=heights, format=format, **options)
+    if not is_card(path, format):
+        return read_file(path, heights=heights, format=format, **options)
+    h = open_card(path, **options)
+    if heights:
+        finite(h, str(path))
+    return h

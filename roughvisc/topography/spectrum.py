@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.blocks import column_blocks, count_of, mean_of, row_blocks
 from roughvisc.topography.bridging import bridged
-from roughvisc.topography.grid import checked, like, spacing
+from roughvisc.topography.grid import checked, filled_points, like, spacing
 from roughvisc.topography.missing_points import in_large_holes
 
 #: Share of the points that may be bridged.
@@ -202,9 +202,9 @@ def unmeasured(h: xr.DataArray) -> np.ndarray:
 
     What instruments give inside a large hole and on its rim is wrong more often than not.
     """
-    missing = np.isnan(h.values)
-    if "filled" in h.coords:
-        missing |= h["filled"].transpose("x", "y").values.astype(bool)
+    missing, filled = np.isnan(h.values), filled_points(h)
+    if filled is not None:
+        missing |= filled
     return missing | scipy.ndimage.binary_dilation(in_large_holes(missing)) if missing.any() else missing
 
 

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from strategies import examples
 
 import roughvisc as rv
-from roughvisc.topography import blocks, borders, harmonic, inspection, missing_points, parameters, writers
+from roughvisc.topography import blocks, borders, bridging, inspection, missing_points, parameters, writers
 
 #: Heights of a map with missing points, some of them alike.
 maps = arrays(
@@ -79,7 +79,7 @@ def test_conditioning__in_blocks_is_that_in_one_go(step, monkeypatch):
     h = scan()
     whole = step(h)
     monkeypatch.setattr(blocks, "BLOCK", 8 * 29 * 3)
-    monkeypatch.setattr(harmonic, "_AT_ONCE", 5)
+    monkeypatch.setattr(bridging, "_AT_ONCE", 5)
     monkeypatch.setattr(missing_points, "_AT_ONCE", 81 * 29 * 3)
     cut = step(h)
     np.testing.assert_allclose(cut.values, whole.values, rtol=0, atol=1e-12 * np.nanmax(np.abs(h.values)))
@@ -135,9 +135,9 @@ def test_harmonic__is_flat_over_a_plane_and_holes_do_not_know_of_each_other(monk
     for place in (np.s_[2:5, 2:4], np.s_[8, 6], np.s_[7, 5], np.s_[5:7, 5:8]):
         holed[place] = np.nan
     for most in (1, 4, 1000):
-        monkeypatch.setattr(harmonic, "_AT_ONCE", most)
+        monkeypatch.setattr(bridging, "_AT_ONCE", most)
         missing = np.isnan(holed)
-        np.testing.assert_allclose(harmonic.harmonic(holed, missing), plane[missing], rtol=1e-13)
+        np.testing.assert_allclose(bridging.harmonic(holed, missing), plane[missing], rtol=1e-13)
 
 
 @examples(20)
@@ -152,8 +152,8 @@ def test_harmonic__is_that_of_surface_topography(seed, most):
     masked = np.ma.masked_invalid(heights)
     expected = topography.Topography(masked, heights.shape).interpolate_undefined_data().heights()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(harmonic, "_AT_ONCE", most)
-        found = harmonic.harmonic(heights, missing)
+        patch.setattr(bridging, "_AT_ONCE", most)
+        found = bridging.harmonic(heights, missing)
     np.testing.assert_allclose(found, np.asarray(expected)[missing], rtol=0, atol=1e-12)
 
 
