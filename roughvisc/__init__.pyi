@@ -25,8 +25,8 @@ from roughvisc.mechanics.materials.models import kelvin_voigt as kelvin_voigt
 from roughvisc.mechanics.materials.models import maxwell as maxwell
 from roughvisc.mechanics.materials.models import pair as pair
 from roughvisc.mechanics.materials.models import zener as zener
+from roughvisc.mechanics.materials.scaled import shifted as shifted
 from roughvisc.mechanics.materials.temperature import arrhenius_shift as arrhenius_shift
-from roughvisc.mechanics.materials.temperature import shifted as shifted
 from roughvisc.mechanics.materials.temperature import wlf_shift as wlf_shift
 from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.settings import Numerics as Numerics

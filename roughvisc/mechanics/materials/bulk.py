@@ -9,7 +9,7 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.secular import merged, secular_roots
+from roughvisc.mechanics.materials.secular import secular_roots
 
 
 def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
@@ -35,9 +35,7 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
     of ``1/(3K) + J_0 - phi/m + sum J_i r_i / (r_i - m)``.
     """
     check_number("bulk_modulus", bulk_modulus, "Pa")
-    weights, rates = merged(shear.compliances, shear.times)
-    poles = np.append(0.0, rates) if shear.fluidity else rates
-    strengths = np.append(shear.fluidity, weights * rates) if shear.fluidity else weights * rates
+    strengths, poles = shear.poles()
     volume = 1 / (3 * bulk_modulus)
     compliances, times = list(shear.compliances), list(shear.times)
     for rate, offsets in secular_roots(strengths, poles, volume + shear.glassy):

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -212,8 +212,8 @@ def from_dynamic(
 
 
 @dataclass(frozen=True, eq=False)
-class _Offer:
-    """Terms that are offered to the rows of a measurement.
+class _Spectrum:
+    """Terms that are offered to the rows of a measurement, and those that are used.
 
     ``at`` tells where a datum was measured: data with the same value are one row. ``steps`` weighs those from term to
     term beside the misfit.
@@ -226,7 +226,7 @@ class _Offer:
     at: Array
     steps: float = 0.0
 
-    def moduli(self, kept: NDArray[np.bool_] | slice = slice(None)) -> Array:
+    def fitted(self, kept: NDArray[np.bool_] | slice = slice(None)) -> Array:
         """Moduli of the terms that come nearest to the data that are kept, the equilibrium modulus first. [Pa]"""
         matrix = self.columns[kept] / self.scale[kept, None]
         between = np.diff(np.eye(self.theta.size), axis=0) * (self.steps / np.max(self.target))
@@ -234,32 +234,26 @@ class _Offer:
         wanted = np.append(self.target[kept] / self.scale[kept], np.zeros(self.theta.size - 1))
         return nonnegative(matrix, wanted, np.ones(wanted.size))
 
-    def spectrum(self) -> _Spectrum:
-        """The moduli for all data."""
-        moduli = self.moduli()
-        return _Spectrum(self, moduli, (self.columns @ moduli - self.target) / self.scale)
+    @cached_property
+    def moduli(self) -> Array:
+        """The moduli for all data. [Pa]"""
+        return self.fitted()
 
-    def material(self, moduli: Array, poisson: float) -> Prony:
-        """The material of some moduli."""
-        used = np.flatnonzero(moduli[1:])
-        return from_relaxation(float(moduli[0]), moduli[1:][used].tolist(), self.theta[used].tolist(), poisson)
+    @cached_property
+    def misfit(self) -> Array:
+        """Relative misfit of each datum."""
+        return (self.columns @ self.moduli - self.target) / self.scale
 
-    def from_rows(self, poisson: float, rows: NDArray[np.bool_]) -> Prony:
-        """The material from some of the rows, in the order of where they were measured."""
-        return self.material(self.moduli(np.isin(self.at, np.unique(self.at)[rows])), poisson)
-
-
-@dataclass(frozen=True)
-class _Spectrum:
-    """Moduli of the terms offered [Pa], the equilibrium modulus first, and the relative misfit of each datum.
-
-    ``between`` is the largest error of rows predicted from the others.
-    """
-
-    offer: _Offer
-    moduli: Array
-    misfit: Array
-    between: float = math.nan
+    @cached_property
+    def between(self) -> float:
+        """Largest error of rows predicted from the others, those at the ends excepted; missing without such rows."""
+        inner = np.unique(self.at)[1:-1]
+        errors = []
+        for row in inner[:: math.ceil(inner.size / _LEFT_OUT) or 1]:
+            out = self.at == row
+            error = (self.columns[out] @ self.fitted(~out) - self.target[out]) / self.scale[out]
+            errors.append(float(np.abs(error).max()))
+        return max(errors, default=math.nan)
 
     @property
     def terms(self) -> int:
@@ -269,17 +263,27 @@ class _Spectrum:
     def rms(self) -> float:
         return float(np.sqrt(np.mean(self.misfit**2)))
 
+    def series(self, moduli: Array, poisson: float) -> Prony:
+        """The material of some moduli."""
+        used = np.flatnonzero(moduli[1:])
+        return from_relaxation(float(moduli[0]), moduli[1:][used].tolist(), self.theta[used].tolist(), poisson)
+
+    def from_rows(self, poisson: float, rows: NDArray[np.bool_]) -> Prony:
+        """The material from some of the rows, in the order of where they were measured."""
+        return self.series(self.fitted(np.isin(self.at, np.unique(self.at)[rows])), poisson)
+
     def material(
         self, rows: int, span: str, poisson: float, measured: tuple[float, float], odds: Disagreement | None = None
     ) -> Prony:
+        """The material from all rows, with what is to be said of the fit."""
         misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
         if not math.isnan(self.between):
             misfit += f", error between rows up to about {self.between:.2g} (rows predicted from the others)"
         note = f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}"
         complaint, off = ("", 0.0) if odds is None else (odds.note, odds.together)
-        fit = Fit(partial(self.offer.from_rows, poisson), np.unique(self.offer.at).size, measured, complaint, off)
+        fit = Fit(partial(self.from_rows, poisson), np.unique(self.at).size, measured, complaint, off)
         note = f"{note}; {complaint}" if complaint else note
-        return dataclasses.replace(self.offer.material(self.moduli, poisson), note=note, fit=fit)
+        return dataclasses.replace(self.series(self.moduli, poisson), note=note, fit=fit)
 
 
 def _sparsest(
@@ -289,24 +293,12 @@ def _sparsest(
 
     def offered(per_decade: float, steps: float = 0.0) -> _Spectrum:
         theta = lattice(*within, per_decade)
-        return _Offer(theta, columns(theta), target, scale, at, steps).spectrum()
-
-    def predicted(one: _Spectrum) -> _Spectrum:
-        """With the largest error of rows predicted from the others, those at the ends excepted."""
-        inner = np.unique(at)[1:-1]
-        if inner.size == 0:
-            return one
-        worst = 0.0
-        for row in inner[:: math.ceil(inner.size / _LEFT_OUT)]:
-            out = at == row
-            error = (one.offer.columns[out] @ one.offer.moduli(~out) - target[out]) / scale[out]
-            worst = max(worst, float(np.abs(error).max()))
-        return dataclasses.replace(one, between=worst)
+        return _Spectrum(theta, columns(theta), target, scale, at, steps)
 
     found = [offered(per_decade) for per_decade in _PER_DECADE]
     enough = max(_ALLOWED * min(one.rms for one in found), _ACCURATE)
-    sparse = predicted(min((one for one in found if one.rms <= enough), key=lambda one: one.terms))
+    sparse = min((one for one in found if one.rms <= enough), key=lambda one: one.terms)
     if not sparse.between > _ROUGH:
         return sparse
-    smooth = predicted(offered(_SMOOTH_PER_DECADE, _STEPS))
+    smooth = offered(_SMOOTH_PER_DECADE, _STEPS)
     return smooth if smooth.rms <= max(2 * enough, _ROUGH / 10) and smooth.between < sparse.between / 2 else sparse

@@ -9,15 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
-from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
 @quantities(glassy="1/Pa", coefficient="1/Pa", time_scale="s")
-@dataclass(frozen=True)
-class PowerLaw:
+@dataclass(frozen=True, repr=False)
+class PowerLaw(PrintedAsBuilt):
     r"""Power-law creep.
 
     .. math:: J(t) = J_0 + c \, (t/T)^\alpha
@@ -63,12 +63,6 @@ class PowerLaw:
         check_poisson(self.poisson)
         if not 0 < self.exponent < 1:
             raise InputError(f"exponent is {self.exponent!r}: expected a number above 0 and below 1")
-
-    def __repr__(self) -> str:
-        return str(self._built())
-
-    def _repr_html_(self) -> str:
-        return self._built().html()
 
     def _built(self) -> Built:
         """With readable units."""

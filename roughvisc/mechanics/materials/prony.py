@@ -14,15 +14,15 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.fit import AnyFit
 from roughvisc.mechanics.materials.secular import merged, secular_roots
-from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
 @quantities(glassy="1/Pa", fluidity="1/(Pa s)", compliances="1/Pa", times="s")
-@dataclass(frozen=True)
-class Prony:
+@dataclass(frozen=True, repr=False)
+class Prony(PrintedAsBuilt):
     r"""Exponential (Prony) series of the shear creep compliance.
 
     .. math:: J(t) = J_0 + \varphi t + \sum_i J_i \left(1 - e^{-t/\tau_i}\right)
@@ -74,12 +74,6 @@ class Prony:
         check_poisson(self.poisson)
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
             raise InputError("all compliances are zero: a rigid material cannot be pressed")
-
-    def __repr__(self) -> str:
-        return str(self._built())
-
-    def _repr_html_(self) -> str:
-        return self._built().html()
 
     def _built(self) -> Built:
         """As springs and dashpots where it is a model of few of them, else as the series."""
@@ -158,13 +152,19 @@ class Prony:
         """
         if self.glassy == 0:
             raise InputError("a material without instantaneous compliance has no finite relaxation modulus")
-        weights, rates = merged(self.compliances, self.times)
-        poles = np.append(0.0, rates) if self.fluidity else rates
-        strengths = np.append(self.fluidity, weights * rates) if self.fluidity else weights * rates
+        strengths, poles = self.poles()
         roots = secular_roots(strengths, poles, self.glassy)
         moduli = np.array([1 / (rate * float(np.sum(strengths / offset**2))) for rate, offset in roots])
-        equilibrium = 0.0 if self.fluidity else 1 / (self.glassy + float(np.sum(weights)))
+        retarded = float(np.sum(merged(self.compliances, self.times)[0]))
+        equilibrium = 0.0 if self.fluidity else 1 / (self.glassy + retarded)
         return equilibrium, moduli, np.array([1 / rate for rate, _ in roots])
+
+    def poles(self) -> tuple[Array, Array]:
+        """Strengths and poles of the transformed compliance, ``J^(s) = J_0 + sum strengths / (poles + s)``. [1/s]"""
+        weights, rates = merged(self.compliances, self.times)
+        if self.fluidity:
+            return np.append(self.fluidity, weights * rates), np.append(0.0, rates)
+        return weights * rates, rates
 
 
 # (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding

@@ -103,7 +103,12 @@ def series_of(material: Material, shortest: float, longest: float, tolerance: fl
         error = measured_error(pressed, joined, _instants(pressed, shortest, longest))
         repair = "; ".join(f"{name}: {part.repair}" for name, part in zip("ab", parts, strict=True) if part.repair)
         return Series(joined, error, shortest, pressed, repair)
-    return sampled_series(complete(material), shortest, longest, tolerance)
+    material = complete(material)
+    check_creep(material, _instants(material, shortest, longest))
+    found = _fitted(material, shortest, longest, tolerance)
+    if found.error > tolerance:
+        return replace(found, repair="no positive series comes nearer: the material is not passive")
+    return found
 
 
 def power_law_series(material: PowerLaw, shortest: float, longest: float, tolerance: float) -> Series:
@@ -149,41 +154,17 @@ def table_series(material: Tabulated, shortest: float, longest: float, tolerance
     return _fitted(material, min(max(shortest, first_time(material)), longest), longest, tolerance)
 
 
-def sampled_series(material: Material, shortest: float, longest: float, tolerance: float) -> Series:
-    """Series for any creep compliance, fitted as a table's to as many samples as its error is measured at.
-
-    Parameters and errors as in :func:`series_of`.
-    """
-    _check_range(shortest, longest, tolerance)
-    check_creep(material, _instants(material, shortest, longest))
-    found = _fitted(_Sampled(material), shortest, longest, tolerance)
-    if found.error > tolerance:
-        return replace(found, repair="no positive series comes nearer: the material is not passive")
-    return found
+def _creep(material: Material, t: ArrayLike) -> Array:
+    """Shear creep compliance; of a material of the user's own from the contact compliance. [1/Pa]"""
+    if isinstance(material, PowerLaw | Tabulated):
+        return material.creep_compliance(t)
+    return np.asarray(2 / (1 - material.poisson) * material.contact_compliance(t))
 
 
-@dataclass(frozen=True)
-class _Sampled:
-    """A material by its contact compliance alone."""
-
-    material: Material
-
-    @property
-    def poisson(self) -> float:
-        return self.material.poisson
-
-    def creep_compliance(self, t: ArrayLike) -> Array:
-        return np.asarray(2 / (1 - self.poisson) * self.contact_compliance(t))
-
-    def contact_compliance(self, t: ArrayLike) -> Array:
-        return self.material.contact_compliance(t)
-
-
-def _fitted(material: Tabulated | _Sampled, shortest: float, longest: float, tolerance: float) -> Series:
+def _fitted(material: Material, shortest: float, longest: float, tolerance: float) -> Series:
     """Non-negative least squares on ever finer lattices of retardation times."""
     times = _instants(material, shortest, longest)
-    exact = np.asarray(material.creep_compliance(times))
-    glassy = float(material.creep_compliance(0.0))
+    exact, glassy = _creep(material, times), float(_creep(material, 0.0))
     seen = exact > 0
     best = _unfit(material, longest)
     for faster in _FASTER:
@@ -205,7 +186,7 @@ def _fitted(material: Tabulated | _Sampled, shortest: float, longest: float, tol
     return best
 
 
-def measured_error(material: Material | _Sampled, prony: Prony, times: Array) -> float:
+def measured_error(material: Material, prony: Prony, times: Array) -> float:
     """Largest ``|C~ - C| / C`` at the times, infinite where only the series is not zero. [s]"""
     exact = np.asarray(material.contact_compliance(times))
     deviation = np.abs(np.asarray(prony.contact_compliance(times)) - exact)
@@ -214,15 +195,13 @@ def measured_error(material: Material | _Sampled, prony: Prony, times: Array) ->
     return float(relative.max())
 
 
-def _measured(material: Material | _Sampled, prony: Prony, times: Array) -> Series:
-    pressed = material.material if isinstance(material, _Sampled) else material
-    return Series(prony, measured_error(material, prony, times), float(times[0]), pressed)
+def _measured(material: Material, prony: Prony, times: Array) -> Series:
+    return Series(prony, measured_error(material, prony, times), float(times[0]), material)
 
 
-def _unfit(material: PowerLaw | Tabulated | _Sampled, longest: float) -> Series:
+def _unfit(material: Material, longest: float) -> Series:
     """What any series is better than."""
-    pressed = material.material if isinstance(material, _Sampled) else material
-    return Series(Prony(max(float(material.creep_compliance(longest)), 1e-300)), math.inf, longest, pressed)
+    return Series(Prony(max(float(_creep(material, longest)), 1e-300)), math.inf, longest, material)
 
 
 def _better(found: Series, best: Series, tolerance: float) -> bool:
@@ -232,13 +211,13 @@ def _better(found: Series, best: Series, tolerance: float) -> bool:
     return found.error < best.error
 
 
-def _instants(material: Material | _Sampled, shortest: float, longest: float) -> Array:
+def _instants(material: Material, shortest: float, longest: float) -> Array:
     """Where the error is measured: a dense logarithmic grid, and the rows of tables. [s]"""
     rows = [t for t in _rows(material) if shortest < t < longest]
     return np.unique(np.append(lattice(shortest, longest, _DENSE), rows))
 
 
-def _rows(material: Material | _Sampled) -> tuple[float, ...]:
+def _rows(material: Material) -> tuple[float, ...]:
     if isinstance(material, Tabulated):
         return material.times
     return _rows(material.a) + _rows(material.b) if isinstance(material, Pair) else ()
@@ -330,12 +309,12 @@ def _levelled(columns: Array, exact: Array, glassy: float) -> Iterator[Array]:
         importance = importance * np.sqrt(0.02 + misfit / misfit.max())
 
 
-def _from_weights(material: Tabulated | _Sampled, weights: Array, retardation: Array, longest: float) -> Prony:
-    used = np.flatnonzero(weights[1:] > 0)
-    if not weights.any() and not material.creep_compliance(0.0):  # nothing but zeros was seen
+def _from_weights(material: Material, weights: Array, retardation: Array, longest: float) -> Prony:
+    used, glassy = np.flatnonzero(weights[1:] > 0), float(_creep(material, 0.0))
+    if not weights.any() and not glassy:  # nothing but zeros was seen
         return _unfit(material, longest).prony
     return Prony(
-        float(material.creep_compliance(0.0)),
+        glassy,
         float(weights[0]) / longest,
         tuple(weights[1:][used].tolist()),
         tuple(retardation[used].tolist()),

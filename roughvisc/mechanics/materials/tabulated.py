@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
 from roughvisc.mechanics.materials.fit import Fit
-from roughvisc.mechanics.materials.words import Built, as_built
+from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
 @quantities(times="s", compliances="1/Pa")
-@dataclass(frozen=True)
-class Tabulated:
+@dataclass(frozen=True, repr=False)
+class Tabulated(PrintedAsBuilt):
     """Measured shear creep compliance, without a fit.
 
     Between rows the compliance is linear in the logarithm of time; from a first row at time zero it is linear in time.
@@ -97,12 +97,6 @@ class Tabulated:
         kept = np.flatnonzero(rows)
         times, compliances = (tuple(column[row] for row in kept) for column in (self.times, self.compliances))
         return Tabulated(times, compliances, self.noise, self.poisson)
-
-    def __repr__(self) -> str:
-        return str(self._built())
-
-    def _repr_html_(self) -> str:
-        return self._built().html()
 
     def _built(self) -> Built:
         """With readable units; of a long table its ends."""

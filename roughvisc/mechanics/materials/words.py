@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 from roughvisc.notebook import table
@@ -23,9 +23,18 @@ class Built:
     def __str__(self) -> str:
         return f"{self.name}({', '.join(f'{key}={text}' for key, text in self.arguments)})"
 
-    def html(self) -> str:
-        """As a table."""
-        return table(self.name, self.arguments)
+
+class PrintedAsBuilt:
+    """A material whose ``repr`` is the call that builds it, with readable units; a subclass says which call."""
+
+    def _built(self) -> Built:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return str(self._built())
+
+    def _repr_html_(self) -> str:
+        return table(*astuple(self._built()))
 
 
 def as_built(name: str, poisson: float, note: str, **parameters: tuple[Any, str]) -> Built:

@@ -10,7 +10,7 @@ import roughvisc as rv
 from roughvisc.mechanics.materials.fit import Fit
 from roughvisc.mechanics.materials.kramers_kronig import disagreement
 from roughvisc.mechanics.materials.models import from_creep_table, from_dynamic, from_relaxation_table
-from roughvisc.mechanics.materials.temperature import shifted
+from roughvisc.mechanics.materials.scaled import shifted
 
 #: A broad spectrum, a glass transition, and one sharp mode: relaxation times [s], moduli [Pa], equilibrium modulus.
 SPECTRA = {

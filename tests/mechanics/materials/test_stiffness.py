@@ -6,7 +6,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.materials.stiffness import stiffened
+from roughvisc.mechanics.materials.scaled import stiffened
 
 
 class Own:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.mechanics.materials.scaled import Scaled
 from roughvisc.mechanics.materials.series import series_of
-from roughvisc.mechanics.materials.temperature import Shifted
 
 GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)
 
@@ -68,7 +68,7 @@ def test_shifted__keeps_its_kind_so_that_what_knows_the_kind_goes_on():
     for material in MATERIALS[:-1]:
         assert type(rv.shifted(material, 3.0)) is type(material)
     own = rv.shifted(Own(), 3.0)
-    assert isinstance(own, Shifted)
+    assert isinstance(own, Scaled)
     assert own == rv.shifted(Own(), 3.0)
     assert own.poisson == 0.5
     assert series_of(own, 1e-3, 100.0, 1e-4).error <= 1e-4

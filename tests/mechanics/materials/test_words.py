@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from strategies import examples, positive
 
 import roughvisc as rv
-from roughvisc.mechanics.materials.temperature import shifted
+from roughvisc.mechanics.materials.scaled import shifted
 from roughvisc.units import quantity
 
 UNITS = {"modulus": "Pa", "viscosity": "Pa s"}

@@ -25,8 +25,7 @@ from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.bodies.layer import layer
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.checks import tensile_to_shear
-from roughvisc.mechanics.materials.stiffness import stiffened
-from roughvisc.mechanics.materials.temperature import shifted
+from roughvisc.mechanics.materials.scaled import shifted, stiffened
 from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
 from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
 from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE

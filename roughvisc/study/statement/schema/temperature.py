@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.temperature import LARGEST_SHIFT, arrhenius_shift, wlf_shift
+from roughvisc.mechanics.materials.scaled import LARGEST_SHIFT
+from roughvisc.mechanics.materials.temperature import arrhenius_shift, wlf_shift
 from roughvisc.study.statement.schema.entries import measured
 from roughvisc.study.statement.schema.section import refuse
 
