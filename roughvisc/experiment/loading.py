@@ -31,22 +31,27 @@ from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.refusal import least_rows, require_memory
 from roughvisc.experiment.resources import march_bytes
 from roughvisc.experiment.scene import build_scene, kept_times, memory_options, slide_note, snap_to_cells
-from roughvisc.experiment.stated import area_columns, error_columns, is_end_value, meets_tolerance
+from roughvisc.experiment.stated import (
+    area_columns,
+    error_columns,
+    friction_columns,
+    is_end_value,
+    meets_tolerance,
+    staircase_area,
+)
 from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
-from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program, Slid
-from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, State, Step, Trajectory, Uncertainty
+from roughvisc.mechanics.stepping.scene import ControllerState, Instant, State, Step, Trajectory, Uncertainty
 from roughvisc.mechanics.stepping.seed import march_seed
-from roughvisc.mechanics.stepping.step import at_border, segment_number
-from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
+from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
@@ -308,7 +313,7 @@ class LoadingRows(Rows):
             "contact_area_counted": touching,
             "contact_fraction": self.profile.contact_fraction(contact, area),
             "mean_gap": mean_gap,
-            **friction_row(step),
+            **friction_columns(step),
         }
         if self._has_mean_plane:  # separation of the profile's and the undeformed plane in free space [m]
             row["mean_plane_separation"] = self.profile.mean_gap - shown.approach
@@ -329,20 +334,17 @@ class LoadingRows(Rows):
         columns["nominal_pressure"] = columns["force"] / self.profile.nominal_area
         return columns
 
-    def _window(self, facts: dict[str, Any]) -> Window:
-        """The window of the final domain that a row was solved on."""
-        return self.profile.window_at(facts["corner"], facts["shape"])
-
     def settled(self, records: RowStore, number: int) -> dict[str, Any]:
         """What is counted over the domain, where that has grown since the row was found."""
         row, facts = records.plain[number]["row"], records.plain[number]["facts"]
         if tuple(facts["domain"]) == self.profile.window.domain:
             return {}
-        fraction = row["contact_area"] / self._area()
+        dx, dy = self.profile.spacing
+        fraction = row["contact_area"] / (dx * dy * self.profile.height.size)
         if not records.plain[number]["kept"]:  # its pressure is not known any more
             return {"contact_fraction": fraction, "mean_gap": math.nan}
         source = records.arrays(number, "source")["source"]
-        window = self._window(facts)
+        window = self.profile.window_at(facts["corner"], facts["shape"])
         if self.profile.all_present:
             mean_gap = self._mean_gap(window, source, facts["level"])
         else:
@@ -353,7 +355,8 @@ class LoadingRows(Rows):
 
     def field(self, records: RowStore, name: str, number: int, out: Array) -> Array:
         """A field of a row over the final surface, written to ``out``, which holds zeros."""
-        window = self._window(records.plain[number]["facts"])
+        facts = records.plain[number]["facts"]
+        window = self.profile.window_at(facts["corner"], facts["shape"])
         touched = out[window.surface_cells] if name == "pressure" else out  # zeros that stay cost nothing
         if self.profile.mirrored:
             self._fill(records, name, number, window, touched[quarter(touched.shape)])
@@ -424,15 +427,13 @@ class LoadingRows(Rows):
             return step.shown.pressure
         if name == "displacement":
             return step.displacement
-        if name != "gap":
-            raise KeyError(f"a step has no field {name!r}")
-        found = np.empty(contact.shape)
+        gap = np.empty(contact.shape)
 
         def fill(rows: slice) -> None:
-            found[rows] = self._gap(step, contact, rows)
+            gap[rows] = self._gap(step, contact, rows)
 
         over_rows(fill, contact.shape, step.scene.operator.threads)
-        return found
+        return gap
 
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
         """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
@@ -468,8 +469,6 @@ class LoadingRows(Rows):
         for rows, displacement in self._reach(window).rows(arrays["source"]):
             if name == "displacement":
                 out[rows] = displacement
-            elif name != "gap":
-                raise KeyError(f"a row has no field {name!r}")
             else:
                 np.add(displacement, self.profile.gap[rows], out=out[rows])
                 self._clip_gap(out[rows], records.plain[index]["facts"]["level"], rows)
@@ -483,11 +482,6 @@ class LoadingRows(Rows):
         if not self.profile.all_present:
             gap[~self.profile.present[rows]] = np.nan
 
-    def _area(self) -> float:
-        """Of the surface. [m2]"""
-        dx, dy = self.profile.spacing
-        return dx * dy * self.profile.height.size
-
     def _status(self, step: Step, converged: bool, count: int) -> int:
         if not converged:
             meaning = "not_converged"
@@ -498,38 +492,6 @@ class LoadingRows(Rows):
         else:
             meaning = "converged"
         return STATUS_MEANINGS.index(meaning)
-
-
-def friction_row(step: Step) -> dict[str, float]:
-    """Distance, forces and work of an accepted step; empty for a program without slides."""
-    scene, state = step.scene, step.state
-    if not scene.motions:
-        return {}
-    slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
-    pressure, force = step.shown.pressure, step.shown.force
-    friction = tangential_force(scene.operator, pressure, step.displacement, slide)
-    return {
-        "sliding_distance": slid.distance,
-        "friction_force": friction,
-        "friction_coefficient": friction / force if force > 0 else math.nan,
-        "friction_force_across": force_across(scene.operator, pressure, step.displacement, slide),
-        "friction_force_error": step.uncertainty.friction,
-        "friction_work": slid.work,
-    }
-
-
-def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
-    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
-
-    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
-    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
-    """
-    free = ~contact if scene.present is None else scene.present & ~contact
-    periodic, mirrored = scene.operator.boundary == "periodic", scene.operator.mirrored
-    goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
-    # beyond a mirror a cell's neighbour is its image
-    outside = {"before": goes_on and not mirrored, "beyond": goes_on}
-    return staircase(contact, free, scene.operator.cell_area, periodic and not mirrored, **outside)
 
 
 def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:

@@ -74,7 +74,7 @@ class Profile:
         self._missing = missing
         self.kernel = kernel
         self.growths = 0
-        height = _checked(height)
+        height = _checked(height, missing)
         self.mirrored = mirror and is_mirrored(height.values)
         self._lay_out(height)
         #: Area that nominal pressures refer to: that of the surface as it was given. [m2]
@@ -86,14 +86,12 @@ class Profile:
     def _lay_out(self, height: xr.DataArray) -> None:
         self.height = height
         self._can_grow: bool | None = None  # not known yet
-        present = np.isfinite(height.values)
-        _check_missing(height, present, self._missing)
         cells = quarter(height.shape) if self.mirrored else ...
         #: What is solved for: the surface, or the quarter of it at the end of both axes.
         self.domain = height[cells]
         values = self.domain.values
         self._centres = self.domain["x"].values, self.domain["y"].values
-        self.present: NDArray[np.bool_] = present[cells]
+        self.present: NDArray[np.bool_] = np.isfinite(values)
         self.all_present = bool(self.present.all())
         #: Height of the highest point, which on an indenter may lie between the cells. [m]
         self.highest = highest(height)
@@ -150,7 +148,7 @@ class Profile:
             larger = grown(self.height, GROWTH)
             if larger is None or larger.size > MOST_CELLS:
                 return None
-            self._lay_out(_checked(larger))
+            self._lay_out(_checked(larger, self._missing))
         else:
             self.widen_window()
         self.growths += 1
@@ -183,29 +181,22 @@ class Profile:
         return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
 
 
-def _checked(height: xr.DataArray) -> xr.DataArray:
+def _checked(height: xr.DataArray, missing: Missing) -> xr.DataArray:
+    """The surface, if it can be pressed; absent where heights are missing if the settings or the surface say so."""
     height = checked(height, "height", least=1)
     if np.isinf(height.values).any():
         raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
-    return height
-
-
-def is_absent(height: xr.DataArray, missing: str) -> bool:
-    """Whether there is no material where heights are missing: the settings or the surface say so."""
-    return missing == "absent" or height.attrs.get("missing") == "absent"
-
-
-def _check_missing(height: xr.DataArray, present: NDArray[np.bool_], missing: str) -> None:
+    present = np.isfinite(height.values)
     if not present.any():
         raise InputError("height is missing everywhere: expected at least one finite height")
-    absent = is_absent(height, missing)
-    if not present.all() and not absent:
+    if not present.all() and "absent" not in (missing, height.attrs.get("missing")):
         row, column = np.argwhere(~present)[0]
         raise InputError(
             f"height is missing at {np.count_nonzero(~present)} of {present.size} points, the first at cell "
             f"({row}, {column}): fill it (fill = true in a study, rv.fill in Python), or say missing='absent' "
             "if there is no material"
         )
+    return height
 
 
 def uses_window(settings: Settings) -> bool:

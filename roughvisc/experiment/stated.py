@@ -1,14 +1,18 @@
-"""What is stated of a row: how far off its pressure, force, approach, area and energies may be."""
+"""Columns of a row that follow from a step: area and friction, and how far off these and all others may be."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import over_rows
-from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.stepping.scene import Step
+from roughvisc.mechanics.contact.neighbours import area_bounds, staircase
+from roughvisc.mechanics.stepping.program import Slid
+from roughvisc.mechanics.stepping.scene import Scene, Step
 from roughvisc.mechanics.stepping.step import segment_number
+from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
 
 #: What the contact solver's errors of the past leave of a pressure, in units of the tolerance, and of an approach:
 #: measured on rows whose other errors are small (workflows/benchmarks/accuracy.py).
@@ -22,6 +26,20 @@ _SUMMED = 0.5
 _AT_MOST = 3.0
 #: Error of a pressure at the edge of contact, over the mean one.
 _SOLVER_AT_EDGE = 3.0
+
+
+def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
+    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
+
+    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
+    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
+    """
+    free = ~contact if scene.present is None else scene.present & ~contact
+    periodic, mirrored = scene.operator.boundary == "periodic", scene.operator.mirrored
+    goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
+    # beyond a mirror a cell's neighbour is its image
+    outside = {"before": goes_on and not mirrored, "beyond": goes_on}
+    return staircase(contact, free, scene.operator.cell_area, periodic and not mirrored, **outside)
 
 
 def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:
@@ -65,6 +83,24 @@ def area_columns(step: Step, contact: NDArray[np.bool_], counted: float, area: f
     in_doubt, unknown = uncertain_cells(step, contact), step.uncertainty
     lower, upper = area_bounds(counted, area, unknown.inside + in_doubt[0], unknown.outside + in_doubt[1])
     return {"contact_area_solver_lower": float(lower), "contact_area_solver_upper": float(upper)}
+
+
+def friction_columns(step: Step) -> dict[str, float]:
+    """Distance, forces and work of an accepted step; empty for a program without slides."""
+    scene, state = step.scene, step.state
+    if not scene.motions:
+        return {}
+    slide, slid = scene.motions[segment_number(state)], state.slid or Slid()
+    pressure, force = step.shown.pressure, step.shown.force
+    friction = tangential_force(scene.operator, pressure, step.displacement, slide)
+    return {
+        "sliding_distance": slid.distance,
+        "friction_force": friction,
+        "friction_coefficient": friction / force if force > 0 else math.nan,
+        "friction_force_across": force_across(scene.operator, pressure, step.displacement, slide),
+        "friction_force_error": step.uncertainty.friction,
+        "friction_work": slid.work,
+    }
 
 
 def error_columns(step: Step, series_error: float) -> dict[str, float]:
@@ -131,10 +167,10 @@ def meets_tolerance(step: Step, series_error: float) -> bool:
         return False
     if not scene.is_soft:
         return not found["stated_error"] > scene.tolerance
-    since = state.now.time - state.began
-    if state.before is not None and state.now.time - state.before.time < scene.tolerance * since:
+    now, before = state.now, state.before
+    if before is not None and now.time - before.time < scene.tolerance * (now.time - state.began):
         return False
-    if step.control == "approach" and _entered(step):
+    if before is not None and step.control == "approach" and np.any(now.pressure[before.pressure == 0] > 0):
         return False
     return not found["approach_error"] > scene.tolerance * state.largest_approach
 
@@ -154,9 +190,3 @@ def is_end_value(step: Step) -> bool:
     state = step.state
     since = state.began if state.before is None else state.before.time
     return step.control == "load" or not step.scene.lacks_instantaneous_compliance(state.now.time - since)
-
-
-def _entered(step: Step) -> bool:
-    """Whether a cell has come into contact within a step."""
-    before = step.state.before
-    return before is not None and bool(np.any(step.state.now.pressure[before.pressure == 0] > 0))

@@ -7,8 +7,8 @@ import pytest
 from support import simulate_whole
 
 import roughvisc as rv
-from roughvisc.experiment.loading import staircase_area
 from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.stated import staircase_area
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact.neighbours import PERIMETER_CORRECTION
 

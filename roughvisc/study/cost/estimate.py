@@ -13,11 +13,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.loading import staircase_area
 from roughvisc.experiment.profile import GROWTH, MOST_CELLS, Profile
 from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import build_scene, check_slides, kept_times
-from roughvisc.experiment.stated import in_slide
+from roughvisc.experiment.stated import in_slide, staircase_area
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
