@@ -47,19 +47,22 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     ValueError
         If a variable's dimensions are not the declared ones.
     """
+    declared = {
+        name: _declared(str(name), one.dims)
+        for name, one in dataset.variables.items()
+        if name in VARIABLES or name not in dataset.coords or one.dims
+    }
     other = {}
-    known = {name: one for name, one in dataset.variables.items() if not _is_label(dataset, name)}
-    for name, variable in known.items():
-        declared = _declared(str(name), variable.dims)
-        if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
-            other[name] = variable.astype(declared.dtype)
+    for name, one in declared.items():
+        variable = dataset.variables[name]
+        if variable.dtype != np.dtype(one.dtype) and variable.dtype.kind not in "fUO":
+            other[name] = variable.astype(one.dtype)
     annotated = dataset.assign(other)  # once: each assignment merges the whole
-    for name in known:
-        variable = annotated.variables[name]
-        declared = _vocabulary(variable.dims)[str(name)]
-        variable.attrs.update(declared.attributes() | ({"cartesian_axis": declared.axis} if declared.axis else {}))
-        if stated := " ".join(other for other in declared.ancillary if other in annotated):
-            variable.attrs["ancillary_variables"] = stated
+    for name, one in declared.items():
+        attributes = one.attributes() | ({"cartesian_axis": one.axis} if one.axis else {})
+        if stated := " ".join(other for other in one.ancillary if other in annotated):
+            attributes["ancillary_variables"] = stated
+        annotated.variables[name].attrs.update(attributes)
     for name in FLAGS.keys() & set(annotated.variables):
         annotated.variables[name].attrs.update(_flags(name))
     return annotated
@@ -69,11 +72,6 @@ def _flags(name: str) -> dict[str, Any]:
     """CF attributes that say what the values of a status mean."""
     meanings = FLAGS[name]
     return {"flag_values": np.arange(len(meanings), dtype="int8"), "flag_meanings": " ".join(meanings)}
-
-
-def _is_label(dataset: xr.Dataset, name: Hashable) -> bool:
-    """Whether a variable is a scalar coordinate that is not declared."""
-    return name not in VARIABLES and name in dataset.coords and not dataset.variables[name].dims
 
 
 def describe(dataset: xr.Dataset) -> xr.Dataset:
@@ -187,12 +185,9 @@ def _same_unit(found: str, declared: str) -> bool:
     return factor == 1.0
 
 
-def _vocabulary(dims: tuple[Hashable, ...]) -> dict[str, Variable]:
-    return AXES[axis_of(dims)].variables
-
-
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
-    known = _vocabulary(dims)
+    """What is declared of a variable over its axis, if its dimensions are those."""
+    known = AXES[axis_of(dims)].variables
     if name not in known:
         raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
     declared = known[name]

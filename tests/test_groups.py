@@ -13,10 +13,9 @@ from support import changed_package
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.groups import GROUPS, group_of, split, whole_of
+from roughvisc.groups import AT_ROOT, GROUPS, WARNINGS, group_of, split, whole_of
 from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.attributes import AT_ROOT, WARNINGS
 
 FORMER = Path(__file__).parent / "study" / "storage" / "format_2"
 BALL, RUBBER = rv.sphere(1e-2, 2e-3, (17, 15)), rv.zener(1e6, 1e6, 1e6)

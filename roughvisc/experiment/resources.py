@@ -23,8 +23,8 @@ from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import Memory
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory
+from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
-from roughvisc.variables.chunks import chunks
 
 _PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
 #: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.

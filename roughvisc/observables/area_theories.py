@@ -10,12 +10,12 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import material_of, need_history
 from roughvisc.observables.response import history
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.variables.attributes import attributes_of
 
 
 def persson_fraction(strain: ArrayLike) -> Any:

@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import frame_by_frame, material_of
 from roughvisc.observables.spots import contact
 from roughvisc.topography.grid import spacing
 from roughvisc.units import quantity
-from roughvisc.variables.attributes import attributes_of
 
 
 def incremental_stiffness(

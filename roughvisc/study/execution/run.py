@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
 from roughvisc.experiment.refusal import require_surface
 from roughvisc.experiment.resources import keep_memory
+from roughvisc.groups import attributes_of
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
@@ -41,7 +42,6 @@ from roughvisc.study.storage.store import (
     write_result,
 )
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:

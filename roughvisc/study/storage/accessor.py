@@ -15,8 +15,7 @@ from typing import Any
 
 import xarray as xr
 
-from roughvisc.groups import group_of, groups_of, with_groups_of
-from roughvisc.variables.attributes import attributes_of
+from roughvisc.groups import attributes_of, group_of, groups_of, with_groups_of
 
 #: Before the name of a figure.
 _PLOT = "plot_"

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of
 from roughvisc.study.storage.checksum import UNSEALED, append_checksum, unsealed, verify_checksum, warn_once
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
 from roughvisc.variables import RESULT_FORMAT, of_step
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.groups import root_of
+from roughvisc.groups import for_root, root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.realisations import DRAWN, REALISATION
@@ -30,7 +30,6 @@ from roughvisc.study.storage.reading import read_variable
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.upkeep import counted_versions, version_of
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.attributes import for_root
 from roughvisc.variables.axes import AXES
 
 #: Coordinate that says which version computed each case.

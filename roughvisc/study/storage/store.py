@@ -22,17 +22,16 @@ import netCDF4
 import numpy as np
 
 from roughvisc.errors import FolderError, InputError
-from roughvisc.groups import group_of, groups_of, root_of, split, whole_of
+from roughvisc.groups import attributes_of, group_of, groups_of, root_of, split, whole_of
 from roughvisc.labels import annotate, format_of
+from roughvisc.recorder import chunks
 from roughvisc.study.storage.checksum import append_checksum, is_news, verify_checksum
 from roughvisc.study.storage.formats import to_current
 from roughvisc.study.storage.reading import BOUNDS, NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.variables.chunks import chunks
 
 if TYPE_CHECKING:
     import xarray as xr

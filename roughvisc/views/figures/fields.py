@@ -22,11 +22,11 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import in_si
 from roughvisc.variables import FIELDS, VARIABLES
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import (
     ABSENT,

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
+from roughvisc.groups import attributes_of, whole_of
 from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
 from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
@@ -22,7 +22,6 @@ from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures.axes import (
     BLUE,

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of
 from roughvisc.observables import contact
 from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.attributes import attributes_of
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures.axes import (
     BLUE,
