@@ -7,23 +7,19 @@ import re
 
 from roughvisc.study.statement.schema import (
     StudyFile,
-    audit,
-    conditioning,
-    friction,
+    evaluation,
+    experiments,
     material,
-    observe,
     program,
     settings,
     surface,
-    want,
 )
-from roughvisc.study.statement.schema.meanings import meaning as first_meaning
-from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
-from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import meaning as first_meaning
+from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.statement.schema.material import TEMPERATURE, THICKNESS
 
 HEAD = ("key", "expected", "unit", "default", "meaning", "example")
-_STEPS = conditioning.Prepared.model_fields
+_STEPS = surface.Prepared.model_fields
 _GENERATED = {f"generate: {name}": one for name, one in surface.GENERATED.items()}
 _MODELS = {f"material: {name}": one for name, one in material.SECTIONS.items()}
 _CASES = {
@@ -46,9 +42,9 @@ TABLES = {
     "surface: a file": ("surface", surface.FromFile.model_fields),
     "surface: steps of a face": ("surface", _STEPS),
     "surface: steps of the profile": ("surface", _own(surface.SurfaceSection, _STEPS)),
-    "surface.crop": ("surface.crop", conditioning.Crop.model_fields),
-    "surface.outliers": ("surface.outliers", conditioning.Outliers.model_fields),
-    "surface.filter": ("surface.filter", conditioning.Filter.model_fields),
+    "surface.crop": ("surface.crop", surface.Crop.model_fields),
+    "surface.outliers": ("surface.outliers", surface.Outliers.model_fields),
+    "surface.filter": ("surface.filter", surface.Filter.model_fields),
     "surface.second": ("surface.second", _own(surface.SecondFace, _STEPS)),
     "generate: any": (
         "surface",
@@ -71,20 +67,20 @@ TABLES = {
         f"program: {name}": ("program.0", kind["load"].model_fields)
         for name, kind in program.KINDS.items()
     },
-    "program.cycle": ("program.0.cycle", program.LoadWave.model_fields),
-    "program.table": ("program.0.table", program.LoadRows.model_fields),
-    "friction": ("friction", friction.FrictionSection.model_fields),
+    "program.cycle": ("program.0.cycle", program.TABLES["load"].wave.model_fields),
+    "program.table": ("program.0.table", program.TABLES["load"].rows.model_fields),
+    "friction": ("friction", experiments.FrictionSection.model_fields),
     "friction.speeds": (
         "friction.speeds",
-        {field.alias or name: field for name, field in friction.Decades.model_fields.items()},
+        {field.alias or name: field for name, field in experiments.Decades.model_fields.items()},
     ),
     "solve": ("solve", settings.SolveSection.model_fields),
     "keep": ("keep", settings.KeepSection.model_fields),
-    "observe": ("observe", observe.ObserveSection.model_fields),
-    "observe.leakage": ("observe.leakage", observe.LeakageTable.model_fields),
-    "observe.conductance": ("observe.conductance", observe.ConductanceTable.model_fields),
-    "audit": ("audit", audit.AuditSection.model_fields),
-    "want": ("want", want.WantSection.model_fields),
+    "observe": ("observe", evaluation.ObserveSection.model_fields),
+    "observe.leakage": ("observe.leakage", evaluation.LeakageTable.model_fields),
+    "observe.conductance": ("observe.conductance", evaluation.ConductanceTable.model_fields),
+    "audit": ("audit", evaluation.AuditSection.model_fields),
+    "want": ("want", evaluation.WantSection.model_fields),
 }
 #: first word of a table's name -> the table whose meanings hold where it has none of its own
 _SHARED = {"generate": "generate: any", "material": "material: any"}

@@ -279,12 +279,12 @@ def run(
     ConvergenceError
         If a step did not converge. The result is written nevertheless, and the message names the file.
     """
-    from roughvisc.study.execution import single
+    from roughvisc.study.execution.single import run_stated
     from roughvisc.study.statement.case import Case, read_study
 
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None and not stated.is_to_be_chosen:
-        return single.run(stated, out, progress=progress, same_bits=same_bits, threads=threads)
+        return run_stated(stated, out, progress=progress, same_bits=same_bits, threads=threads)
     from roughvisc.study.budget import target
 
     return target.run(stated, out, want=want, progress=progress is not False, same_bits=same_bits, threads=threads)

@@ -219,6 +219,7 @@ def shown(value: Any) -> str:
 
 def within(
     number: float,
+    *,
     above: float | None = None,
     least: float | None = None,
     most: float | None = None,
@@ -234,40 +235,26 @@ def within(
     )
 
 
-def range_in_words(
-    above: float | None = None, least: float | None = None, most: float | None = None, below: float | None = None
-) -> str:
-    """``" above 0 and up to 0.5"`` and the like; empty without bounds."""
-    words = [
-        f"{word} {bound:g}"
-        for word, bound in (("above", above), ("at least", least), ("up to", most), ("below", below))
-        if bound is not None
-    ]
-    return " " + " and ".join(words) if words else ""
+def range_in_words(**bounds: float | None) -> str:
+    """``" above 0 and up to 0.5"`` and the like, of bounds as :func:`within` has them; empty without any."""
+    words = {"above": "above", "least": "at least", "most": "up to", "below": "below"}
+    told = [f"{word} {bounds[key]:g}" for key, word in words.items() if bounds.get(key) is not None]
+    return " " + " and ".join(told) if told else ""
 
 
-def wanted_quantity(
-    unit: str,
-    above: float | None = None,
-    least: float | None = None,
-    most: float | None = None,
-    below: float | None = None,
-) -> str:
+def wanted_quantity(unit: str, **bounds: float | None) -> str:
     """What is expected of a quantity, in words."""
     wanted = "a number" if unit == "1" else f"a number in {unit}, or a string with a unit of its kind,"
-    return (wanted + range_in_words(above, least, most, below)).rstrip(",")
+    return (wanted + range_in_words(**bounds)).rstrip(",")
 
 
 def bounded_quantity(
     value: str | float,
     unit: str,
     *,
-    above: float | None = None,
-    least: float | None = None,
-    most: float | None = None,
-    below: float | None = None,
     instead: Mapping[str, str] | None = None,
     difference: bool = False,
+    **bounds: float | None,
 ) -> float:
     """Value of a quantity in a given unit and between bounds: the check of study files and of loading programs.
 
@@ -277,12 +264,12 @@ def bounded_quantity(
         As :func:`quantity` takes it.
     unit : str
         The unit expected.
-    above, least, most, below : float, optional
-        Bounds, the first and the last excluded. [unit]
     instead : mapping of str to str, optional
         Key -> unit of quantities that may be meant where the unit is of another kind; the message suggests the key.
     difference : bool
         Whether it is a difference of temperatures.
+    **bounds : float, optional
+        ``above``, ``least``, ``most`` and ``below``, the first and the last excluded. [unit]
 
     Returns
     -------
@@ -307,8 +294,8 @@ def bounded_quantity(
             if is_quantity(value, other):
                 raise InputError(f"{error}; did you mean {key} = {value!r}?") from None
         raise
-    if not within(number, above, least, most, below):
-        raise InputError(f"found {shown(value)}: expected {wanted_quantity(unit, above, least, most, below)}")
+    if not within(number, **bounds):
+        raise InputError(f"found {shown(value)}: expected {wanted_quantity(unit, **bounds)}")
     return number
 
 

@@ -461,7 +461,7 @@ def test_help__has_an_example_for_every_command(invoke):
 def test_process__ends_with_its_status(tmp_path):
     """A real process: exit status, streams, and no heavy import for the help."""
     (tmp_path / "bad.toml").write_text("title = 3")
-    command = [sys.executable, "-W", "error", "-m", "roughvisc.cli"]
+    command = [sys.executable, "-W", "error", "-m", "roughvisc"]
     bad = subprocess.run([*command, "run", "bad.toml"], cwd=tmp_path, capture_output=True, text=True)
     assert (bad.returncode, bad.stdout) == (2, "")
     assert bad.stderr.startswith("roughvisc: bad.toml: 4 problems\n  title: found 3: expected a text\n")

@@ -19,9 +19,9 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.hereditary.choice import Kind
 from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.statement.case import Case, read_study, vary
-from roughvisc.study.statement.schema import study_schema
-from roughvisc.study.statement.schema.conditioning import Conditioned
+from roughvisc.study.statement.schema.keys import study_schema
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
+from roughvisc.study.statement.schema.surface import Conditioned
 from roughvisc.study.trade.ladder import Setting
 from roughvisc.variables import FIELDS
 
@@ -199,7 +199,7 @@ from unittest.mock import patch
 import roughvisc as rv
 from roughvisc.experiment import loading
 from roughvisc.study.statement.case import read_study
-from roughvisc.study.statement.schema.meanings import meaning
+from roughvisc.study.statement.schema.keys import meaning
 
 def refused(call):
     try:

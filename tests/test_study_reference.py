@@ -9,10 +9,9 @@ from test_docs import BASE, DOCS, there  # noqa: F401  a fixture
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.statement.schema.material import COLUMNS, MODELS, SPRINGS
-from roughvisc.study.statement.schema.meanings import meanings
+from roughvisc.study.statement.schema.keys import meanings
+from roughvisc.study.statement.schema.material import COLUMNS, MODELS, SPRINGS, TEMPERATURE
 from roughvisc.study.statement.schema.surface import RECIPES
-from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
 from roughvisc.views.sweep_figures.case_text import study_text
 
 PAGE = (DOCS / "study-files.md").read_text(encoding="utf-8")

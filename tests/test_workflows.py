@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.api import run
 from roughvisc.observables import history
-from roughvisc.study.execution.single import run
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.variables import NOT_CONVERGED
 

@@ -9,13 +9,11 @@ interrupted, 143 terminated. Heavy imports are made inside the commands, so that
 from roughvisc.cli.interrupts import ending_at_once
 
 with ending_at_once():
-    from roughvisc.cli.budgets import budget
+    from roughvisc.cli.costs import budget, plan, trade
     from roughvisc.cli.group import main
-    from roughvisc.cli.new import new
-    from roughvisc.cli.results import audit, plot, report, validate
-    from roughvisc.cli.scans import scan
-    from roughvisc.cli.studies import plan, run, trade
-    from roughvisc.cli.upkeep import clean, verify
+    from roughvisc.cli.results import audit, clean, plot, report, validate, verify
+    from roughvisc.cli.scans import new, scan
+    from roughvisc.cli.studies import run
 
 __all__ = ["main"]
 

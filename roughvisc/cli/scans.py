@@ -1,14 +1,15 @@
-"""The command on a scan file: ``scan``."""
+"""Commands on a scan file: ``scan``, and ``new``, which begins a study of one."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import click
 
 from roughvisc.cli.group import say
 from roughvisc.cli.reading import read_options, reading_options
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, printable
 
 
 @click.command()
@@ -46,7 +47,7 @@ def scan(
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import atomic_write
+    from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.bandwidth import level
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.parameters import parameters
@@ -89,3 +90,82 @@ def scan(
         with atomic_write(card) as temporary:
             temporary.write_text(text, encoding="utf-8")
         say(console, "Card", card)
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), help="Study file to write. [default: FILE's name-study.toml, here]"
+)
+@click.option(
+    "--contact",
+    metavar="PART",
+    default="5 %",
+    show_default=True,
+    help="Part of the area in contact at the end, which sets the pressure.",
+)
+@reading_options
+def new(file: Path | None, out: Path | None, contact: str, **given: str | None) -> None:
+    """Write a first study for a scan.
+
+    The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends
+    and presses the scan on a rubber, at a pressure that brings the part --contact of the area into contact. FILE is an
+    instrument file or a surface card. Without FILE, the command also writes an example scan, focus_variation.x3p.
+
+    \b
+    Example:
+      roughvisc new
+      roughvisc plan focus_variation-study.toml
+      roughvisc run focus_variation-study.toml
+      roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.cost.first_pressure import first_pressure
+    from roughvisc.study.statement.starter import starter_study
+    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.study.trade.files import part_of_one
+    from roughvisc.topography.example import EXAMPLE
+    from roughvisc.topography.inspection import inspect_scan
+    from roughvisc.topography.scans import open_scan
+    from roughvisc.views.console.scan_advice import advice_table
+
+    options, part = read_options(**given), part_of_one(contact, "--contact")
+    wanted = file or Path(EXAMPLE)
+    out = out or Path(f"{wanted.stem}-study.toml")
+    if out.suffix.lower() != ".toml":
+        raise InputError(f"{out}: has the suffix {out.suffix!r}: expected a study file, .toml")
+    if out.exists():
+        raise InputError(f"{out}: already exists: expected another name (--out)")
+    if file is None:
+        for option in (name for name, value in given.items() if value):
+            raise InputError(f"--{option}: has no meaning without FILE: expected FILE")
+        _write_example(wanted)
+    scan = open_scan(wanted, **options)
+    found = inspect_scan(scan)
+    text = starter_study(wanted, out, options, found, first_pressure(scan, found, part))
+    with atomic_write(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    console = Console()
+    console.print(advice_table(found))
+    console.print()
+    if file is None:
+        say(console, "Scan", wanted)
+    say(console, "Study", out)
+    following = f"Next: roughvisc plan {out}\n      roughvisc run {out}"
+    console.print(printable(following), soft_wrap=True, highlight=False, markup=False)
+
+
+def _write_example(path: Path) -> None:
+    """Write the scan that ships with roughvisc; one that is there already stays, and has to be the same."""
+    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.topography.example import example_scan
+
+    held = example_scan()
+    if not path.exists():
+        with atomic_write(path) as temporary:
+            shutil.copyfile(held, temporary)
+    elif path.read_bytes() != held.read_bytes():
+        raise InputError(
+            f"{path}: already exists and differs from the example: expected an empty folder, or your own FILE"
+        )

@@ -1,4 +1,4 @@
-"""Commands on a study file: ``run``, ``plan``, ``trade``."""
+"""The command that computes a study: ``run``."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from roughvisc.cli.costs import show
 from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say, say_figures
 from roughvisc.cli.interrupts import end_if_interrupted
 from roughvisc.cli.reading import naming_keys
@@ -16,9 +17,9 @@ from roughvisc.errors import InputError, printable
 
 if TYPE_CHECKING:
     import xarray as xr
+    from distributed import Client
     from rich.console import Console
 
-    from roughvisc.study.budget.target import Choice
     from roughvisc.study.statement.case import Case
 
 
@@ -43,7 +44,16 @@ _FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best
 @click.option("--profile", is_flag=True, help="Print where the time went; runs in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def run(
-    study: Path, out: Path | None, targets: tuple[str, ...], no_plots: bool, profile: bool, quiet: bool, **where: Any
+    study: Path,
+    out: Path | None,
+    targets: tuple[str, ...],
+    no_plots: bool,
+    scheduler: str | None,
+    scheduler_file: Path | None,
+    profile: bool,
+    quiet: bool,
+    retry_failed: bool,
+    **computing: Any,
 ) -> None:
     """Compute all cases of a study file.
 
@@ -63,6 +73,7 @@ def run(
     """
     from rich.console import Console
 
+    from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.run import result_folder, study_folder
     from roughvisc.study.statement.case import read_cases
 
@@ -79,25 +90,30 @@ def run(
         raise InputError(f"{study}: {where}: found a target beside a sweep of {len(cases)} cases: expected one case")
     folder = result_folder(cases[0], out, to_write=False)
     console = Console(quiet=quiet)
-    elsewhere = where["scheduler"] or where["scheduler_file"]
-    if profile and (elsewhere or where["workers"]):
+    elsewhere = bool(scheduler or scheduler_file)
+    if profile and (elsewhere or computing["workers"]):
         raise InputError(
             "--profile: measures this process only: expected no --scheduler, --scheduler-file or --workers"
         )
-    with _profile(console) if profile else nullcontext():
-        choice = _choose(chosen[0], folder, console, **where) if chosen else None
-        if len(cases) == 1 and (choice or not elsewhere):
-            case = cases[0] if choice is None else choice.case
-            complaint = _run_one(
-                case, folder, study.stem, console, not no_plots, where["same_bits"], where["threads"], bool(choice)
-            )
-            if choice is not None:
-                _show_budgets(choice.budgets, folder, console, not no_plots)
-            if complaint:
-                complain(f"{study.stem}: {complaint}")
-                raise Failure("1 of 1 cases failed", 1)
-        else:
-            _run_all(cases, folder, console, **(where | {"workers": 0} if profile else where))
+    if profile and not chosen:
+        computing["workers"] = 0
+    with (
+        _profile(console) if profile else nullcontext(),
+        connect(scheduler, scheduler_file) if elsewhere else nullcontext() as client,
+    ):
+        if len(cases) > 1 or (elsewhere and not chosen):
+            _run_all(cases, folder, console, client=client, retry_failed=retry_failed, **computing)
+            return
+        case, budgets = cases[0], {}
+        if chosen:
+            case, budgets = _choose(case, folder, console, client=client, **computing)
+        same_bits, threads = computing["same_bits"], computing["threads"]
+        complaint = _run_one(case, folder, study.stem, console, not no_plots, same_bits, threads, bool(chosen))
+        for name, one in budgets.items():
+            show(console, one, folder / "budget", name, not no_plots)
+        if complaint:
+            complain(f"{study.stem}: {complaint}")
+            raise Failure("1 of 1 cases failed", 1)
 
 
 @contextmanager
@@ -111,52 +127,22 @@ def _profile(console: Console) -> Iterator[None]:
     console.print(profile_table(profile))
 
 
-def _choose(
-    case: Case,
-    folder: Path,
-    console: Console,
-    *,
-    scheduler: str | None,
-    scheduler_file: Path | None,
-    workers: int | None,
-    threads: int | None,
-    same_bits: bool,
-    **_: Any,
-) -> Choice:
-    """Choose what the target of a case takes, and say what it is and why."""
+def _choose(case: Case, folder: Path, console: Console, **computing: Any) -> tuple[Case, Mapping[str, xr.Dataset]]:
+    """The case that the target of one takes, and the whole errors around it; say what it is and why."""
     from functools import partial
 
     from roughvisc.study.budget.target import choose
-    from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.monitor import watcher
 
     def tell(line: str) -> None:
         console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
 
-    elsewhere = connect(scheduler, scheduler_file) if scheduler or scheduler_file else nullcontext()
-    with elsewhere as client:
-        choice = choose(
-            case,
-            folder,
-            watch=partial(watcher, not console.quiet, console, summary=False),
-            tell=tell,
-            client=client,
-            workers=workers,
-            threads=threads,
-            same_bits=same_bits,
-        )
+    watch = partial(watcher, not console.quiet, console, summary=False)
+    choice = choose(case, folder, watch=watch, tell=tell, **computing)
     tell("Chosen")
     for reason in choice.reasons:
         tell(f"  {reason}")
-    return choice
-
-
-def _show_budgets(budgets: Mapping[str, xr.Dataset], folder: Path, console: Console, plots: bool) -> None:
-    """Print, keep and draw the whole errors around what was chosen."""
-    from roughvisc.cli.budgets import show
-
-    for name, one in budgets.items():
-        show(console, one, folder / "budget", name, plots)
+    return choice.case, choice.budgets
 
 
 def _run_one(
@@ -171,9 +157,10 @@ def _run_one(
 ) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
     from roughvisc.progress import Bar
+    from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
-    from roughvisc.study.execution.side_by_side import threads_each
-    from roughvisc.study.storage.store import is_writable, require_writable, result_path, whole_result
+    from roughvisc.study.storage.files import is_writable, require_writable
+    from roughvisc.study.storage.store import result_path, whole_result
     from roughvisc.study.storage.upkeep import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
@@ -216,22 +203,8 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
     return ""
 
 
-def _run_all(
-    cases: list[Case],
-    folder: Path,
-    console: Console,
-    *,
-    workers: int | None,
-    scheduler: str | None,
-    scheduler_file: Path | None,
-    retry_failed: bool,
-    same_bits: bool,
-    threads: int | None,
-) -> None:
+def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Client | None, **computing: Any) -> None:
     """Compute and sum up a sweep."""
-    from contextlib import ExitStack
-
-    from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.monitor import watcher
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.execution.task import REFUSED
@@ -240,22 +213,9 @@ def _run_all(
     from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
     from roughvisc.views.console.tables import realisations_tables, sweep_table
 
-    with ExitStack() as stack:
-        client = None
-        if scheduler or scheduler_file:
-            client = stack.enter_context(connect(scheduler, scheduler_file))
-        outcomes = run_cases(
-            cases,
-            folder,
-            client=client,
-            workers=workers,
-            retry_failed=retry_failed,
-            same_bits=same_bits,
-            threads=threads,
-            watch=watcher(not console.quiet, console),
-        )
-        with client.as_current() if client is not None else nullcontext():
-            missed = _observe(cases, folder, console)
+    outcomes = run_cases(cases, folder, client=client, watch=watcher(not console.quiet, console), **computing)
+    with client.as_current() if client is not None else nullcontext():
+        missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     if (folder / REALISATIONS).exists():
         console.print(realisations_tables(realisations_table(index_of(folder, warn=False))))
@@ -282,110 +242,3 @@ def _run_all(
         raise Failure("; ".join(filter(None, (failed, held if kept else ""))), 1)
     if missed:
         raise Failure("some observables could not be computed", 1)
-
-
-@click.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the results; its disk must have room.")
-@click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
-def plan(study: Path, out: Path | None, workers: int | None) -> None:
-    """Show what a study will model and what it will cost.
-
-    Runs and writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
-    of steps and FFTs by coarse runs, and the time by a solve timed on this machine. The exit status is 2 if the study
-    does not fit into memory or on the disk.
-
-    \b
-    Example:
-      roughvisc plan focus_variation-study.toml
-    """
-    from rich.console import Console
-
-    from roughvisc.study.cost.plan import plan as planned
-    from roughvisc.views.console.tables import plan_tables
-
-    costs = planned(study, out, workers=workers)
-    if not costs["refusal"].all():
-        Console().print(plan_tables(costs))
-    if costs.attrs["upgrade"]:
-        complain(costs.attrs["upgrade"])
-    if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
-        raise Failure(f"{study}: cannot run: {why}", 2)
-
-
-@click.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the measurements. [default: results/STUDY-trade]"
-)
-@click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
-@click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
-@click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
-@click.option(
-    "--floor", is_flag=True, help="Compute the error that no setting lessens, as `budget` does without options."
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-def trade(
-    study: Path, out: Path | None, target: str | None, quantity: str, budget: str, floor: bool, quiet: bool
-) -> None:
-    """Measure what accuracy costs, and recommend a setting.
-
-    Computes the case with several tolerances and grids; with a loading program also with fixed time steps, other
-    memory models and the seed paper's algorithm. Each run is timed and compared with a closed-form solution if there
-    is one, else with the finest run. Writes a NetCDF file and a figure. --apply changes the keys in STUDY and keeps its
-    comments and layout. A budget that `roughvisc budget` has left in the results shows the error that no setting
-    lessens.
-
-    \b
-    Example:
-      roughvisc trade focus_variation-study.toml
-      roughvisc trade focus_variation-study.toml --apply 1%
-    """
-    from dask.system import CPU_COUNT
-    from rich.console import Console
-    from scipy import fft
-
-    from roughvisc.progress import reporting
-    from roughvisc.study.budget.budget import budgets, case_of
-    from roughvisc.study.quantities import QUANTITIES
-    from roughvisc.study.statement.case import read_study
-    from roughvisc.study.storage.store import write_dataset
-    from roughvisc.study.trade import files as trade_file
-    from roughvisc.study.trade import recommend
-    from roughvisc.study.trade.apply import apply
-    from roughvisc.study.trade.floor import with_floors
-    from roughvisc.study.trade.reference import further_quantities_of, quantities_of
-    from roughvisc.study.trade.trade import trade as measured
-    from roughvisc.views.console.trade_table import trade_table
-    from roughvisc.views.figures.files import write_figure
-    from roughvisc.views.plot import trade as figure
-
-    case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
-    folder, part = trade_file.trade_folder(case, out), None
-    usual = quantities_of(case)
-    quantity = recommend.known_quantity(quantity, (*usual, *further_quantities_of(case)), "--quantity")
-    if target is not None:
-        part = trade_file.part_of_one(target, "--apply")
-        trade_file.check_writable(study)
-    with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, quantities=[quantity], budget=time, progress=report)
-    beside = case_of(case, None)[1]
-    names = [name for name in dict.fromkeys([quantity, *usual]) if name in QUANTITIES]
-    if floor:
-        for name, one in budgets(case, names, out=beside, progress=not quiet).items():
-            write_dataset(one, beside / f"budget-{name}.nc")
-    dataset = with_floors(dataset, trade_file.budgets_in(beside, names, case))
-    console.print(trade_table(dataset))
-    say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
-    first = list(
-        dict.fromkeys([*([] if quantity == "contact_area" else [quantity]), *recommend.main_quantities(dataset)])
-    )
-    say(console, "Figure", write_figure(figure(dataset, first[:2]), folder / "trade.png"))
-    if part is not None:
-        index = recommend.cheapest(dataset, quantity, part)
-        if index is None:
-            shortfall = recommend.shortfall(dataset, quantity, part)
-            raise Failure(f"{study}: --apply {target}: {shortfall}; the study is unchanged", 1)
-        changes = apply(study, recommend.keys_of(dataset, index))
-        said = printable(f"{study}: {changes or 'already has this setting'}")
-        console.print(said, soft_wrap=True, highlight=False, markup=False)

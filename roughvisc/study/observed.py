@@ -13,12 +13,14 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.observables.tables import asked
-from roughvisc.study.execution.cluster import default_client, has_other_versions
+from roughvisc.study.execution.cluster import has_other_versions
 from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.single import default_client
 from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.store import require_writable, result_path, whole_result, write_result
+from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")

@@ -9,7 +9,7 @@ import xarray as xr
 
 from roughvisc.groups import whole_of
 from roughvisc.labels import heading
-from roughvisc.study.storage.store import atomic_write
+from roughvisc.study.storage.files import atomic_write
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import FLAGS
 from roughvisc.variables.axes import axis_of

@@ -9,8 +9,8 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.sliding_grid import areas
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.study.statement.schema.entries import listed, measured
 from roughvisc.study.statement.schema.experiments import ExperimentSection
+from roughvisc.study.statement.schema.section import listed, measured
 from roughvisc.variables import STATUS_MEANINGS, Variable, over_axis
 from roughvisc.variables.axes import Axis
 

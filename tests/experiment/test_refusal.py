@@ -19,7 +19,7 @@ from roughvisc.experiment.resources import PROCESS, Available, cores, curve_byte
 from roughvisc.experiment.steady_sliding import SlidingRows
 from roughvisc.mechanics import arrays as threads_module
 from roughvisc.settings import Settings
-from roughvisc.study.execution import side_by_side as side_module
+from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result

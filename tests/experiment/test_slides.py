@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.scene import kept_times, snap_to_cells
 from roughvisc.study.statement.case import Case, read_study, vary
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words
 
 SIDE = 1e-3

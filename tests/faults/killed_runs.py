@@ -18,7 +18,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.cli import main as command
 from roughvisc.errors import InputError
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases
@@ -48,7 +48,7 @@ def prepare(folder):
         if name == "one":
             run_case(cases[0], folder / name, checkpoint_steps=3)
         else:
-            run_cases(cases, folder / name, watch=NullMonitor(), workers=0)
+            run_cases(cases, folder / name, watch=Monitor(), workers=0)
         studies[name] = path, cases, _values(folder / name), time.monotonic() - began
     began = time.monotonic()
     _wait(

@@ -13,10 +13,10 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.checksum import _SEAL
+from roughvisc.study.storage.files import _SEAL
 from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import whole_result
 from roughvisc.study.storage.upkeep import verify
@@ -37,7 +37,7 @@ def prepare(folder):
     """A folder of two results, and their values by key."""
     (folder / "study.toml").write_text(_TEXT)
     cases = read_cases(folder / "study.toml")
-    run_cases(cases, folder / "whole", watch=NullMonitor(), workers=0)
+    run_cases(cases, folder / "whole", watch=Monitor(), workers=0)
     rv.open_results(folder / "whole", cases=cases)  # so that the index is there
     wanted = {}
     for case in cases:
@@ -130,7 +130,7 @@ def _through(door, out, case, cases, damage):
             if verdict.flaw or not verdict.sealed:
                 raise InputError(f"{verdict.path}: {verdict.flaw or 'no checksum'}")
         return {}
-    outcomes = run_cases(cases, out, watch=NullMonitor(), workers=0)
+    outcomes = run_cases(cases, out, watch=Monitor(), workers=0)
     assert {one.kind for one in outcomes.values()} == {"done"}
     return _by_key(rv.open_results(out, cases=cases).load())
 

@@ -14,7 +14,7 @@ from stated_units import UnknownUnit, quantity_said
 
 from roughvisc import tables
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema import entries
+from roughvisc.study.statement.schema import section as entries
 from roughvisc.study.storage import results, store
 from roughvisc.topography import cards
 

@@ -15,7 +15,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases, read_study
@@ -115,7 +115,7 @@ def test_damaged_results(tmp_path, count):
     path = tmp_path / "two.toml"
     path.write_text(TWO_LOADS)
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(21)
-    run_cases(cases, out, watch=NullMonitor(), workers=0)
+    run_cases(cases, out, watch=Monitor(), workers=0)
     wanted = whole_of(rv.open_results(out, cases=cases)).drop_vars("wall_time").load()
     places = [out / f"{case.key}.nc" for case in cases]
     whole = [place.read_bytes() for place in places]
@@ -130,7 +130,7 @@ def test_damaged_results(tmp_path, count):
             except InputError:
                 refused += 1
             if number % 10 == 0:
-                outcomes = run_cases(cases, out, watch=NullMonitor(), workers=0)
+                outcomes = run_cases(cases, out, watch=Monitor(), workers=0)
                 assert {one.kind for one in outcomes.values()} == {"done"}
                 found = whole_of(rv.open_results(out)).drop_vars("wall_time")
                 xr.testing.assert_equal(found.load(), wanted)
@@ -150,7 +150,7 @@ def test_damaged_index(tmp_path, count):
     path = tmp_path / "two.toml"
     path.write_text(TWO_LOADS)
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(22)
-    run_cases(cases, out, watch=NullMonitor(), workers=0)
+    run_cases(cases, out, watch=Monitor(), workers=0)
     wanted = rv.open_results(out).load()
     whole = {name: (out / name).read_bytes() for name in (INDEX, LATEST)}
     for number in range(count):

@@ -7,7 +7,7 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import FolderError
-from roughvisc.study.execution.baggage import serialize_with_inputs
+from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 

@@ -102,7 +102,7 @@ sys.meta_path.insert(0, Finder())
 sys.argv = ["roughvisc", "run", "s.toml"]
 runpy.run_module("roughvisc", run_name="__main__")
 """
-LATER_MODULES = "roughvisc.cli.upkeep", "rich.console", "xarray"
+LATER_MODULES = "roughvisc.cli.results", "rich.console", "xarray"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

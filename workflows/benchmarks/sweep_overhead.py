@@ -17,7 +17,7 @@ from dask.system import CPU_COUNT
 
 from roughvisc import solve as driver
 from roughvisc.study.execution import run
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage import records
@@ -49,7 +49,7 @@ def sweep(count, workers, boundary):
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         with processor_time() as spent:
-            outcomes = run_cases(cases, Path(folder), watch=NullMonitor(), workers=workers)
+            outcomes = run_cases(cases, Path(folder), watch=Monitor(), workers=workers)
         wall, used = time.perf_counter() - began, sum(spent.values())
     assert all(outcome.entry for outcome in outcomes.values())
     return {

@@ -27,7 +27,7 @@ from whole_error import FAMILIES, study
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget.target import Bench, choose, first_grids, grids_of, wanting
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import compute
 from roughvisc.study.quantities import QUANTITIES
 
@@ -132,9 +132,9 @@ def request(population, family, load, seed, name, target):
         naive *= max(20.0, (1.96 * scatter / math.log1p(target)) ** 2)
     with tempfile.TemporaryDirectory() as folder:
         spent = []
-        bench = Bench([QUANTITIES[name]], Path(folder) / "budget", NullMonitor, spent.append)
+        bench = Bench([QUANTITIES[name]], Path(folder) / "budget", Monitor, spent.append)
         try:
-            choice = choose(case, Path(folder), watch=NullMonitor, tell=spent.append)
+            choice = choose(case, Path(folder), watch=Monitor, tell=spent.append)
         except InputError as error:
             _, around = first_grids(case, bench, {name: target}, math.inf)
             parts = bench.solve(around.changed_cases())

@@ -26,15 +26,16 @@ from roughvisc.study.budget.budget import FOLDER, assembled, known_errors, obser
 from roughvisc.study.budget.population import MOST, PILOT, Level, counts_for, draw, mean_of, scatter_of
 from roughvisc.study.budget.sources import SOURCES, Asked, Found
 from roughvisc.study.budget.variants import Variants, with_rows
-from roughvisc.study.execution import single
-from roughvisc.study.execution.cluster import default_client, local_client
-from roughvisc.study.execution.monitor import Monitor, NullMonitor, watcher
+from roughvisc.study.execution.cluster import local_client
+from roughvisc.study.execution.monitor import Monitor, watcher
 from roughvisc.study.execution.run import is_result_of, result_folder
+from roughvisc.study.execution.single import default_client, run_stated
 from roughvisc.study.quantities import Observable, known_quantity
 from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.schema.evaluation import BEST, KNOWN, WANTED
 from roughvisc.study.statement.schema.section import nearest
-from roughvisc.study.statement.schema.want import BEST, KNOWN, WANTED
-from roughvisc.study.storage.store import atomic_write, require_writable, result_path, write_dataset
+from roughvisc.study.storage.files import atomic_write, require_writable
+from roughvisc.study.storage.store import result_path, write_dataset
 from roughvisc.study.trade.ladder import format_tolerance, has_steps
 from roughvisc.topography.grid import spacing
 from roughvisc.units import is_quantity, unit_for
@@ -203,7 +204,7 @@ class Bench:
             "want",
             solves,
             self.folder,
-            watch=self.watch() if len(solves) * each > _WORTH_WATCHING else NullMonitor(),
+            watch=self.watch() if len(solves) * each > _WORTH_WATCHING else Monitor(),
             client=self.client,
             workers=workers,
             threads=self.threads,
@@ -311,7 +312,7 @@ def run(
     )
     for name, one in choice.budgets.items():
         write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
-    found = single.run(choice.case, out, progress=False, same_bits=same_bits, threads=threads)
+    found = run_stated(choice.case, out, progress=False, same_bits=same_bits, threads=threads)
     return found.assign_attrs(choice="\n".join(choice.reasons))
 
 

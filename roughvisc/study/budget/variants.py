@@ -14,7 +14,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
+from roughvisc.study.statement.schema.material import TEMPERATURE
 from roughvisc.study.trade.ladder import grid_change, is_data
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import last_octave, modes

@@ -57,8 +57,8 @@ from roughvisc.study.cost.full_contact import (
     full_contact_warning,
     largest_pressure,
 )
+from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.execution.side_by_side import processes_that_fit, threads_each
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.study.storage.upkeep import upgrade_note

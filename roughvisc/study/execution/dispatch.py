@@ -23,10 +23,9 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 from roughvisc import errors
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.mechanics.bodies.transforms import transform_library
-from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
 from roughvisc.study.execution.cluster import SOURCE, VERSION
-from roughvisc.study.execution.monitor import NullMonitor, SweepLog, watcher
-from roughvisc.study.execution.task import Outcome, Progress, Report, stop_sweep
+from roughvisc.study.execution.monitor import Monitor, SweepLog, watcher
+from roughvisc.study.execution.task import INPUTS, Outcome, Progress, Report, serialize_with_inputs, stop_sweep
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import program_version
 
@@ -267,7 +266,7 @@ def run_on(
     return folder / outcome.entry.file
 
 
-class ProgressForwarder(NullMonitor):
+class ProgressForwarder(Monitor):
     """Passes the times reached on to a function."""
 
     def __init__(self, progress: Progress) -> None:

@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from rich.console import Console
 
@@ -18,38 +17,52 @@ from roughvisc.errors import ON_SCREEN, DiskFullError, printable, shortened
 from roughvisc.progress import Display, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.realisations import REALISATION
+from roughvisc.study.statement.variation import REALISATION
 from roughvisc.study.storage.failures import forget_failure, record_failure
+from roughvisc.study.storage.files import is_writable
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
-from roughvisc.study.storage.store import is_writable
 from roughvisc.study.storage.table import write_table
 
+log = logging.getLogger("roughvisc")
+
+#: Seconds between two savings of the index while a sweep runs.
+_SAVE_EVERY = 60.0
 #: Running cases that are shown, and messages of cases that ended badly.
 _SHOWN = 8
 
 
-def watcher(progress: bool, console: Console | None = None, summary: bool = True) -> LiveMonitor | NullMonitor:
+def watcher(progress: bool, console: Console | None = None, summary: bool = True) -> Monitor:
     """Who watches a sweep: a display, or nobody."""
-    return LiveMonitor(console, summary) if progress else NullMonitor()
+    return LiveMonitor(console, summary) if progress else Monitor()
 
 
-class NullMonitor:
-    """Shows nothing but what the user should know at once."""
+class Monitor:
+    """Who is told how a sweep goes on, times in seconds; this one shows only what the user should know at once."""
 
-    def begin(self, cases: Sequence[Case], link: str) -> None: ...
-    def reached(self, key: str, now: float, end: float) -> None: ...
-    def ended(self, outcome: Outcome) -> None: ...
-    def tick(self) -> None: ...
+    def begin(self, cases: Sequence[Case], link: str) -> None:
+        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
+
+    def reached(self, key: str, now: float, end: float) -> None:
+        """A running case is at this time of so much; from any thread."""
+
+    def ended(self, outcome: Outcome) -> None:
+        """A case ended."""
+
+    def tick(self) -> None:
+        """Called several times a second."""
 
     def message(self, text: str) -> None:
         """Something the user should know at once."""
         print(shortened(f"roughvisc: {printable(text)}", ON_SCREEN), file=sys.stderr)
 
-    def stopping(self) -> None: ...
-    def close(self) -> None: ...
+    def stopping(self) -> None:
+        """The sweep is interrupted and waits for the running cases to stop."""
+
+    def close(self) -> None:
+        """Nothing more follows."""
 
 
-class LiveMonitor:
+class LiveMonitor(Monitor):
     """Cases done, running and failed, and the time left.
 
     Parameters
@@ -73,7 +86,6 @@ class LiveMonitor:
         self._complaints = 0
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
-        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
         self._at = {case.key: case.at for case in cases}
         self._names = {case.key: _name(case, number, len(cases)) for number, case in enumerate(cases, 1)}
         self._began = time.monotonic()
@@ -82,13 +94,11 @@ class LiveMonitor:
         self._display.start()
 
     def reached(self, key: str, now: float, end: float) -> None:
-        """A running case is at this time of so much."""
         with self._lock:
             if key not in self._ended:
                 self._running[key] = (now, end)
 
     def ended(self, outcome: Outcome) -> None:
-        """A case ended."""
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
@@ -100,20 +110,16 @@ class LiveMonitor:
                 self._display.say("further cases that end so are counted here, and named in the log")
 
     def tick(self) -> None:
-        """Show what has changed."""
         self._display.tick()
 
     def message(self, text: str) -> None:
-        """Something the user should know at once."""
         self._display.say(text)
 
     def stopping(self) -> None:
-        """The sweep is interrupted and waits for the running cases to stop."""
         self._stopping = True
         self._display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
 
     def close(self) -> None:
-        """Nothing more follows."""
         self._display.stop()
         if self._names and self._sums_up:
             self._display.say(self._summary())
@@ -152,36 +158,6 @@ def _name(case: Case, number: int, total: int) -> str:
     if len(varied) > 60:
         varied = f"{varied[:57]}..."
     return f"case {number} of {total}" + (f" ({varied})" if varied else "")
-
-
-log = logging.getLogger("roughvisc")
-#: Seconds between two savings of the index while a sweep runs.
-_SAVE_EVERY = 60.0
-
-
-class Monitor(Protocol):
-    """Who is told how a sweep goes on; times in seconds."""
-
-    def begin(self, cases: Sequence[Case], link: str) -> None:
-        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
-
-    def reached(self, key: str, now: float, end: float) -> None:
-        """A running case is at this time of so much; from any thread."""
-
-    def ended(self, outcome: Outcome) -> None:
-        """A case ended."""
-
-    def tick(self) -> None:
-        """Called several times a second."""
-
-    def message(self, text: str) -> None:
-        """Something the user should know at once."""
-
-    def stopping(self) -> None:
-        """The sweep is interrupted and waits for the running cases to stop."""
-
-    def close(self) -> None:
-        """Nothing more follows."""
 
 
 @dataclass

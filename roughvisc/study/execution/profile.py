@@ -21,8 +21,7 @@ from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.study.execution import run
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.records import RowFile
+from roughvisc.study.storage.checkpoint import CheckpointWriter, RowFile
 
 #: What is timed, by whose attribute it is; time in one that another one calls counts for the inner one.
 _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {

@@ -29,18 +29,10 @@ from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.checksum import warn_once
+from roughvisc.study.storage.files import is_writable, partial_files, require_writable, warn_once
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import (
-    is_writable,
-    open_result,
-    partial_files,
-    quarantine,
-    require_writable,
-    result_path,
-    write_result,
-)
+from roughvisc.study.storage.store import open_result, quarantine, result_path, write_result
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, axis_of
 
@@ -211,8 +203,8 @@ def run_case(
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path, same_bits) and not (_leftovers(path) and is_writable(folder)):
-        return path
+    if is_result_of(case, path, same_bits) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
+        return path  # and no run has left behind what it needs no longer
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     keep_memory()
     try:
@@ -313,11 +305,6 @@ def other_transforms(made_with: Iterable[str]) -> str:
     )
 
 
-def _leftovers(path: Path) -> bool:
-    """Whether a run has left behind what it needs no longer."""
-    return any(path.parent.glob(f".{path.stem}.*"))
-
-
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
     path = write_result(dataset, result_path(folder, case.key), precision=case.settings.keep.precision)
@@ -346,3 +333,6 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     axis = AXES[rows]
     first = axis.place(float(histories[rows][bad[0]]))
     return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try {axis.advice}"
+
+
+log = logging.getLogger("roughvisc")

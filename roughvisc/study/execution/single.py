@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import logging
+import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.groups import whole_of
-from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
-from roughvisc.study.statement.case import Case, read_study
-from roughvisc.study.storage.store import open_result, require_writable, result_path
+from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.files import require_writable
+from roughvisc.study.storage.store import open_result, result_path
 from roughvisc.study.storage.upkeep import upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr
+    from distributed import Client
 
 log = logging.getLogger("roughvisc")
 
 
-def run(
-    case: Case | str | Path,
+def run_stated(
+    case: Case,
     out: str | Path | None = None,
     *,
     progress: bool | Progress = True,
@@ -29,8 +32,6 @@ def run(
     threads: int | None = None,
 ) -> xr.Dataset:
     """Bring a case as it is stated to its file; see :func:`roughvisc.run`."""
-    if not isinstance(case, Case):
-        case = read_study(case)
     folder, client = result_folder(case, out, to_write=False), default_client()
     if not is_result_of(case, result_path(folder, case.key), same_bits):
         require_writable(folder, "since the case is not finished")
@@ -47,3 +48,16 @@ def run(
     if complaint:
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
     return dataset
+
+
+def default_client() -> Client | None:
+    """The client that the user has made the default; none within a Dask task, which is there to compute itself."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:  # nobody has made one
+        return None
+    with suppress(ValueError):
+        distributed.get_worker()
+        return None
+    with suppress(ValueError):
+        return distributed.default_client()
+    return None

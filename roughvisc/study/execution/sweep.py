@@ -6,25 +6,28 @@ import importlib.util
 import logging
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.mechanics.bodies.transforms import transform_library
-from roughvisc.study.execution.baggage import INPUTS, serialize_with_inputs
-from roughvisc.study.execution.cluster import default_client, local_client, refuse_unguarded_script
+from roughvisc.study.execution.cluster import (
+    local_client,
+    refuse_unguarded_script,
+    side_by_side,
+    threads_each,
+)
 from roughvisc.study.execution.monitor import Monitor, SweepLog
 from roughvisc.study.execution.run import other_transforms, result_folder, set_aside_damaged
-from roughvisc.study.execution.side_by_side import side_by_side, threads_each
-from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
+from roughvisc.study.execution.single import default_client
+from roughvisc.study.execution.task import INPUTS, REFUSED, Outcome, outcome_of, run_case_safely, serialize_with_inputs
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.storage.checksum import UNSEALED
 from roughvisc.study.storage.failures import LOG, forget_failure, log_file, recorded_failure
+from roughvisc.study.storage.files import UNSEALED, is_writable, refuse_link, require_writable
 from roughvisc.study.storage.index import Index, index_of, warn_of
-from roughvisc.study.storage.links import refuse_link
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import is_writable, require_writable
 from roughvisc.study.storage.upkeep import clean_folder, upgrade_note
 
 if TYPE_CHECKING:
@@ -247,9 +250,15 @@ def _compute(
     threads: int | None,
 ) -> None:
     if not todo or (client is None and not processes):
+
+        def report(key: str, now: float, end: float) -> None:
+            book.watch.reached(key, now, end)
+            book.watch.tick()
+
         book.begin()
-        for case in todo.values():
-            book.ended(_here(case, folder, book, threads or cores(), same_bits))
+        for key, case in todo.items():
+            progress, here = partial(report, key), threads or cores()
+            book.ended(run_case_safely(case, folder, progress=progress, stop=None, threads=here, same_bits=same_bits))
         return
     from roughvisc.study.execution.dispatch import distribute
 
@@ -270,11 +279,3 @@ def _processes(workers: int | None, cases: Sequence[Case]) -> int:
     if len(cases) <= 1:
         return 0
     return side_by_side(cases, min(cores(), len(cases)))
-
-
-def _here(case: Case, folder: Path, book: SweepLog, threads: int, same_bits: bool) -> Outcome:
-    def report(now: float, end: float) -> None:
-        book.watch.reached(case.key, now, end)
-        book.watch.tick()
-
-    return run_case_safely(case, folder, progress=report, stop=None, threads=threads, same_bits=same_bits)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -14,11 +15,11 @@ from pydantic import ValidationError
 from roughvisc.errors import ChangedError, InputError
 from roughvisc.notebook import table
 from roughvisc.study.statement.identity import identity
-from roughvisc.study.statement.problems import Problems, in_sweep, line, report
-from roughvisc.study.statement.realisations import REALISATION, SURROGATE
-from roughvisc.study.statement.schema import Study, study_schema
-from roughvisc.study.statement.variation import expand, place, with_files, with_realisations
+from roughvisc.study.statement.schema import Study
+from roughvisc.study.statement.schema.keys import study_schema
+from roughvisc.study.statement.variation import REALISATION, SURROGATE, expand, place, with_files, with_realisations
 from roughvisc.topography.cards import read_toml
+from roughvisc.units import shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +29,37 @@ if TYPE_CHECKING:
     from roughvisc.mechanics.materials.models import Material
     from roughvisc.mechanics.stepping.program import Program
     from roughvisc.settings import Settings
+
+
+class Problems(InputError):
+    """All that is wrong with one case, one line each."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = list(lines)
+
+
+def in_sweep(problem: str, where: Sequence[int], changes: Sequence[Mapping[str, Any]]) -> str:
+    """The problem, and the first case that has it where not all do."""
+    if len(where) == len(changes):
+        return problem
+    values = ", ".join(f"{key} = {shown(value)}" for key, value in changes[where[0]].items())
+    head, *rows = problem.split("\n")
+    return "\n".join([f"{head} (case {where[0] + 1} of {len(changes)}: {values})", *rows])
+
+
+def line(path: Path | None, key: str, problem: str) -> str:
+    """One line: the file, the key, what is wrong."""
+    return f"{path}: {key}: {problem}" if path else f"{key}: {problem}"
+
+
+def report(path: Path | None, lines: Sequence[str]) -> str:
+    """One message: a single line, or a line for each problem below the name of the file."""
+    name = str(path) if path else "case"
+    if len(lines) == 1:
+        return f"{name}: {lines[0]}"
+    return "\n".join([f"{name}: {len(lines)} problems", *(indent(one, "  ") for one in lines)])
+
 
 #: Tables that no result depends on, and what their values are.
 _NO_RESULT = {"observe": "observed", "want": "wanted"}
@@ -267,7 +299,7 @@ def read_cases(path: str | Path) -> list[Case]:
     problems: dict[str, list[int]] = {}
     for number, (change, drawn) in enumerate(changes):
         try:
-            case = _varied(data, change, path, path)
+            case = _varied(data, change, path)
         except Problems as error:
             for problem in error.lines:
                 problems.setdefault(problem, []).append(number)
@@ -309,20 +341,20 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     if "boundary" not in case.settings.solve.model_fields_set:  # another surface may have another one
         data["solve"].pop("boundary")
     try:
-        changed = _varied(data, changes, case.origin, None)
+        changed = _varied(data, changes, case.origin)
     except Problems as error:
         raise InputError(report(case.origin, error.lines)) from error
     written = {key: text for key, text in case.written.items() if key not in changes}
     return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
 
 
-def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, reading: Path | None) -> Case:
+def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None) -> Case:
     for key, value in changes.items():
         try:
             data = place(data, key, value)
         except InputError as error:
             raise Problems([f"{key}: {error}"]) from error
-    settings = _checked(data, reading.parent if reading else origin.parent if origin else None)
+    settings = _checked(data, origin.parent if origin else None)
     stated = _dump(settings)
     varied = {key: _at(stated, key, value) for key, value in changes.items()}
     written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.stepping.program import PUSHING, UNITS, Control, Program
 from roughvisc.tables import Wanted, read_table
-from roughvisc.units import bounded_quantity, is_quantity
+from roughvisc.units import bounded_quantity, is_quantity, stated_quantity
 
 Array = NDArray[np.float64]
 
@@ -104,22 +104,15 @@ def read_program(
         control,
         time=time,
         column=chosen.get(control, control),
-        start=start if start == "first" else _said("start", start, "s"),
-        end=None if end is None else _said("end", end, "s"),
-        zero=_said("zero", zero, unit),
-        factor=_said("factor", factor, "1"),
+        start=start if start == "first" else stated_quantity(start, "s", "start"),
+        end=None if end is None else stated_quantity(end, "s", "end"),
+        zero=stated_quantity(zero, unit, "zero"),
+        factor=stated_quantity(factor, "1", "factor"),
         noise=noise,
         thin=thin,
         decimal=decimal,
     )
     return Program.table(found.times, found.values, control, note=found.note)
-
-
-def _said(key: str, value: Any, unit: str) -> float:
-    try:
-        return bounded_quantity(value, unit)
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from None
 
 
 def part_or_value(value: Any, unit: str, largest: float | None = None, key: str = "") -> float:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from roughvisc.mechanics.stepping.program import Program
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.writers import surface_table, written_quantity
 
@@ -147,11 +146,8 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
 def _program(pressure: float, found: Inspection) -> str:
     """The line that sets the load, with the pressure and the force that it stands for."""
     force = written_quantity(pressure * found.area, "N", 4)
-    area = written_area(found.area)
     whole = " with the mirror images" if "mirror" in found.steps else ""
-    if hasattr(Program, "pressure"):
-        return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {area}{whole}'
-    return f'load = "{force}"  # a nominal pressure of {written_quantity(pressure, "Pa")} over {area}{whole}'
+    return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {written_area(found.area)}{whole}'
 
 
 def written_area(area: float) -> str:

@@ -15,8 +15,7 @@ from typing import Any, TextIO
 from roughvisc.errors import FolderError, InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
-from roughvisc.study.storage.links import open_unlinked
-from roughvisc.study.storage.store import atomic_write
+from roughvisc.study.storage.files import atomic_write, open_unlinked
 
 log = logging.getLogger("roughvisc")
 

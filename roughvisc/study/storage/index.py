@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.groups import attributes_of
-from roughvisc.study.storage.checksum import UNSEALED, append_checksum, unsealed, verify_checksum, warn_once
+from roughvisc.study.storage.files import UNSEALED, append_checksum, atomic_write, unsealed, verify_checksum, warn_once
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
-from roughvisc.study.storage.store import NETCDF, atomic_write, result_files, result_path
+from roughvisc.study.storage.store import NETCDF, is_json_table, result_files, result_path
 from roughvisc.variables import RESULT_FORMAT, of_step
 from roughvisc.variables.axes import AXES, axis_of
 
@@ -159,7 +159,7 @@ def read_entry(path: Path) -> Entry:
         raise InputError(f"{path}: {error}") from error
     along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]
-    if absent or not _is_table(attributes.get("case")):
+    if absent or not is_json_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
     kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)} | {"result_format": RESULT_FORMAT}
@@ -176,14 +176,6 @@ def _histories(file: Any) -> dict[str, NDArray[Any]]:
         names = {f"{prefix}{name}": variable for name, variable in members.variables.items()}
         found |= {name: names[name][:] for name in _names_of_histories() if name in names and name not in found}
     return found
-
-
-def _is_table(text: Any) -> bool:
-    """Whether a text is a table in JSON."""
-    try:
-        return isinstance(json.loads(text), dict)
-    except (TypeError, ValueError, RecursionError):
-        return False
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -249,20 +241,14 @@ def warn_of(folder: Path, problems: Mapping[str, str]) -> None:
 def save_index(folder: Path, index: Index) -> None:
     """Write the index of a folder; where that cannot be done, results are only slower to open."""
     entries = list(index.entries.values())
-    grids = _Grids()
-    head = [
-        {
-            "file": entry.file,
-            "stamp": entry.stamp,
-            "attributes": entry.attributes,
-            "fields": entry.fields,
-            "sealed": entry.sealed,
-            "histories": {name: len(values) for name, values in entry.histories.items()},
-            "grid": grids.number(entry),
-        }
-        for entry in entries
-    ]
-    arrays: dict[str, NDArray[Any]] = dict(grids.arrays)
+    grids = [(entry.x.tobytes(), entry.y.tobytes()) for entry in entries]
+    numbers = {grid: number for number, grid in enumerate(dict.fromkeys(grids))}  # most results are on one
+    head, arrays = [], {}
+    for entry, grid in zip(entries, grids, strict=True):
+        stated = {name: getattr(entry, name) for name in ("file", "stamp", "attributes", "fields", "sealed")}
+        counts = {name: len(values) for name, values in entry.histories.items()}
+        head.append(stated | {"histories": counts, "grid": numbers[grid]})
+        arrays |= {f"x{numbers[grid]}": entry.x, f"y{numbers[grid]}": entry.y}
     for name in _names_of_histories():
         columns = [entry.histories[name] for entry in entries if name in entry.histories]
         if columns:
@@ -276,20 +262,6 @@ def save_index(folder: Path, index: Index) -> None:
         stated = {"keys": keys} | ({"realisations": drawn} if drawn else {}) | {"checksum": _checksum(keys, drawn)}
         with suppress(OSError, InputError), atomic_write(folder / LATEST) as temporary:
             temporary.write_text(json.dumps(stated))
-
-
-class _Grids:
-    """Distinct grids, numbered: most results of a folder are on one."""
-
-    def __init__(self) -> None:
-        self.arrays: dict[str, NDArray[np.float64]] = {}
-        self._numbers: dict[tuple[bytes, bytes], int] = {}
-
-    def number(self, entry: Entry) -> int:
-        grid = (entry.x.tobytes(), entry.y.tobytes())
-        number = self._numbers.setdefault(grid, len(self._numbers))
-        self.arrays |= {f"x{number}": entry.x, f"y{number}": entry.y}
-        return number
 
 
 def _latest(folder: Path) -> tuple[tuple[str, ...] | None, dict[str, int]]:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InUseError
-from roughvisc.study.storage.links import open_unlinked
+from roughvisc.study.storage.files import open_unlinked
 
 try:
     import fcntl
@@ -35,10 +35,6 @@ _PATIENCE = 2.0
 def lock_path(folder: Path, key: str) -> Path:
     """Lock of a case in a folder of results."""
     return folder / f".{key}.lock"
-
-
-def _named(holder: dict[str, Any]) -> str:
-    return f"process {holder['pid']} on {holder['host']}" if holder else "another run"
 
 
 class Lock:
@@ -132,8 +128,9 @@ def _opened(path: Path, patience: float) -> int:
                 if alone is False and time.monotonic() < until:
                     time.sleep(0.05)
                 elif alone is False or (holder and not _dead(path, holder, alone)):
+                    who = f"process {holder['pid']} on {holder['host']}" if holder else "another run"
                     raise InUseError(
-                        f"{path}: {_named(holder)} is at work on this case in this folder: expected one run at a "
+                        f"{path}: {who} is at work on this case in this folder: expected one run at a "
                         "time; wait for it, or use another folder"
                     )
                 else:

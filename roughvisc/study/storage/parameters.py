@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.study.statement.realisations import REALISATION, SURROGATE
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.statement.variation import REALISATION, SURROGATE
 
 #: Coordinate that holds the key of the case.
 CASE_KEY = "case_key"
@@ -60,8 +60,7 @@ def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
     case : mapping
         The case in JSON.
     """
-    varied = {name: values[0] for name, values in parameters_of([case]).items()}
-    return labels_of({name: np.asarray(value) for name, value in varied.items()}, case)
+    return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
 
 
 def as_realisation(case: Mapping[str, Any], number: int | None) -> Mapping[str, Any]:
@@ -78,8 +77,8 @@ def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]
         below = any(key == varied or key.startswith(f"{varied}.") for varied in keys)
         if not below and key not in said_already and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
             keys[key] = None
-    values = {key: [_value(case, leaf, key) for case, leaf in zip(cases, leaves, strict=True)] for key in keys}
-    return {key: _column(found) for key, found in values.items()}
+    stated = [leaf | case.get("varied", {}) for case, leaf in zip(cases, leaves, strict=True)]
+    return {key: _column([one.get(key) for one in stated]) for key in keys}
 
 
 def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
@@ -89,11 +88,6 @@ def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
             yield from _leaves(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
-
-
-def _value(case: Mapping[str, Any], leaf: Mapping[str, Any], key: str) -> Any:
-    varied = case.get("varied", {})
-    return varied[key] if key in varied else leaf.get(key)
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:

@@ -15,8 +15,8 @@ from roughvisc.errors import InputError
 from roughvisc.groups import for_root, root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.realisations import DRAWN, REALISATION
-from roughvisc.study.storage.checksum import warn_once
+from roughvisc.study.statement.variation import DRAWN, REALISATION
+from roughvisc.study.storage.files import warn_once
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
 from roughvisc.study.storage.parameters import (
     CASE_KEY,
@@ -26,8 +26,7 @@ from roughvisc.study.storage.parameters import (
     labels_of,
     parameters_of,
 )
-from roughvisc.study.storage.reading import read_variable
-from roughvisc.study.storage.store import no_results
+from roughvisc.study.storage.store import no_results, read_variable
 from roughvisc.study.storage.upkeep import counted_versions, version_of
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES

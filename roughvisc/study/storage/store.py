@@ -1,6 +1,7 @@
-"""Results in NetCDF files: written whole or not at all, and read lazily.
+"""Results in NetCDF files: written whole or not at all, and read lazily in any thread: no file stays open.
 
-CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them as they are.
+CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them as they are. xarray's own engine reads under
+netCDF's lock, but opens and closes files outside it, and netCDF-4 does not stand that: here none is touched outside it.
 """
 
 from __future__ import annotations
@@ -10,31 +11,102 @@ import json
 import logging
 import math
 import os
-import secrets
 import shutil
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import netCDF4
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray, BackendEntrypoint
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
+from xarray.core import indexing
 
-from roughvisc.errors import FolderError, InputError
-from roughvisc.groups import attributes_of, group_of, groups_of, root_of, split, whole_of
+from roughvisc.errors import InputError
+from roughvisc.groups import attributes_of, carrying, group_of, groups_of, root_of, split, whole_of
 from roughvisc.labels import annotate, format_of
 from roughvisc.recorder import chunks
-from roughvisc.study.storage.checksum import append_checksum, is_news, verify_checksum
+from roughvisc.study.storage.files import append_checksum, atomic_write, is_news, verify_checksum
 from roughvisc.study.storage.formats import to_current
-from roughvisc.study.storage.reading import BOUNDS, NETCDF, ResultBackend  # netCDF-4 does not stand two threads
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.axes import AXES, axis_of
 
-if TYPE_CHECKING:
-    import xarray as xr
+#: End of the name of the borders of cells in a file; a Dataset has none, its cells are all alike.
+BOUNDS = "_bounds"
+
+
+def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
+    """Part of a variable of a result, as it is stored.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, gone, or holds no such variable.
+    """
+    verify_checksum(Path(path))
+    try:
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            return np.asarray(file[name][key])
+    except (OSError, RuntimeError, LookupError) as error:
+        raise InputError(
+            f"{path}: its {name} cannot be read ({error}): the file is damaged; run its study again"
+        ) from error
+
+
+class ResultBackend(BackendEntrypoint):
+    """Fields over x and y are read when they are asked for, all else at once; the root carries the groups."""
+
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
+        """As xarray's engine ``netcdf4`` opens it, durations as plain numbers."""
+        path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            root, groups = _dataset(path, file), {name: _dataset(path, one) for name, one in file.groups.items()}
+        return carrying(root.drop_vars(drop_variables or (), errors="ignore"), groups)
+
+
+def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
+    """The variables of a file, or of a group of it."""
+    variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
+    for axis in [name for name, one in variables.items() if one.attrs.get("bounds") == f"{name}{BOUNDS}"]:
+        variables.pop(variables[axis].attrs.pop("bounds"), None)
+    attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+    decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
+    texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
+    return decoded.assign_coords(texts)
+
+
+def _variable(path: str, stored: netCDF4.Variable) -> xr.Variable:
+    attributes = {name: stored.getncattr(name) for name in stored.ncattrs()}
+    lazily = stored.dimensions[-2:] == ("x", "y")
+    data = indexing.LazilyIndexedArray(_Field(path, stored)) if lazily else np.asarray(stored[...])
+    filters = stored.filters() or {}
+    encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
+    chunks = stored.chunking()
+    encoding |= {"contiguous": True} if chunks == "contiguous" else {"chunksizes": tuple(chunks or ())}
+    return xr.Variable(stored.dimensions, data, attributes, encoding)
+
+
+class _Field(BackendArray):
+    """A variable whose file is opened each time: it pickles, and may be read in threads and processes."""
+
+    def __init__(self, path: str, stored: netCDF4.Variable) -> None:
+        self.path, self.name = path, stored.name
+        self.shape, self.dtype = stored.shape, stored.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        return read_variable(self.path, self.name, key)
 
 
 #: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
@@ -113,34 +185,6 @@ def result_files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*.nc") if not path.name.startswith("."))
 
 
-def is_writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, which need not exist yet."""
-    return os.access(_nearest(folder), os.W_OK)
-
-
-def require_writable(folder: Path, why: str = "") -> None:
-    """Refuse a folder of results in which no file can be made.
-
-    Raises
-    ------
-    FolderError
-        If there is none and none can be made, or it is not writable; with the reason that is given.
-    """
-    if not is_writable(folder):
-        needed = f", {why}" if why else ""
-        raise FolderError(f"{_nearest(folder)}: is not writable: expected a folder with write permission{needed}")
-
-
-def _nearest(folder: Path) -> Path:
-    """A folder, or what is there of the folders above it."""
-    return next(place for place in (folder, *folder.absolute().parents) if place.exists())
-
-
-def partial_files(path: Path) -> list[Path]:
-    """What writes of a result that did not end have left beside it."""
-    return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
-
-
 def no_results(folder: Path) -> InputError:
     """What to tell of a folder without a result."""
     return InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
@@ -154,56 +198,6 @@ def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
     with atomic_write(path) as temporary:
         kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
     return Path(path)
-
-
-@contextmanager
-def atomic_write(path: str | Path) -> Iterator[Path]:
-    """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.
-
-    Parameters
-    ----------
-    path : path
-        The file to be. Its folder is made if need be.
-
-    Yields
-    ------
-    Path
-        A temporary name in the same folder, with the same suffix.
-
-    Raises
-    ------
-    FolderError
-        If the folder cannot be made or written to.
-    """
-    path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
-    if not os.access(path.parent, os.W_OK):
-        raise FolderError(f"{path.parent}: is not writable: expected a folder with write permission")
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    try:
-        yield temporary
-        _sync(temporary)
-        os.replace(temporary, path)
-        _sync(path.parent)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _sync(path: Path) -> None:
-    """Have the operating system put a file, or the names in a folder, on the disk."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except OSError:  # a folder, on Windows
-        if path.is_dir():
-            return
-        raise
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | None = None) -> Path:
@@ -417,8 +411,6 @@ def whole_result(path: str | Path) -> xr.Dataset:
 
 def _stored(path: str | Path) -> xr.Dataset:
     """Root of a result, which carries its groups."""
-    import xarray as xr
-
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
@@ -458,8 +450,12 @@ def _foreign(dataset: xr.Dataset) -> str:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
         return f"has the tolerance {shown(dataset.attrs['tolerance'])}"
+    return "" if is_json_table(dataset.attrs.get("case", "{}")) else "has an attribute case that is no case in JSON"
+
+
+def is_json_table(text: Any) -> bool:
+    """Whether a text is a table in JSON, as a stored case is."""
     try:
-        stated = json.loads(dataset.attrs.get("case", "{}"))
+        return isinstance(json.loads(text), dict)
     except (TypeError, ValueError, RecursionError):
-        stated = None
-    return "" if isinstance(stated, dict) else "has an attribute case that is no case in JSON"
+        return False

@@ -14,12 +14,13 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.study.ensembles import STANDING, over_realisations
-from roughvisc.study.statement.realisations import DRAWN, REALISATION
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.failures import stated_failure
+from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.parameters import as_realisation, combinations, parameters_of
-from roughvisc.study.storage.store import atomic_write, no_results
+from roughvisc.study.storage.store import no_results
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES

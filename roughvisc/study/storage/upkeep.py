@@ -16,7 +16,7 @@ from roughvisc.errors import InputError, InUseError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION, program_version
 from roughvisc.study.storage.checkpoint import checkpoint_version
-from roughvisc.study.storage.checksum import checksum_error, is_sealed
+from roughvisc.study.storage.files import checksum_error, is_sealed
 from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import NETCDF, no_results, result_files, result_path
@@ -96,8 +96,9 @@ def upgrade_note(folder: Path, cases: Sequence[Case], index: Index | None = None
     str
         Empty if there is nothing to say.
     """
-    if index is None:
-        index = index_of(folder, warn=False) if folder.is_dir() else Index({})
+    if not folder.is_dir():
+        return ""
+    index = index or index_of(folder, warn=False)
     todo = {case.key: case for case in cases if case.key not in index.entries}
     if not todo:
         return ""

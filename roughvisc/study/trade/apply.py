@@ -15,7 +15,7 @@ from tomlkit.items import Float, Table, Trivia
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.store import atomic_write
+from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.trade.ladder import format_tolerance
 
 #: What keys are that a study does not state, where they are to be as if it did not.

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.store import atomic_write
+from roughvisc.study.storage.files import atomic_write
 from roughvisc.views.figures.axes import verbatim
 
 

@@ -20,9 +20,9 @@ from roughvisc.groups import whole_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.checksum import verify_checksum
+from roughvisc.study.storage.files import atomic_write, verify_checksum
 from roughvisc.study.storage.index import index_of
-from roughvisc.study.storage.store import atomic_write, no_results, result_files, whole_result
+from roughvisc.study.storage.store import no_results, result_files, whole_result
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters

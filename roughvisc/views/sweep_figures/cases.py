@@ -15,8 +15,8 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.labels import expect_current_names
-from roughvisc.study.statement.realisations import DRAWN, REALISATION
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.variables.axes import AXES, axis_of

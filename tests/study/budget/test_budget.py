@@ -10,7 +10,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget.budget import budgets
 from roughvisc.study.quantities import QUANTITIES
-from roughvisc.study.statement.schema.want import WANTED
+from roughvisc.study.statement.schema.evaluation import WANTED
 
 BALL = """
 title = "Ball"

@@ -13,7 +13,7 @@ from roughvisc.study.budget import population
 from roughvisc.study.budget.population import Level, counts_for, mean_of, scatter_of
 from roughvisc.study.budget.target import Bench, Grids, first_grids, mean_of_population, wanting
 from roughvisc.study.budget.variants import Variants
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.quantities import QUANTITIES
 
 STUDY = """
@@ -105,7 +105,7 @@ def made_up(monkeypatch):
 def prepared(tmp_path, target, **changes):
     (tmp_path / "study.toml").write_text(STUDY)
     case = wanting(rv.vary(rv.read_study(tmp_path / "study.toml"), changes), {"mean_gap": target})
-    bench = Bench([QUANTITIES["mean_gap"]], tmp_path / "budget", NullMonitor, [].append)
+    bench = Bench([QUANTITIES["mean_gap"]], tmp_path / "budget", Monitor, [].append)
     return case, bench, *first_grids(case, bench, {"mean_gap": target}, np.inf)
 
 
@@ -115,7 +115,7 @@ def test_mean__is_within_the_target_of_the_truth(tmp_path, made_up):
     off = []
     for seed in range(20):
         (tmp_path / str(seed)).mkdir()
-        other = Bench(bench.quantities, tmp_path / str(seed), NullMonitor, [].append)
+        other = Bench(bench.quantities, tmp_path / str(seed), Monitor, [].append)
         moved = Variants(rv.vary(grids.variants.case, {"surface.seed": seed}), grids.variants.height)
         found = mean_of_population(case, Grids(grids.own, moved), around, other, {"mean_gap": 0.03}, np.inf)
         assert found.error(QUANTITIES["mean_gap"]) <= np.log(1.03)

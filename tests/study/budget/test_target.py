@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget.budget import budgets
 from roughvisc.study.budget.target import Bench, first_grids, parse_targets, tolerance_for
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.quantities import QUANTITIES
 from roughvisc.study.statement.case import Case
 
@@ -199,7 +199,7 @@ def test_tolerance__is_sharpened_where_steps_and_solver_take_much_of_the_target(
     study = case(ROUGH, tmp_path, **{"program.0.over": "10 ms", "program.0.pressure": "100 kPa"})
     told = []
     for part in (0.9, 0.01):
-        bench = Bench([QUANTITIES["leak_rate"]], tmp_path / "budget", NullMonitor, told.append)
+        bench = Bench([QUANTITIES["leak_rate"]], tmp_path / "budget", Monitor, told.append)
         tolerance = tolerance_for(study, {"leak_rate": part})
         _, around = first_grids(study, bench, {"leak_rate": part}, np.inf)
         half = float(around.solves[0].stated["leak_rate"].max())

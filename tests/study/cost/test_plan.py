@@ -193,7 +193,7 @@ def test_plan__says_what_runs_side_by_side_and_what_half_the_resolution_costs(st
     case = study(ROUGH)[0]
     several = [vary(case, {"program.0.load": load}) for load in (0.01, 0.015, 0.02)]
     monkeypatch.setattr(totals_module, "cores", lambda: 4)
-    monkeypatch.setattr("roughvisc.study.execution.side_by_side.cores", lambda: 4)
+    monkeypatch.setattr("roughvisc.study.execution.cluster.cores", lambda: 4)
     monkeypatch.setattr(plan_module, "memory_available", lambda: Available(1e12, "free in this machine"))
     planned = rv.plan(several)
     assert (planned.attrs["processes"], planned.attrs["threads"]) == (3, 1)

@@ -21,7 +21,7 @@ from roughvisc.groups import whole_of
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, has_other_versions
-from roughvisc.study.execution.monitor import LiveMonitor, NullMonitor
+from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.execution.task import Outcome
 from roughvisc.study.statement.case import vary
@@ -60,7 +60,7 @@ def worker_process(client, *options):
         process.wait(60)
 
 
-class Ear(NullMonitor):
+class Ear(Monitor):
     """Keeps what a sweep is told: times reached, and messages."""
 
     def __init__(self):
@@ -101,7 +101,7 @@ def test_lifetime__of_each_worker_is_shorter_than_the_sweep(study, tmp_path):
         outcomes = run_cases(cases, tmp_path / "out", watch=(ear := Ear()), client=client)
     assert [o.kind for o in outcomes.values()] == ["done"] * 4
     assert sum(end == 0 for _, _, end in ear.heard) > 4, "some were begun again"
-    run_cases(cases, tmp_path / "calm", watch=NullMonitor(), workers=0)
+    run_cases(cases, tmp_path / "calm", watch=Monitor(), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
 
 
@@ -165,7 +165,7 @@ def test_other_version__of_all_workers_ends_the_sweep_and_of_some_leaves_them_ou
     cases, version = study(), program_version()
     with bare_cluster() as client, foreign_worker(client, tmp_path) as process:
         with pytest.raises(InputError) as caught:  # it joins when the sweep waits already
-            run_cases(cases, tmp_path / "out", watch=NullMonitor(), client=client)
+            run_cases(cases, tmp_path / "out", watch=Monitor(), client=client)
         ((foreign, _),) = client.nthreads().items()
         beginning = f"worker {foreign} has roughvisc 0.0.7, while this process has {version}: expected "
         assert str(caught.value).startswith(beginning)
@@ -353,7 +353,7 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
 
 
 def test_message__is_seen_whoever_watches(capsys):
-    NullMonitor().message("no worker")
+    Monitor().message("no worker")
     LiveMonitor(None).message("no worker")
     assert capsys.readouterr().err == "roughvisc: no worker\nno worker\n"
 
@@ -381,5 +381,5 @@ def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
     assert [o.kind for o in outcomes.values()] == ["done"]
     second = [end for _, _, end in ear.heard].index(0.0, 1)
     assert ear.heard[second + 1][1] > left_at, "it did not begin anew"
-    run_cases([case], tmp_path / "calm", watch=NullMonitor(), workers=0)
+    run_cases([case], tmp_path / "calm", watch=Monitor(), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))

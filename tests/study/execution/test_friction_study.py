@@ -10,7 +10,7 @@ from support import BALL, assert_same, friction_whole, numbers, run_whole
 
 import roughvisc as rv
 from roughvisc.study.execution.cluster import connect
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases, read_study, vary
@@ -134,9 +134,9 @@ def test_sweep__on_a_cluster_ends_with_the_same_bits(tmp_path, by_hand):
     (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES + '"friction.direction" = ["x", "-y"]\n')
     cases = read_cases(tmp_path / "slide.toml")
     with connect(file=by_hand) as client:
-        outcomes = run_cases(cases, tmp_path / "there", watch=NullMonitor(), client=client)
+        outcomes = run_cases(cases, tmp_path / "there", watch=Monitor(), client=client)
     assert [one.kind for one in outcomes.values()] == ["done"] * 4
-    run_cases(cases, tmp_path / "here", watch=NullMonitor(), workers=0)
+    run_cases(cases, tmp_path / "here", watch=Monitor(), workers=0)
     assert_same(numbers(tmp_path / "there"), numbers(tmp_path / "here"))
 
 

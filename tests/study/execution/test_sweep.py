@@ -23,9 +23,9 @@ from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscErr
 from roughvisc.groups import whole_of
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
-from roughvisc.study.execution.baggage import serialize_with_inputs
 from roughvisc.study.execution.cluster import connect
-from roughvisc.study.execution.monitor import LiveMonitor, NullMonitor
+from roughvisc.study.execution.dispatch import serialize_with_inputs
+from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage import failures as sweep_log
@@ -34,7 +34,7 @@ from roughvisc.study.storage.index import INDEX, LATEST
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.table import CASES
 
-RUN = [sys.executable, "-m", "roughvisc.cli", "run"]
+RUN = [sys.executable, "-m", "roughvisc", "run"]
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning",
@@ -174,20 +174,20 @@ def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_p
     assert record["case"]["varied"] == {"program.0.load": 50.0}
     assert "failed" in (tmp_path / "out" / "sweep.log").read_text()
 
-    outcomes = run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0)
+    outcomes = run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
     assert computed == [4e-3, 50.0, 5e-3], "nothing is computed again"
     assert [o.kind for o in outcomes.values()] == ["done", "failed", "done"]
     assert all(o.reused for o in outcomes.values())
-    run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0, retry_failed=True)
+    run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0, retry_failed=True)
     assert computed == [4e-3, 50.0, 5e-3, 50.0]
 
 
 def test_sweep__what_another_version_failed_at_is_tried_again(study, tmp_path):
     cases = study(BALL + POISON)
-    run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0)
+    run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
     path = record_path(tmp_path / "out", cases[1].key)
     path.write_text(path.read_text().replace('"source": "roughvisc', '"source": "roughvisc 0'))
-    assert not run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0)[cases[1].key].reused
+    assert not run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)[cases[1].key].reused
 
 
 def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_path, monkeypatch):
@@ -221,7 +221,7 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
         raise error
 
     monkeypatch.setattr(task_module, "run_case", hindered)
-    outcomes = run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=0)
+    outcomes = run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
     assert {o.kind for o in outcomes.values()} == {kind}
     assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
@@ -243,7 +243,7 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
         monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
     monkeypatch.setattr(task_module, "run_case", full)
     with pytest.raises(DiskFullError, match=r"^x\.nc: No space left .*make room \(1 of 4 cases are finished\)$"):
-        run_cases(cases, tmp_path / "out", watch=NullMonitor(), workers=workers)
+        run_cases(cases, tmp_path / "out", watch=Monitor(), workers=workers)
     begun = len(list(tmp_path.glob("begun*")))
     assert begun == 2 if workers == 0 else begun < 4
     assert not list((tmp_path / "out").glob("*.failed.json"))
@@ -266,14 +266,14 @@ def test_run__a_folder_that_may_no_longer_be_written_to_keeps_the_checkpoint(stu
     (case,) = study(BALL)
     write = run_module.write_result
     monkeypatch.setattr(run_module, "write_result", lambda ds, path, **how: write(ds, "/proc/none/x.nc", **how))
-    outcomes = run_cases([case], tmp_path / "out", watch=NullMonitor(), workers=0)
+    outcomes = run_cases([case], tmp_path / "out", watch=Monitor(), workers=0)
     assert outcomes[case.key].kind == "hindered"
     assert "/proc/none: cannot be made" in outcomes[case.key].message
 
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
     for _ in range(2):
-        outcomes = run_cases(study()[:1], tmp_path / "out", watch=NullMonitor(), workers=0)
+        outcomes = run_cases(study()[:1], tmp_path / "out", watch=Monitor(), workers=0)
         (outcome,) = outcomes.values()
         assert outcome.kind == "unconverged"
         assert "1 of 3 kept times did not converge, first at t = 100 ms" in outcome.message
@@ -377,7 +377,7 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
 def test_watch__hears_from_workers(study, tmp_path):
     heard = {}
 
-    class Ear(NullMonitor):
+    class Ear(Monitor):
         def reached(self, key, now, end):
             heard.setdefault(key, []).append(now)
 

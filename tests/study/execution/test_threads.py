@@ -9,7 +9,7 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.reading import NETCDF
+from roughvisc.study.storage.store import NETCDF
 
 #: A ball on a coarse grid: most of its time goes to files.
 SMALL = BALL.replace("[24, 21]", "[12, 9]")

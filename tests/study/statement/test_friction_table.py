@@ -7,7 +7,7 @@ import roughvisc as rv
 from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.study.statement import identity as identity_module
 from roughvisc.study.statement.case import Case, read_cases, read_study
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 
 SURFACE = BALL[BALL.index("[surface]") : BALL.index("[[program]]")]
 FREE = '[solve]\nboundary = "free"\n'

@@ -6,7 +6,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 
 START, END = BALL.index("[material]"), BALL.index("[[program]]")
 LAYER = """

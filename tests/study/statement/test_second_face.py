@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.study.execution.baggage import serialize_with_inputs
+from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.treatment import treatment
 from roughvisc.study.trade.ladder import grid_change, is_data
 

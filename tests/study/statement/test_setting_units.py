@@ -3,9 +3,9 @@
 import pytest
 
 from roughvisc.study.statement.schema import program, settings, surface
-from roughvisc.study.statement.schema.conditioning import Filter, Outliers
+from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.schema.material import SECTIONS
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.surface import Filter, Outliers
 
 CYCLES = {control: {"program": [{"cycle": {}, "control": control}]} for control in ("load", "approach")}
 TABLES = {control: {"program": [{"table": {}, "control": control}]} for control in ("load", "approach")}
@@ -17,8 +17,8 @@ PLACES = [
     ("filter", "surface.filter", Filter, None),
     ("outliers", "surface.outliers", Outliers, None),
     *((one.__name__, "program.0", one, None) for one in program.SECTIONS),
-    ("load cycle", "program.0.cycle", program.LoadWave, CYCLES["load"]),
-    ("approach cycle", "program.0.cycle", program.ApproachWave, CYCLES["approach"]),
+    ("load cycle", "program.0.cycle", program.TABLES["load"].wave, CYCLES["load"]),
+    ("approach cycle", "program.0.cycle", program.TABLES["approach"].wave, CYCLES["approach"]),
     ("solve", "solve", settings.SolveSection, None),
     ("keep", "keep", settings.KeepSection, None),
 ]

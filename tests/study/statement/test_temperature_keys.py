@@ -6,7 +6,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.study.statement.case import Case, read_cases, vary
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 
 WORKFLOWS = Path(__file__).parents[3] / "workflows"
 WLF = {"temperature": "30 degC", "reference_temperature": 293.15, "wlf_c1": 8.0, "wlf_c2": "90 K"}

@@ -9,7 +9,7 @@ from support import BALL, run_whole
 import roughvisc as rv
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.statement.schema import Study
-from roughvisc.study.statement.schema.friction import FrictionSection
+from roughvisc.study.statement.schema.experiments import FrictionSection
 from roughvisc.study.storage.parameters import identifier, labels_of_case
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.sliding import SLIDING

@@ -38,10 +38,8 @@ from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
-from roughvisc.study.storage import records
-from roughvisc.study.storage.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
+from roughvisc.study.storage.checkpoint import CheckpointWriter, RowFile, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.records import RowFile
 from roughvisc.study.storage.store import whole_result
 
 
@@ -651,7 +649,7 @@ def test_memory__does_not_grow_with_kept_rows(room, whole, tmp_path, monkeypatch
         append(self, plain, arrays)
         held_arrays.append(sum(array.nbytes for array in arrays_in(list(vars(self).values()))))
 
-    monkeypatch.setattr(records, "_WAITING", room)
+    monkeypatch.setattr(checkpoint_module, "_WAITING", room)
     monkeypatch.setattr(RowFile, "append", appended)
     assert values(run_case(case, tmp_path)) == expected
     assert max(held_arrays) <= room
@@ -684,10 +682,10 @@ def test_checkpoint_of_the_former_format__is_not_gone_on_from(whole, tmp_path, c
     unfinished = stopped(case, tmp_path, steps // 2)
     for path in unfinished.glob("checkpoint.*"):
         with open(path, "rb", buffering=0) as stream:
-            plain, arrays = records.read_record(stream)
+            plain, arrays = checkpoint_module.read_record(stream)
         del plain["result_format"]  # former versions state none
         with open(path, "wb", buffering=0) as stream:
-            records.write_record(stream, plain, arrays)
+            checkpoint_module.write_record(stream, plain, arrays)
     stop = Stop()
     with caplog.at_level(logging.WARNING, "roughvisc"):
         path = run_case(case, tmp_path, stop=stop)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roughvisc.study.storage import records
-from roughvisc.study.storage.records import Damaged, RowFile, read_record, write_record
+from roughvisc.study.storage import checkpoint as records
+from roughvisc.study.storage.checkpoint import Damaged, RowFile, read_record, write_record
 
 
 def field(share, seed, shape=(37, 41)):

@@ -16,8 +16,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.storage import checksum as trust
-from roughvisc.study.storage.checksum import checksum_error, is_sealed, unsealed
+from roughvisc.study.storage import files as trust
+from roughvisc.study.storage.files import checksum_error, is_sealed, unsealed
 from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.study.storage.upkeep import verify
 

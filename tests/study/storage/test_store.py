@@ -12,8 +12,10 @@ from xarray.core.indexing import LazilyIndexedArray
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.storage import records, store
-from roughvisc.study.storage.store import atomic_write, may_be_missing, whole_result, write_result
+from roughvisc.study.storage import checkpoint as records
+from roughvisc.study.storage import store
+from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.store import may_be_missing, whole_result, write_result
 
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
 MISSING = {
@@ -224,7 +226,7 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
         out[...] = number
         return out
 
-    lazy = LazilyIndexedArray(records._frames(shape, filled))
+    lazy = LazilyIndexedArray(records._Frames(filled, range(shape[0]), shape[1:]))
     ds = ds.assign(pressure=(ds["pressure"].dims, lazy, ds["pressure"].attrs))
     write_result(ds, tmp_path / "first.nc")  # what is imported late is there
     tracemalloc.start()

@@ -9,7 +9,7 @@ from support import BALL, run_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.execution.monitor import NullMonitor
+from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import whole_result
@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
     """Results of a sweep of four cases, two of which fail."""
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "balls.toml").write_text(SMALL.replace('"A ball"', '"Bälle, größer"') + SWEEP, encoding="utf-8")
-    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=NullMonitor())
+    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=Monitor())
     return folder / "out"
 
 
@@ -85,7 +85,7 @@ def test_table__leaves_out_what_is_not_known(folder, tmp_path):
 
 
 def test_table__names_cases_that_were_not_reached(tmp_path):
-    class Stop(NullMonitor):
+    class Stop(Monitor):
         def ended(self, outcome):
             raise KeyboardInterrupt
 

@@ -9,7 +9,7 @@ import xarray as xr
 from PIL import Image
 
 import roughvisc as rv
-from roughvisc.study.storage import reading, store
+from roughvisc.study.storage import store
 from roughvisc.topography import blocks
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import chunks
@@ -53,14 +53,14 @@ def stored(tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "_MANY_CELLS", 100)
     monkeypatch.setattr(chunks, "_CHUNK_OF_MANY", (1, 8, 8))
     path, shapes = store.write_result(result(displacement=True), tmp_path / "result.nc"), []
-    read = reading._Field._read
+    read = store._Field._read
 
     def told(self, key):
         found = read(self, key)
         shapes.append(found.shape)
         return found
 
-    monkeypatch.setattr(reading._Field, "_read", told)
+    monkeypatch.setattr(store._Field, "_read", told)
     with store.open_result(path) as dataset:
         yield dataset, shapes
 

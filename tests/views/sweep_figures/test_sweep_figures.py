@@ -12,7 +12,7 @@ from support import labels, lines, text_boxes
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.schema.units import unit_of
+from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.views import plot
 from roughvisc.views.sweep_figures.case_text import material_words, readable_setting
 from roughvisc.views.sweep_figures.cases import cases_of

@@ -12,18 +12,13 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.study.statement.schema.audit import AuditSection
-from roughvisc.study.statement.schema.entries import Text, a_list, nullable, shown
-from roughvisc.study.statement.schema.experiments import ExperimentSection
-from roughvisc.study.statement.schema.friction import FrictionSection
+from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection, WantSection
+from roughvisc.study.statement.schema.experiments import ExperimentSection, FrictionSection
 from roughvisc.study.statement.schema.material import AnyMaterial
-from roughvisc.study.statement.schema.meanings import with_meanings
-from roughvisc.study.statement.schema.observe import ObserveSection
 from roughvisc.study.statement.schema.program import AnySegment
-from roughvisc.study.statement.schema.section import Section, refuse
+from roughvisc.study.statement.schema.section import Section, Text, a_list, nullable, refuse, shown
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
 from roughvisc.study.statement.schema.surface import AnySurface
-from roughvisc.study.statement.schema.want import WantSection
 
 #: Tables that state an experiment other than a program.
 EXPERIMENTS = ["friction"]
@@ -169,18 +164,3 @@ def add_experiment(section: type[ExperimentSection], table: str) -> None:
                 fields[table] = FieldInfo.from_annotated_attribute(nullable(section), None)
             fields[name] = one
         study.model_rebuild(force=True)
-
-
-def study_schema() -> dict[str, Any]:
-    """JSON schema of a study file, for editors that check TOML while it is written.
-
-    Examples
-    --------
-    >>> sorted(study_schema()["properties"])
-    ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title', 'want']
-    >>> study_schema()["$defs"]["SolveSection"]["properties"]["edge"]["description"].partition(";")[0]
-    'whether contact may reach the border in free space: the scan outline is then treated as a punch'
-    """
-    schema = StudyFile.model_json_schema()
-    schema["title"] = "roughvisc study"
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **with_meanings(schema)}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     Field,
@@ -23,15 +23,113 @@ from pydantic import (
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.bodies.layer import layer
+from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.checks import tensile_to_shear
-from roughvisc.mechanics.materials.scaled import shifted, stiffened
-from roughvisc.study.statement.schema.entries import FilePath, Text, choice, listed, located, measured, nullable, shown
-from roughvisc.study.statement.schema.section import Section, nearest, of_file, refuse
-from roughvisc.study.statement.schema.temperature import KEYS as TEMPERATURE
-from roughvisc.study.statement.schema.temperature import shift_factor
-from roughvisc.study.statement.schema.thickness import KEYS as THICKNESS
+from roughvisc.mechanics.materials.scaled import LARGEST_SHIFT, shifted, stiffened
+from roughvisc.mechanics.materials.temperature import arrhenius_shift, wlf_shift
+from roughvisc.study.statement.schema.section import (
+    FilePath,
+    Section,
+    Text,
+    Unit,
+    choice,
+    kind,
+    listed,
+    located,
+    measured,
+    nearest,
+    nullable,
+    of_file,
+    refuse,
+    shown,
+    validate,
+)
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
+
+#: key -> its kind; every model takes them, and none of them is needed
+TEMPERATURE: dict[str, Any] = {
+    "temperature": measured("K", above=0),
+    "reference_temperature": measured("K", above=0),
+    "wlf_c1": measured("1", above=0),
+    "wlf_c2": measured("K", above=0, difference=True),
+    "activation_energy": measured("J/mol", above=0),
+    "shift_factor": measured("1", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT),
+}
+_LAWS = (("wlf_c1", "wlf_c2"), ("activation_energy",))
+_WANTED = "wlf_c1 and wlf_c2, or activation_energy"
+
+
+def shift_factor(stated: Mapping[str, Any]) -> float:
+    """What all times of a material are multiplied by; one if nothing is stated.
+
+    Parameters
+    ----------
+    stated : mapping
+        Values of :data:`TEMPERATURE`, None where there is none.
+
+    Raises
+    ------
+    ValidationError
+        Naming the key, if one is missing or too many, or the temperature is out of the law's range.
+    """
+    given = {key: stated[key] for key in TEMPERATURE if stated.get(key) is not None}
+    if "shift_factor" in given:
+        if len(given) > 1:
+            beside = next(key for key in given if key != "shift_factor")
+            raise refuse("shift_factor", f"found beside {beside}: expected one of them")
+        return float(given["shift_factor"])
+    if not given:
+        return 1.0
+    for key in ("temperature", "reference_temperature"):
+        if key not in given:
+            raise refuse(key, f"missing: expected a temperature in K, or with its unit, beside {next(iter(given))}")
+    laws = [law for law in _LAWS if any(key in given for key in law)]
+    if len(laws) != 1:
+        found = f"found {' and '.join(laws[0] + laws[1])}" if laws else "missing"
+        raise refuse(laws[1][0] if laws else "wlf_c1", f"{found}: expected {_WANTED}")
+    for key in laws[0]:
+        if key not in given:
+            raise refuse(key, f"missing: expected {_WANTED}")
+    at = given["temperature"], given["reference_temperature"]
+    try:
+        factor = (
+            wlf_shift(*at, given["wlf_c1"], given["wlf_c2"])
+            if "wlf_c1" in given
+            else arrhenius_shift(*at, given["activation_energy"])
+        )
+    except InputError as error:
+        raise refuse("temperature", str(error).replace("temperature is", "found", 1)) from error
+    if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
+        raise refuse(
+            "temperature",
+            f"found {at[0]:g} K and a reference of {at[1]:g} K, a shift by {factor:.1g}: expected one from 1e-30 to "
+            "1e30; a number is in kelvin, and '25 degC' is a text",
+        )
+    return factor
+
+
+_THICKNESS = measured("m", above=0)
+
+
+def _thickness(value: Any) -> float:
+    """A length, or an infinite one: a half-space among the sheets of a sweep."""
+    endless = isinstance(value, float) and value == math.inf
+    return math.inf if endless else float(validate(_THICKNESS, value))
+
+
+#: key -> its kind; every model takes them, and a half-space has none of them
+THICKNESS: dict[str, Any] = {
+    "thickness": kind(
+        float,
+        _thickness,
+        "a number in m, or a string with a unit of its kind, above 0; inf: a half-space",
+        {"type": ["number", "string"]},
+        Unit("m"),
+    ),
+    "base": choice(*get_args(Base)),
+}
+
 
 MODULUS = measured("Pa", above=0)
 COMPLIANCE = measured("1/Pa", least=0)
@@ -255,18 +353,18 @@ def _section(name: str) -> type[MaterialSection]:
     constructor, kinds = MODELS[name]
     parameters, columns = inspect.signature(constructor).parameters, COLUMNS.get(name, {})
     fields: dict[str, Any] = {}
-    for key, kind in kinds.items():
+    for key, own in kinds.items():
         default = parameters[key].default
         if key in columns:
             default = None  # missing with a file, and asked for by _with_columns without one
         elif default is inspect.Parameter.empty or (default is None and key not in _OPTIONAL):
             default = ...
-        fields[key] = (nullable(kind) if default is None else kind, default)
+        fields[key] = (nullable(own) if default is None else own, default)
     if columns:
         fields["file"] = (nullable(FilePath), None)
         keys = {column.unit_key for column in columns.values()} - {"", *kinds}
         fields |= {key: (nullable(Text), None) for key in sorted(keys)}
-    fields |= {key: (nullable(kind), None) for key, kind in {**TEMPERATURE, **THICKNESS, "on": _BELOW}.items()}
+    fields |= {key: (nullable(one), None) for key, one in {**TEMPERATURE, **THICKNESS, "on": _BELOW}.items()}
     return create_model(name, __base__=MaterialSection, model=(Literal[name], ...), **fields)
 
 

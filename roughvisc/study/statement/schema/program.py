@@ -5,42 +5,74 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import (
-    BeforeValidator,
     Field,
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
     WrapValidator,
+    create_model,
     model_validator,
 )
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import INSTEAD, Control, Program
+from roughvisc.mechanics.stepping.program import INSTEAD, PUSHING, UNITS, Control, Program
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
-from roughvisc.study.statement.schema.entries import (
+from roughvisc.study.statement.schema.section import (
     FilePath,
+    Section,
     Text,
     choice,
+    close,
+    kind,
     listed,
     literal_or,
     located,
     measured,
+    of_file,
     shown,
 )
-from roughvisc.study.statement.schema.section import Section, close, of_file
 from roughvisc.tables import Wanted, read_table
 
-LOAD = measured("N", least=0, instead=INSTEAD["load"])
-APPROACH = measured("m", instead=INSTEAD["approach"])
-PRESSURE = measured("Pa", least=0, instead=INSTEAD["pressure"])
 DURATION = measured("s", least=0)
 PERIOD = measured("s", above=0)
 DISTANCE = measured("m", above=0)
 SPEED = measured("m/s", above=0)
 INSTANTS = listed(measured("s", least=0), "times [s]")
+
+
+class _Controlled(NamedTuple):
+    """What segments prescribe.
+
+    Attributes
+    ----------
+    noun, target : str
+        What it is called, and what a segment goes to.
+    plural : str
+        Values of a table, with their unit.
+    kind : type
+        Kind of a value.
+    """
+
+    noun: str
+    target: str
+    plural: str
+    kind: Any
+
+
+#: What a program may control: each has a segment, cycles, tables and recordings of its own.
+CONTROLLED: dict[Control, _Controlled] = {
+    "load": _Controlled("load", "a load", "loads [N]", measured("N", least=0, instead=INSTEAD["load"])),
+    "approach": _Controlled("approach", "an approach", "approaches [m]", measured("m", instead=INSTEAD["approach"])),
+    "pressure": _Controlled(
+        "nominal pressure",
+        "a nominal pressure, the load over the scan's area",
+        "nominal pressures [Pa]",
+        measured("Pa", least=0, instead=INSTEAD["pressure"]),
+    ),
+}
 
 
 class SegmentSection(Section):
@@ -54,36 +86,6 @@ class SegmentSection(Section):
     def _builds(self) -> SegmentSection:
         self.extend(Program())
         return self
-
-
-class LoadSegment(SegmentSection):
-    """Go to a load, linearly; ``over = 0`` is a jump."""
-
-    load: LOAD
-    over: DURATION
-
-    def extend(self, program: Program) -> Program:
-        return program.load(self.load, over=self.over)
-
-
-class ApproachSegment(SegmentSection):
-    """Go to an approach, linearly; ``over = 0`` is a jump."""
-
-    approach: APPROACH
-    over: DURATION
-
-    def extend(self, program: Program) -> Program:
-        return program.approach(self.approach, over=self.over)
-
-
-class PressureSegment(SegmentSection):
-    """Go to a nominal pressure, the load over the scan's area, linearly; ``over = 0`` is a jump."""
-
-    pressure: PRESSURE
-    over: DURATION
-
-    def extend(self, program: Program) -> Program:
-        return program.pressure(self.pressure, over=self.over)
 
 
 class HoldSegment(SegmentSection):
@@ -111,175 +113,17 @@ class SlideSegment(SegmentSection):
         return program.slide(self.slide, speed=self.speed, over=self.over, direction=self.direction)
 
 
-class LoadWave(Section):
-    """A sine wave of the load about a mean."""
+class _Ramp(SegmentSection):
+    control: ClassVar[Control]
 
-    mean: LOAD
-    amplitude: LOAD
-    period: PERIOD
-    cycles: measured("1", above=0, most=1e6)
-
-
-class ApproachWave(Section):
-    """A sine wave of the approach about a mean."""
-
-    mean: APPROACH
-    amplitude: APPROACH
-    period: PERIOD
-    cycles: measured("1", above=0, most=1e6)
-
-
-class PressureWave(Section):
-    """A sine wave of the nominal pressure about a mean."""
-
-    mean: PRESSURE
-    amplitude: PRESSURE
-    period: PERIOD
-    cycles: measured("1", above=0, most=1e6)
+    def extend(self, program: Program) -> Program:
+        return getattr(program, self.control)(getattr(self, self.control), over=self.over)
 
 
 class _Cycle(SegmentSection):
     def extend(self, program: Program) -> Program:
         wave = self.cycle
         return program + Program.cycle(wave.mean, wave.amplitude, wave.period, wave.cycles, self.control)
-
-
-class LoadCycle(_Cycle):
-    """Cycles of the load, after a jump to their mean."""
-
-    cycle: LoadWave
-    control: Literal["load"] = "load"
-
-
-class ApproachCycle(_Cycle):
-    """Cycles of the approach, after a jump to their mean."""
-
-    cycle: ApproachWave
-    control: Literal["approach"]
-
-
-class PressureCycle(_Cycle):
-    """Cycles of the nominal pressure, after a jump to their mean."""
-
-    cycle: PressureWave
-    control: Literal["pressure"]
-
-
-#: For editors: a path, times and values, or a file with the names of its columns.
-_ANY_TABLE = WithJsonSchema({"type": ["object", "string"]})
-
-
-def _share(unit: str) -> Any:
-    """Kind: a quantity, or a part of the largest value as a text such as ``"0.1 %"``."""
-    wanted = f"a number in {unit}, or a string with a unit of its kind, at least 0, or a part such as '0.1 %'"
-
-    def check(value: Any) -> Any:
-        part_or_value(value, unit)
-        return value
-
-    schema = WithJsonSchema({"type": ["number", "string"]})
-    return Annotated[Any, BeforeValidator(check), schema, Field(description=wanted)]
-
-
-class _Recording(Section):
-    """A table that a test machine wrote: which columns, which rows, how far they are thinned."""
-
-    file: FilePath
-    time: Text = "time"
-    start: literal_or("first", measured("s"), "'first', or a time in s") = "first"
-    end: measured("s") | None = None
-    factor: measured("1") = 1.0
-    decimal: choice(".", ",") | None = None
-
-
-class LoadRecording(_Recording):
-    """Of the load."""
-
-    load: Text = "load"
-    zero: measured("N") = 0.0
-    noise: _share("N") = NOISE
-    thin: _share("N") = THIN
-
-
-class ApproachRecording(_Recording):
-    """Of the approach."""
-
-    approach: Text = "approach"
-    zero: measured("m") = 0.0
-    thin: _share("m") = THIN
-
-
-class PressureRecording(_Recording):
-    """Of the nominal pressure."""
-
-    pressure: Text = "pressure"
-    zero: measured("Pa") = 0.0
-    noise: _share("Pa") = NOISE
-    thin: _share("Pa") = THIN
-
-
-RECORDINGS: dict[Control, type[_Recording]] = {
-    "load": LoadRecording,
-    "approach": ApproachRecording,
-    "pressure": PressureRecording,
-}
-
-
-def _recorded(value: Any, control: Control, info: ValidationInfo) -> dict[str, Any]:
-    """Times and values of a recording, and what was done to have them."""
-    asked = dict(RECORDINGS[control].model_validate(value, context=info.context))
-    path, column = asked.pop("file"), asked.pop(control)
-    found = read_history(path, control, column=column, **{"noise": NOISE} | asked)
-    return {"times": found.times, "values": found.values, "note": found.note}
-
-
-def _rows(quantity: Control, unit: str) -> Any:
-    """Check of a ``table``: the name of a file becomes its times and values, so that a case is whole in itself."""
-
-    def read(value: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
-        if isinstance(value, dict) and "file" in value:
-            return check(_recorded(value, quantity, info))
-        if isinstance(value, str):
-            path = located(value, info)
-            columns, _ = read_table(path, {"time": Wanted("time", "s"), quantity: Wanted(quantity, unit)})
-            times, values = columns["time"].tolist(), columns[quantity].tolist()
-            try:
-                rows = check({"times": times, "values": values})
-                Program.table(times, values, quantity)
-            except ValidationError as error:
-                raise of_file(path, {"times": "time", "values": quantity}, error) from None
-            except InputError as error:
-                raise InputError(f"{path}: {error}") from None
-            return rows
-        if not isinstance(value, dict | Section):
-            raise InputError(f"found {shown(value)}: expected the path of a CSV file, or a table with times and values")
-        return check(value)
-
-    return WrapValidator(read)
-
-
-class LoadRows(Section):
-    """Load against time, linear between the rows."""
-
-    times: INSTANTS
-    values: listed(LOAD, "loads [N]")
-    note: Text | None = None
-
-
-class ApproachRows(Section):
-    """Approach against time, linear between the rows."""
-
-    times: INSTANTS
-    values: listed(APPROACH, "approaches [m]")
-    note: Text | None = None
-
-
-class PressureRows(Section):
-    """Nominal pressure against time, linear between the rows."""
-
-    times: INSTANTS
-    values: listed(PRESSURE, "nominal pressures [Pa]")
-    note: Text | None = None
 
 
 class _Table(SegmentSection):
@@ -293,36 +137,114 @@ class _Table(SegmentSection):
         return program + tabulated
 
 
-class LoadTable(_Table):
-    """A history of the load, its time counted from the end of the segment before."""
+class _Recording(Section):
+    """A table that a test machine wrote: which columns, which rows, how far they are thinned."""
 
-    table: Annotated[LoadRows, _rows("load", "N"), _ANY_TABLE]
-    control: Literal["load"] = "load"
-
-
-class ApproachTable(_Table):
-    """A history of the approach, its time counted from the end of the segment before."""
-
-    table: Annotated[ApproachRows, _rows("approach", "m"), _ANY_TABLE]
-    control: Literal["approach"]
+    file: FilePath
+    time: Text = "time"
+    start: literal_or("first", measured("s"), "'first', or a time in s") = "first"
+    end: measured("s") | None = None
+    factor: measured("1") = 1.0
+    decimal: choice(".", ",") | None = None
 
 
-class PressureTable(_Table):
-    """A history of the nominal pressure, its time counted from the end of the segment before."""
+def _share(unit: str) -> Any:
+    """Kind: a quantity, or a part of the largest value as a text such as ``"0.1 %"``."""
 
-    table: Annotated[PressureRows, _rows("pressure", "Pa"), _ANY_TABLE]
-    control: Literal["pressure"]
+    def check(value: Any) -> Any:
+        part_or_value(value, unit)
+        return value
 
+    wanted = f"a number in {unit}, or a string with a unit of its kind, at least 0, or a part such as '0.1 %'"
+    return kind(Any, check, wanted, {"type": ["number", "string"]})
+
+
+def _read_rows(control: Control) -> Any:
+    """Check of a ``table``: the name of a file becomes its times and values, so that a case is whole in itself."""
+
+    def read(value: Any, check: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        if isinstance(value, dict) and "file" in value:
+            asked = dict(TABLES[control].recording.model_validate(value, context=info.context))
+            path, column = asked.pop("file"), asked.pop(control)
+            found = read_history(path, control, column=column, **{"noise": NOISE} | asked)
+            return check({"times": found.times, "values": found.values, "note": found.note})
+        if isinstance(value, str):
+            path = located(value, info)
+            columns, _ = read_table(path, {"time": Wanted("time", "s"), control: Wanted(control, UNITS[control])})
+            times, values = columns["time"].tolist(), columns[control].tolist()
+            try:
+                rows = check({"times": times, "values": values})
+                Program.table(times, values, control)
+            except ValidationError as error:
+                raise of_file(path, {"times": "time", "values": control}, error) from None
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
+            return rows
+        if not isinstance(value, dict | Section):
+            raise InputError(f"found {shown(value)}: expected the path of a CSV file, or a table with times and values")
+        return check(value)
+
+    return WrapValidator(read)
+
+
+class _Tables(NamedTuple):
+    """The tables of a study that prescribe one quantity: their classes."""
+
+    ramp: type[SegmentSection]
+    wave: type[Section]
+    cycle: type[SegmentSection]
+    rows: type[Section]
+    table: type[SegmentSection]
+    recording: type[Section]
+
+
+def _tables_of(control: Control) -> _Tables:
+    one, unit, name = CONTROLLED[control], UNITS[control], control.capitalize()
+    stated = (Literal[control], "load" if control == "load" else ...)  # the load, unless it says something else
+
+    def section(suffix: str, base: type[Section], about: str, **fields: Any) -> type[Any]:
+        return create_model(f"{name}{suffix}", __base__=base, __doc__=about, **fields)
+
+    about = f"Go to {one.target}, linearly; ``over = 0`` is a jump."
+    ramp = section("Segment", _Ramp, about, **{control: (one.kind, ...)}, over=(DURATION, ...))
+    ramp.control = control
+    wave = section(
+        "Wave",
+        Section,
+        f"A sine wave of the {one.noun} about a mean.",
+        mean=(one.kind, ...),
+        amplitude=(one.kind, ...),
+        period=(PERIOD, ...),
+        cycles=(measured("1", above=0, most=1e6), ...),
+    )
+    about = f"Cycles of the {one.noun}, after a jump to their mean."
+    cycle = section("Cycle", _Cycle, about, cycle=(wave, ...), control=stated)
+    rows = section(
+        "Rows",
+        Section,
+        f"{one.noun.capitalize()} against time, linear between the rows.",
+        times=(INSTANTS, ...),
+        values=(listed(one.kind, one.plural), ...),
+        note=(Text | None, None),
+    )
+    about = f"A history of the {one.noun}, its time counted from the end of the segment before."
+    # for editors: a path, times and values, or a file with the names of its columns
+    read = Annotated[rows, _read_rows(control), WithJsonSchema({"type": ["object", "string"]})]
+    table = section("Table", _Table, about, table=(read, ...), control=stated)
+    noise = {"noise": (_share(unit), NOISE)} if control in PUSHING else {}
+    recorded = {control: (Text, control), "zero": (measured(unit), 0.0), **noise, "thin": (_share(unit), THIN)}
+    return _Tables(ramp, wave, cycle, rows, table, section("Recording", _Recording, f"Of the {one.noun}.", **recorded))
+
+
+TABLES = {control: _tables_of(control) for control in CONTROLLED}
 
 #: the key that a segment is known by -> its class, by what is controlled where that matters
 KINDS: dict[str, dict[str, type[SegmentSection]]] = {
-    "load": {"load": LoadSegment},
-    "approach": {"load": ApproachSegment},
-    "pressure": {"load": PressureSegment},
+    **{control: {"load": one.ramp} for control, one in TABLES.items()},
     "hold": {"load": HoldSegment},
     "slide": {"load": SlideSegment},
-    "cycle": {"load": LoadCycle, "approach": ApproachCycle, "pressure": PressureCycle},
-    "table": {"load": LoadTable, "approach": ApproachTable, "pressure": PressureTable},
+    "cycle": {control: one.cycle for control, one in TABLES.items()},
+    "table": {control: one.table for control, one in TABLES.items()},
 }
 SECTIONS = tuple(section for kind in KINDS.values() for section in kind.values())
 

@@ -1,16 +1,183 @@
-"""The base of every table of a study file: nothing unknown gets in, and every problem is one sentence."""
+"""The tables of a study file: nothing unknown gets in, and every problem is one sentence.
+
+Each kind of value has its check, and words for what is expected.
+"""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    WrapValidator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.schema.entries import shown
+from roughvisc.units import bounded_quantity, range_in_words, shown, wanted_quantity, within
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a kind says of its values beside their check: the SI unit; ``"1"`` of pure numbers."""
+
+    symbol: str
+
+
+def kind(values: Any, check: Callable[..., Any], wanted: str, schema: Any = None, *marks: Any) -> Any:
+    """Kind of value that a key may have.
+
+    Parameters
+    ----------
+    values : type
+        What the check makes of a value.
+    check : callable
+        Gives the value as it is kept, or raises :class:`InputError`.
+    wanted : str
+        What is expected, in words.
+    schema : dict, optional
+        Its JSON schema. Default: that of the type.
+    *marks : Unit
+        What else is to be known of it.
+    """
+    shape = () if schema is None else (WithJsonSchema(schema),)
+    return Annotated[(values, BeforeValidator(check), *shape, Field(description=wanted), *marks)]
+
+
+def validate(kind: Any, value: Any) -> Any:
+    """The value as the check of a kind leaves it."""
+    return kind.__metadata__[0].func(value)
+
+
+def nullable(kind: Any) -> Any:
+    """Kind: the same, or nothing; without a union, whose errors name branches that no user knows of."""
+    return Annotated[kind, WrapValidator(lambda value, check: None if value is None else check(value))]
+
+
+def measured(
+    unit: str, *, instead: Mapping[str, str] | None = None, difference: bool = False, **bounds: float | None
+) -> Any:
+    """Kind: a quantity in SI as a float, from a number or a string with a unit; ``unit="1"`` is a pure number.
+
+    Values are rounded to 15 significant digits, so that ``"10 um"`` and ``1e-5`` are the same to the last bit. All else
+    is as :func:`roughvisc.units.bounded_quantity` has it.
+    """
+
+    def check(value: Any) -> float:
+        number = bounded_quantity(value, unit, instead=instead, difference=difference, **bounds)
+        return float(f"{number:.15g}") + 0.0  # no negative zero
+
+    schema = {"type": "number" if unit == "1" else ["number", "string"]}
+    return kind(float, check, wanted_quantity(unit, **bounds), schema, Unit(unit))
+
+
+def literal_or(word: str, quantity: Any, wanted: str) -> Any:
+    """Kind: a word, or a quantity of another kind."""
+
+    def check(value: Any) -> Any:
+        if value == word:
+            return value
+        try:
+            return validate(quantity, value)
+        except InputError:
+            raise InputError(f"found {shown(value)}: expected {wanted}") from None
+
+    units = [one for one in quantity.__metadata__ if isinstance(one, Unit)]
+    return kind(Any, check, wanted, {"type": ["number", "string"]}, *units)
+
+
+def whole(least: int, most: int | None = None) -> Any:
+    """Kind: a whole number; ``true`` and ``2.0`` are none."""
+    wanted = f"a whole number{range_in_words(least=least, most=most)}"
+
+    def check(value: Any) -> int:
+        if not isinstance(value, int) or isinstance(value, bool) or not within(value, least=least, most=most):
+            raise InputError(f"found {shown(value)}: expected {wanted}")
+        return int(value)
+
+    schema = {"type": "integer", "minimum": least} | ({} if most is None else {"maximum": most})
+    return kind(int, check, wanted, schema)
+
+
+def a_list(value: Any, wanted: str, count: int | None = None) -> list[Any]:
+    """The value if it is a list (of so many entries); a string, which Python would iterate, is none."""
+    if not isinstance(value, list | tuple) or (count is not None and len(value) != count):
+        raise InputError(f"found {shown(value)}: expected {wanted}")
+    return list(value)
+
+
+def listed(entry: Any, name: str) -> Any:
+    """Kind: a list of any length; ``name`` says of what."""
+    wanted = f"a list of {name}"
+    return kind(tuple[entry, ...], lambda value: a_list(value, wanted), wanted)
+
+
+def paired(entry: Any, name: str) -> Any:
+    """Kind: a list of two, along x and along y, or one for both; ``name`` says of what."""
+    wanted = f"{name}, or a list of two, along x and along y"
+
+    def spread(value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return a_list(value, wanted, 2)
+        validate(entry, value)  # so that a problem is told of the value that was written
+        return (value, value)
+
+    return kind(tuple[entry, entry], spread, wanted)
+
+
+def choice(*words: str) -> Any:
+    """Kind: one of a few words."""
+    wanted = " or ".join(repr(word) for word in words)
+
+    def check(value: Any) -> Any:
+        if value not in words:
+            hint = close(value, words) if isinstance(value, str) else ""
+            raise InputError(f"found {shown(value)}: expected {wanted}{hint}")
+        return value
+
+    return kind(str, check, wanted, {"enum": list(words)})
+
+
+def located(value: Any, info: ValidationInfo) -> str:
+    """Absolute path of a file named relative to the study, which must exist while a study is being read."""
+    if not isinstance(value, str | Path) or not str(value):
+        raise InputError(f"found {shown(value)}: expected the path of a file")
+    folder = (info.context or {}).get("folder")
+    if folder is None:  # a stored case: its file may be elsewhere today, and is missed when it is opened
+        return str(value)
+    path = (Path(folder) / Path(value).expanduser()).resolve()
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "does not exist"
+        raise InputError(f"found {shown(str(value))}, which {what}: expected a file ({path})")
+    return str(path)
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(f"found {shown(value)}: expected true or false")
+    return value
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"found {shown(value)}: expected a text")
+    return value
+
+
+FilePath = kind(str, located, "the path of a file, relative to the study", {"type": "string"})
+Flag = kind(bool, _flag, "true or false")
+Text = kind(str, _text, "a text")
 
 _OURS = "problem"
 

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator, Field, WithJsonSchema, create_model
+from pydantic import create_model
 
 from roughvisc.errors import InputError
 from roughvisc.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
-from roughvisc.study.statement.schema.entries import Flag, a_list, choice, literal_or, measured, shown, validate, whole
-from roughvisc.study.statement.schema.section import Section, nearest
+from roughvisc.study.statement.schema.section import (
+    Flag,
+    Section,
+    a_list,
+    choice,
+    kind,
+    literal_or,
+    measured,
+    nearest,
+    shown,
+    validate,
+    whole,
+)
 from roughvisc.units import range_in_words
 from roughvisc.variables import FIELDS
 
 _INSTANT = measured("s", least=0)
+_FIELDS_WANTED = f"a list of fields out of {', '.join(FIELDS)}"
 _TIMES_WANTED = "'all', a count, or a list of times in s"
 
 
@@ -29,8 +41,7 @@ def _times(value: Any) -> Any:
 
 
 def _fields(value: Any) -> Any:
-    wanted = f"a list of fields out of {', '.join(FIELDS)}"
-    names = a_list(value, wanted)
+    names = a_list(value, _FIELDS_WANTED)
     for name in names:
         if name not in FIELDS:
             raise InputError(f"found {shown(name)}, which is not a field{nearest(name, FIELDS)}")
@@ -63,17 +74,14 @@ SolveSection = create_model(
 class KeepSection(Section):
     """What is kept of it."""
 
-    fields: Annotated[
-        tuple[str, ...],
-        BeforeValidator(_fields),
-        WithJsonSchema({"type": "array", "items": {"enum": list(FIELDS)}}),
-        Field(description=f"a list of fields out of {', '.join(FIELDS)}"),
-    ] = Settings.fields
-    times: Annotated[
+    fields: kind(tuple[str, ...], _fields, _FIELDS_WANTED, {"type": "array", "items": {"enum": list(FIELDS)}}) = (
+        Settings.fields
+    )
+    times: kind(
         Any,
-        BeforeValidator(_times),
-        WithJsonSchema({"type": ["integer", "array", "string"], "items": {"type": ["number", "string"]}}),
-        Field(description=_TIMES_WANTED),
-    ] = "all"
+        _times,
+        _TIMES_WANTED,
+        {"type": ["integer", "array", "string"], "items": {"type": ["number", "string"]}},
+    ) = "all"
     # relative, of the fields in the file; none: exact
     precision: measured("1", above=0, below=1) | None = None

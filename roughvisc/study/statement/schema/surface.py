@@ -7,28 +7,148 @@ from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, WrapValidator, create_model
+from pydantic import AfterValidator, BeforeValidator, Field, WrapValidator, create_model
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import Boundary
-from roughvisc.study.statement.schema.conditioning import LENGTH, SHAPE, SIZE, Conditioned, Prepared, either
-from roughvisc.study.statement.schema.entries import (
+from roughvisc.settings import WORDS, Settings
+from roughvisc.study.statement.schema.section import (
     FilePath,
     Flag,
+    Section,
     Text,
+    a_list,
     choice,
+    close,
+    kind,
     measured,
+    nearest,
     nullable,
     paired,
+    refuse,
     shown,
     whole,
 )
-from roughvisc.study.statement.schema.section import Section, close, nearest, refuse
 from roughvisc.topography import recipes
+from roughvisc.topography.arguments import FILL, KEEP, ORDER, TURNS, WINDOW, Argument
 from roughvisc.topography.recipes import UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+LENGTH = measured("m", above=0)
+SIZE = paired(LENGTH, "a length")
+SHAPE = paired(whole(2), "a whole number of cells")
+_LIMITS = "a list of two lengths, the lower and the upper limit"
+
+
+def _ascending(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise InputError(f"found {limits[0]:g} and {limits[1]:g} m: expected {_LIMITS}")
+    return limits
+
+
+LIMITS = Annotated[
+    tuple[measured("m"), measured("m")],
+    BeforeValidator(lambda value: a_list(value, _LIMITS, 2)),
+    AfterValidator(_ascending),
+    Field(description=_LIMITS),
+]
+
+
+def _argument(argument: Argument, schema: dict[str, Any], when_true: Any = None) -> Any:
+    """Kind: an argument of a step as topography checks it; or true and false, where true stands for a value."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, bool) and when_true is not None:
+            return when_true if value else False
+        if not argument.allows(value):
+            raise InputError(f"found {shown(value)}: expected {argument.wanted}")
+        return value
+
+    wanted = argument.wanted if when_true is None else f"true ({when_true!r}), false, or {argument.wanted}"
+    return kind(Any, check, wanted, schema)
+
+
+class Crop(Section):
+    """The part of the scan that is used."""
+
+    x: nullable(LIMITS) = None
+    y: nullable(LIMITS) = None
+
+
+class Outliers(Section):
+    """Points masked that lie far from the median of their neighbours."""
+
+    window: _argument(WINDOW, {"type": "integer", "minimum": 3, "not": {"multipleOf": 2}}) = 9
+    threshold: measured("1", above=0) = 8.0
+
+
+class Filter(Section):
+    """A Gaussian filter."""
+
+    cutoff: LENGTH
+    keep: _argument(KEEP, {"enum": ["long", "short"]}) = "long"
+    periodic: Flag = False
+
+
+_OUTLIERS = "true, false, or a table of window and threshold"
+_FILTER = "false, a cut-off length, or a table of cutoff, keep and periodic"
+
+
+def _outliers(value: Any) -> Any:
+    if isinstance(value, bool):
+        return Outliers() if value else False
+    if not isinstance(value, dict | Outliers):
+        raise InputError(f"found {shown(value)}: expected {_OUTLIERS}")
+    return Outliers.model_validate(value)
+
+
+def _filter(value: Any) -> Any:
+    if value is False:
+        return False
+    return Filter.model_validate(value if isinstance(value, dict | Filter) else {"cutoff": value})
+
+
+class Prepared(Section):
+    """What every face may have done to it; the steps act in the order of surface cards, which is this one."""
+
+    crop: nullable(Crop) = None
+    rotate90: nullable(_argument(TURNS, {"type": "integer"})) = None
+    invert: Flag = False
+    level: _argument(ORDER, {"type": ["boolean", "integer"]}, 1) = False
+    outliers: kind(Outliers | Literal[False], _outliers, _OUTLIERS, {"type": ["boolean", "object"]}) = False
+    fill: _argument(FILL, {"type": ["boolean", "string"]}, "harmonic") = False
+    filter: kind(Filter | Literal[False], _filter, _FILTER, {"type": ["boolean", "number", "string", "object"]}) = False
+
+    def prepared(self, height: xr.DataArray) -> xr.DataArray:
+        """Heights after the steps asked for. [m]"""
+        return _conditioned(self, Prepared, height)
+
+
+class Conditioned(Prepared):
+    """What every surface may have done to it: the steps of a face, then those of the profile that is pressed."""
+
+    shortest_wave: nullable(LENGTH) = None
+    realisation: nullable(whole(1)) = None
+    band_limit: nullable(SHAPE) = None
+    resample: nullable(SHAPE) = None
+    taper: nullable(SIZE) = None
+    mirror: Flag = False
+    missing: choice(*WORDS["missing"]) = Settings.missing
+
+    def framed(self, height: xr.DataArray) -> xr.DataArray:
+        """Heights after the steps asked for that come last. [m]"""
+        return _conditioned(self, Conditioned, height)
+
+
+def _conditioned(stated: Prepared, steps: type[Prepared], height: xr.DataArray) -> xr.DataArray:
+    """Heights after the steps that a class of them names itself. [m]"""
+    from roughvisc.topography.cards import condition
+
+    names = set(steps.__annotations__) - {"missing"}
+    return condition(height, stated.model_dump(include=names, exclude_none=True))
+
 
 PURE = measured("1", above=0)
 _LENGTH_OR_RATIO = {"m": LENGTH, "1": PURE}
@@ -47,8 +167,8 @@ _KINDS = {
 def _kind(recipe: str, key: str, default: Any) -> Any:
     if recipe == "self_affine" and key == "shape":
         return SHAPE  # roughness needs waves both ways
-    kind = _KINDS[key] if key in _KINDS else _LENGTH_OR_RATIO[UNITS[key]]
-    return nullable(kind) if default is None else kind
+    known = _KINDS[key] if key in _KINDS else _LENGTH_OR_RATIO[UNITS[key]]
+    return nullable(known) if default is None else known
 
 
 #: name of a recipe -> the kind of each of its keys, and its default (``...``: none)
@@ -84,7 +204,7 @@ class FromFile(Raw):
 
     file: FilePath
     format: nullable(Text) = None
-    channel: either(_channel, ["string", "integer"], _CHANNEL) = None
+    channel: kind(Any, _channel, _CHANNEL, {"type": ["string", "integer"]}) = None
     unit: nullable(Text) = None
     height_unit: nullable(Text) = None
     spacing: nullable(SIZE) = None

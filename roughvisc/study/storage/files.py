@@ -1,16 +1,144 @@
-"""Checksums: length and checksum of a file's content, behind its last byte; and who is told where one does not fit."""
+"""Files of a results folder: written whole or not at all, never through a link, and with a checksum behind the content.
+
+The folder itself may be a link. Results may be links, too: they are read, and a link whose name is written to gives way
+to the file, by a rename (:func:`atomic_write`), which touches nothing else.
+"""
 
 from __future__ import annotations
 
 import logging
 import os
+import secrets
 import struct
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import IO
 
-from roughvisc.errors import InputError
+from roughvisc.errors import FolderError, InputError
+
+
+def refuse_link(path: Path, expected: str) -> None:
+    """Refuse a link in place of a file or folder that a run writes to, or deletes from.
+
+    Parameters
+    ----------
+    path : Path
+        The file or folder, which need not exist.
+    expected : str
+        What it should be.
+
+    Raises
+    ------
+    FolderError
+        If it is a link.
+    """
+    if path.is_symlink():
+        raise FolderError(f"{path}: is a link: expected {expected}, or nothing; remove it, and what it leads to stays")
+
+
+def open_unlinked(path: str | Path, flags: int, expected: str) -> int:
+    """Descriptor of a file that is made if need be, and that is no link.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    flags : int
+        As :func:`os.open` takes them.
+    expected : str
+        What the file should be.
+
+    Raises
+    ------
+    FolderError
+        If it is a link.
+    OSError
+        If it cannot be opened, or became a link just now.
+    """
+    refuse_link(Path(path), expected)
+    return os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+
+
+def is_writable(folder: Path) -> bool:
+    """Whether files can be made in a folder, which need not exist yet."""
+    return os.access(_nearest(folder), os.W_OK)
+
+
+def require_writable(folder: Path, why: str = "") -> None:
+    """Refuse a folder of results in which no file can be made.
+
+    Raises
+    ------
+    FolderError
+        If there is none and none can be made, or it is not writable; with the reason that is given.
+    """
+    if not is_writable(folder):
+        needed = f", {why}" if why else ""
+        raise FolderError(f"{_nearest(folder)}: is not writable: expected a folder with write permission{needed}")
+
+
+def _nearest(folder: Path) -> Path:
+    """A folder, or what is there of the folders above it."""
+    return next(place for place in (folder, *folder.absolute().parents) if place.exists())
+
+
+def partial_files(path: Path) -> list[Path]:
+    """What writes of a result that did not end have left beside it."""
+    return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Iterator[Path]:
+    """A name to write to, that becomes `path` when all has gone well and vanishes when it has not.
+
+    Parameters
+    ----------
+    path : path
+        The file to be. Its folder is made if need be.
+
+    Yields
+    ------
+    Path
+        A temporary name in the same folder, with the same suffix.
+
+    Raises
+    ------
+    FolderError
+        If the folder cannot be made or written to.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
+    if not os.access(path.parent, os.W_OK):
+        raise FolderError(f"{path.parent}: is not writable: expected a folder with write permission")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    try:
+        yield temporary
+        _sync(temporary)
+        os.replace(temporary, path)
+        _sync(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Have the operating system put a file, or the names in a folder, on the disk."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:  # a folder, on Windows
+        if path.is_dir():
+            return
+        raise
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
 
 # At 256 x 256 x 50 frames, two fields, 59 MB: written in 75 ms, sealed in 15 ms, looked at in 15 ms. SHA-256 would take
 # 37 ms each. A checksum a chunk (fletcher32) would take 30 ms each, and leave out attributes, small variables and the

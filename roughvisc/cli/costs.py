@@ -1,0 +1,212 @@
+"""Commands on what a study costs and how accurate it is: ``plan``, ``trade``, ``budget``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from roughvisc.cli.group import Failure, complain, say
+from roughvisc.errors import printable
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from rich.console import Console
+
+
+@click.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the results; its disk must have room.")
+@click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
+def plan(study: Path, out: Path | None, workers: int | None) -> None:
+    """Show what a study will model and what it will cost.
+
+    Runs and writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
+    of steps and FFTs by coarse runs, and the time by a solve timed on this machine. The exit status is 2 if the study
+    does not fit into memory or on the disk.
+
+    \b
+    Example:
+      roughvisc plan focus_variation-study.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.cost.plan import plan as planned
+    from roughvisc.views.console.tables import plan_tables
+
+    costs = planned(study, out, workers=workers)
+    if not costs["refusal"].all():
+        Console().print(plan_tables(costs))
+    if costs.attrs["upgrade"]:
+        complain(costs.attrs["upgrade"])
+    if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
+        raise Failure(f"{study}: cannot run: {why}", 2)
+
+
+@click.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the measurements. [default: results/STUDY-trade]"
+)
+@click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
+@click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
+@click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
+@click.option(
+    "--floor", is_flag=True, help="Compute the error that no setting lessens, as `budget` does without options."
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def trade(
+    study: Path, out: Path | None, target: str | None, quantity: str, budget: str, floor: bool, quiet: bool
+) -> None:
+    """Measure what accuracy costs, and recommend a setting.
+
+    Computes the case with several tolerances and grids; with a loading program also with fixed time steps, other
+    memory models and the seed paper's algorithm. Each run is timed and compared with a closed-form solution if there
+    is one, else with the finest run. Writes a NetCDF file and a figure. --apply changes the keys in STUDY and keeps its
+    comments and layout. A budget that `roughvisc budget` has left in the results shows the error that no setting
+    lessens.
+
+    \b
+    Example:
+      roughvisc trade focus_variation-study.toml
+      roughvisc trade focus_variation-study.toml --apply 1%
+    """
+    from dask.system import CPU_COUNT
+    from rich.console import Console
+    from scipy import fft
+
+    from roughvisc.progress import reporting
+    from roughvisc.study.budget.budget import budgets, case_of
+    from roughvisc.study.quantities import QUANTITIES
+    from roughvisc.study.statement.case import read_study
+    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.study.trade import files as trade_file
+    from roughvisc.study.trade import recommend
+    from roughvisc.study.trade.apply import apply
+    from roughvisc.study.trade.floor import with_floors
+    from roughvisc.study.trade.reference import further_quantities_of, quantities_of
+    from roughvisc.study.trade.trade import trade as measured
+    from roughvisc.views.console.trade_table import trade_table
+    from roughvisc.views.figures.files import write_figure
+    from roughvisc.views.plot import trade as figure
+
+    case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
+    folder, part = trade_file.trade_folder(case, out), None
+    usual = quantities_of(case)
+    quantity = recommend.known_quantity(quantity, (*usual, *further_quantities_of(case)), "--quantity")
+    if target is not None:
+        part = trade_file.part_of_one(target, "--apply")
+        trade_file.check_writable(study)
+    with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
+        dataset = measured(case, quantities=[quantity], budget=time, progress=report)
+    beside = case_of(case, None)[1]
+    names = [name for name in dict.fromkeys([quantity, *usual]) if name in QUANTITIES]
+    if floor:
+        for name, one in budgets(case, names, out=beside, progress=not quiet).items():
+            write_dataset(one, beside / f"budget-{name}.nc")
+    dataset = with_floors(dataset, trade_file.budgets_in(beside, names, case))
+    console.print(trade_table(dataset))
+    say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
+    first = list(
+        dict.fromkeys([*([] if quantity == "contact_area" else [quantity]), *recommend.main_quantities(dataset)])
+    )
+    say(console, "Figure", write_figure(figure(dataset, first[:2]), folder / "trade.png"))
+    if part is not None:
+        index = recommend.cheapest(dataset, quantity, part)
+        if index is None:
+            shortfall = recommend.shortfall(dataset, quantity, part)
+            raise Failure(f"{study}: --apply {target}: {shortfall}; the study is unchanged", 1)
+        changes = apply(study, recommend.keys_of(dataset, index))
+        said = printable(f"{study}: {changes or 'already has this setting'}")
+        console.print(said, soft_wrap=True, highlight=False, markup=False)
+
+
+_OPTIONS = {
+    "quantity": "What number; may be repeated. [default: contact_area]",
+    "at": "Time or speed; may be repeated. [default: all kept]",
+    "sharp": "Compute cells half as long too: four times the cost, a sharper error of the grid.",
+    "ensemble": "The number of the roughness, of which the scan is one sample, or of this patch. [default: patch]",
+    "out": "Folder of what is found. [default: budget in the results]",
+}
+
+
+@click.command()
+@click.argument("study", metavar="STUDY|RESULT", type=click.Path(path_type=Path))
+@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help=_OPTIONS["quantity"])
+@click.option("--at", "places", multiple=True, metavar="VALUE", help=_OPTIONS["at"])
+@click.option("--sharp", is_flag=True, help=_OPTIONS["sharp"])
+@click.option("--modulus-error", metavar="PART", help="Relative error of the moduli at 95 %: 10%.")
+@click.option("--time-scale-error", metavar="PART", help="Relative error of the times of the material at 95 %.")
+@click.option("--cutoff", metavar="LENGTH", help="Shortest wavelength that the real surface has: '2 um'.")
+@click.option("--ensemble/--patch", default=None, help=_OPTIONS["ensemble"])
+@click.option("--out", type=click.Path(path_type=Path), help=_OPTIONS["out"])
+@click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+def budget(
+    study: Path,
+    quantities: tuple[str, ...],
+    places: tuple[str, ...],
+    sharp: bool,
+    modulus_error: str | None,
+    time_scale_error: str | None,
+    cutoff: str | None,
+    ensemble: bool | None,
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+) -> None:
+    """State the whole error of a number: by source, and together.
+
+    The case is solved again on other grids, without its shortest waves, on other patches of the same roughness and with
+    another material, as far as what is asked needs it. What is known of errors and not said here comes from [want] of
+    the study. A table is printed; a NetCDF and a figure are written for each quantity. What was solved is kept, and
+    used again.
+
+    \b
+    Example:
+      roughvisc budget focus_variation-study.toml --modulus-error 10% --cutoff "1 um"
+      roughvisc budget focus_variation-study.toml --quantity mean_gap --ensemble
+    """
+    from rich.console import Console
+
+    from roughvisc.study.budget.budget import budgets, case_of
+    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.trade.files import part_of_one
+    from roughvisc.units import stated_quantity
+    from roughvisc.variables.axes import AXES
+
+    console = Console(quiet=quiet)
+    case, folder = case_of(open_result(study) if study.suffix == ".nc" else study, out)
+    axis = case.experiment().axis
+    unit = AXES[axis].variables[axis].units
+    errors = (("--modulus-error", modulus_error), ("--time-scale-error", time_scale_error))
+    modulus, time_scale = (None if text is None else part_of_one(text, name) for name, text in errors)
+    found = budgets(
+        case,
+        list(quantities) or ["contact_area"],
+        at=[stated_quantity(one, unit, "--at") for one in places] or None,
+        sharp=sharp,
+        modulus_error=modulus,
+        time_scale_error=time_scale,
+        cutoff=cutoff,
+        population=None if ensemble is None else "ensemble" if ensemble else "patch",
+        out=folder,
+        workers=workers,
+        progress=not quiet,
+    )
+    for name, one in found.items():
+        show(console, one, folder, name)
+
+
+def show(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
+    """Print the budget of a number, write it, and draw it."""
+    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.views.console.budget_table import budget_table
+    from roughvisc.views.figures.files import write_figure
+    from roughvisc.views.plot import budget as figure
+
+    console.print(budget_table(found))
+    say(console, "Budget", write_dataset(found, folder / f"budget-{name}.nc"))
+    if plots:
+        say(console, "Figure", write_figure(figure(found), folder / f"budget-{name}.png"))

@@ -1,0 +1,179 @@
+"""``[observe]``, ``[audit]``, ``[want]``: what is made of results. They change no result, and no case's key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, get_args
+
+from pydantic import Field, WithJsonSchema, create_model, model_validator
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.bodies.sheet import Base
+from roughvisc.study.statement.resistivity import WANTED as RESISTIVITIES
+from roughvisc.study.statement.resistivity import Kind, resistivities
+from roughvisc.study.statement.schema.section import Section, choice, literal_or, measured, nullable, refuse
+from roughvisc.study.statement.schema.surface import LENGTH
+
+
+class Observable(Section):
+    """What one observable is asked with.
+
+    ``NEEDS`` are fields of which one must be kept.
+    """
+
+    NEEDS: ClassVar[tuple[str, ...]] = ()
+
+    def problem(self, boundary: str) -> tuple[str, str] | None:
+        """Key and sentence of what does not go with the border of the study; None if all does."""
+        return None
+
+
+class LeakageTable(Observable):
+    """Leakage of a fluid through the gap."""
+
+    NEEDS = ("gap",)
+
+    viscosity: measured("Pa s", above=0) = 1e-3
+    pressure_drop: measured("Pa", above=0) = 1e5
+    along: choice("x", "y") = "x"
+    sides: nullable(choice("closed", "periodic")) = None
+
+    def problem(self, boundary: str) -> tuple[str, str] | None:
+        if self.sides == "periodic" and boundary != "periodic":
+            return "sides", f"found 'periodic' where solve.boundary is {boundary!r}: expected 'closed'"
+        return None
+
+
+class ConductanceTable(Observable):
+    """Thermal or electrical conductance of the contact spots."""
+
+    NEEDS = ("pressure", "gap")
+
+    resistivity: Annotated[tuple[float, float], Field(description=RESISTIVITIES)]
+    kind: nullable(choice(*get_args(Kind))) = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_kind(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or "resistivity" not in data:
+            return data
+        try:
+            kind, values = resistivities(data["resistivity"], data.get("kind"))
+        except InputError as error:
+            raise refuse("resistivity", str(error)) from None
+        return {**data, "resistivity": values, "kind": kind}
+
+
+class ObserveSection(Section):
+    """What is derived from the result."""
+
+    leakage: nullable(LeakageTable) = Field(None, description="a table")
+    conductance: nullable(ConductanceTable) = Field(None, description="a table")
+
+    def asked(self) -> Iterator[tuple[str, Observable]]:
+        """Name and table of each observable that is asked for."""
+        return ((name, table) for name, table in self if table is not None)
+
+    def problem(self, fields: tuple[str, ...], boundary: str) -> tuple[str, str] | None:
+        """Dotted key and sentence of the first thing that does not go with the study; None if all does."""
+        for name, table in self.asked():
+            if table.NEEDS and not set(table.NEEDS) & set(fields):
+                needed = " or ".join(repr(one) for one in table.NEEDS)
+                return name, f"needs a field that is not kept: expected {needed} in keep.fields"
+            if found := table.problem(boundary):
+                return f"{name}.{found[0]}", found[1]
+        return None
+
+    def stated(self) -> dict[str, Any]:
+        """Name -> keyword arguments of each observable that is asked for, in SI."""
+        return {name: table.model_dump(exclude_none=True) for name, table in self.asked()}
+
+
+#: key -> unit, and the bounds of its values
+BOUNDS: dict[str, tuple[str, dict[str, float]]] = {
+    "work_of_adhesion": ("J/m^2", {"least": 0}),
+    "yield_strength": ("Pa", {"above": 0}),
+    "thickness": ("m", {"above": 0}),
+    "density": ("kg/m^3", {"above": 0}),
+    "linear_strain": ("1", {"above": 0}),
+    "heat_conductivity": ("W/m/K", {"above": 0}),
+    "volumetric_heat_capacity": ("J/m^3/K", {"above": 0}),
+}
+_KINDS: dict[str, Any] = {
+    **{key: measured(unit, **bounds) for key, (unit, bounds) in BOUNDS.items()},
+    "base": choice(*get_args(Base)),
+}
+
+
+class _Stated(Section):
+    """What an audit of the results is told."""
+
+    @model_validator(mode="after")
+    def _base_has_a_thickness(self) -> _Stated:
+        if getattr(self, "base", None) is not None and getattr(self, "thickness", None) is None:
+            raise refuse("base", "found without a thickness: expected both, or neither")
+        return self
+
+
+AuditSection: type[Section] = create_model(
+    "AuditSection",
+    __base__=_Stated,
+    __doc__=_Stated.__doc__,
+    **{key: (nullable(kind), None) for key, kind in _KINDS.items()},
+)
+
+
+#: What is known of the errors of numbers.
+KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
+#: In place of an error: the smallest that the time allows.
+BEST = "best"
+_ERROR = literal_or(
+    BEST, measured("1", above=0, below=1), "'best', or a part of one above 0 and below 1, such as '1 %'"
+)
+_SHARE = Annotated[
+    measured("1", least=0, below=1),
+    WithJsonSchema({"type": ["number", "string"]}),
+    Field(description="a part of one, at least 0 and below 1, such as '10 %'"),
+]
+
+
+class WantSection(Section):
+    """How accurate numbers are wanted, and what is known of their errors."""
+
+    contact_area: nullable(_ERROR) = None
+    mean_gap: nullable(_ERROR) = None
+    approach: nullable(_ERROR) = None
+    force: nullable(_ERROR) = None
+    friction_coefficient: nullable(_ERROR) = None
+    leak_rate: nullable(_ERROR) = None
+    thermal_conductance: nullable(_ERROR) = None
+    incremental_stiffness: nullable(_ERROR) = None
+    time: nullable(measured("s", above=0)) = None
+    modulus_error: nullable(_SHARE) = None
+    time_scale_error: nullable(_SHARE) = None
+    cutoff: nullable(LENGTH) = None
+    population: nullable(choice("patch", "ensemble")) = None
+
+    def numbers(self) -> list[str]:
+        """Those that are wanted."""
+        return [name for name in WANTED if getattr(self, name) is not None]
+
+    def targets(self) -> dict[str, float]:
+        """Number -> relative error that is wanted of it, at 95 %, where one is stated."""
+        return {name: found for name in self.numbers() if (found := getattr(self, name)) != BEST}
+
+    @property
+    def chooses(self) -> bool:
+        """Whether grid and tolerance are to be chosen."""
+        return bool(self.numbers() or self.time)
+
+    @model_validator(mode="after")
+    def _best_in_a_time(self) -> WantSection:
+        for name in self.numbers():
+            if getattr(self, name) == BEST and self.time is None:
+                raise refuse(name, f"found {BEST!r} without a time: expected time = '60 s' or the like beside it")
+        return self
+
+
+#: Numbers whose whole error is known, as the budget knows them.
+WANTED = tuple(name for name in WantSection.model_fields if name not in (*KNOWN, "time"))
