@@ -9,10 +9,10 @@ import xarray as xr
 from PIL import Image
 
 import roughvisc as rv
+from roughvisc import recorder as chunks
 from roughvisc.study.storage import store
 from roughvisc.topography import blocks
 from roughvisc.topography.grid import cell_edges
-from roughvisc.variables import chunks
 from roughvisc.views.figures import animate, coarsened, fields, sections
 from roughvisc.views.report import frames
 
