@@ -28,8 +28,7 @@ from roughvisc.experiment.notes import (
 )
 from roughvisc.experiment.profile import Profile, quarter, unfold, uses_window
 from roughvisc.experiment.protocol import Experiment, Row, Rows
-from roughvisc.experiment.refusal import least_rows, require_memory
-from roughvisc.experiment.resources import march_bytes
+from roughvisc.experiment.resources import least_rows, march_bytes, require_memory
 from roughvisc.experiment.scene import build_scene, kept_times, memory_options, slide_note, snap_to_cells
 from roughvisc.experiment.stated import (
     area_columns,

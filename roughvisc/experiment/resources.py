@@ -1,4 +1,4 @@
-"""What a solve takes and what there is: memory and cores, fields counted beforehand, and memory that is used again."""
+"""What a solve takes and what there is: cores and memory, and the refusal of what does not fit before it is made."""
 
 from __future__ import annotations
 
@@ -7,24 +7,30 @@ import math
 import multiprocessing
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, TooLargeError
+from roughvisc.experiment.profile import uses_window
+from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.arrays import is_wide
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import Memory
-from roughvisc.mechanics.stepping.wave_memory import WaveMemory
+from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
+from roughvisc.topography.borders import is_mirrored
 
 _PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
 #: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
@@ -32,6 +38,8 @@ _FILES = {
     "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
     "": ("memory.max", "memory.current", "inactive_file"),
 }
+#: Part of the memory there is that a case may take.
+PART = 0.9
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,10 @@ class Available:
 
     size: float
     words: str
+
+    def fits(self, needed: float) -> bool:
+        """Whether so much may be taken of it. [byte]"""
+        return needed <= PART * self.size
 
 
 def memory_available() -> Available:
@@ -326,3 +338,135 @@ def march_bytes(
 def curve_bytes(settings: Settings, cells: float) -> float:
     """Memory of a curve of friction at its peak, without what the process takes in any case. [byte]"""
     return (_CURVE + len(settings.fields)) * 8.0 * cells
+
+
+#: Cells from which it is asked what memory there is: on fewer a march takes less than 100 MB.
+WORTH_ASKING = 512**2
+#: No surface is pressed on fewer cells than these without need: the longest stride that is advised leaves them.
+_FEWEST = 64
+#: Fields of the grid that making or reading a surface takes.
+_MADE = 4.0
+
+
+def require_memory(
+    shape: tuple[int, int],
+    settings: Settings,
+    body: Body,
+    program: Program,
+    *,
+    in_memory: bool,
+    heights: NDArray[np.float64] | None = None,
+    area: float = 1.0,
+) -> None:
+    """Refuse a case that takes more memory than there is, even if its contact stays sparse.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Cells of the surface.
+    settings, body, program : Settings, Body, Program
+        Of the case.
+    in_memory : bool
+        Whether the kept fields stay in memory.
+    heights : ndarray, optional
+        Of the surface, if they are there: a surface that is its own mirror image is solved on a quarter. [m]
+    area : float
+        That a nominal pressure refers to. [m2]
+
+    Raises
+    ------
+    TooLargeError
+        If it does not fit: what it needs, what there is, and what would fit.
+    """
+    cells = math.prod(shape)
+    if cells < WORTH_ASKING:
+        return
+    memory = choose_body_memory(body, **memory_options(program.on_area(area), settings)).memory
+    rows = least_rows(settings, program)
+    part = 0.0 if uses_window(settings) and not body.kernel.raises_surface else 1.0
+
+    def needed(cells: float, settings: Settings = settings, in_memory: bool = in_memory) -> float:
+        return march_bytes(settings, cells, memory, rows=rows, part=part, in_memory=in_memory)
+
+    there = memory_available()
+    if there.fits(needed(cells)):
+        return
+    if part and settings.method == "fast" and (heights is None or is_mirrored(heights)):
+        part = 0.25
+        if there.fits(needed(cells)):
+            return
+    one, periodic = replace(settings, fields=settings.fields[:1]), replace(settings, boundary="periodic")
+    savings = []
+    if in_memory and there.fits(needed(cells, in_memory=False)):
+        savings.append("rv.run, which keeps the fields in a file")
+    if in_memory and len(settings.fields) > 1 and there.fits(needed(cells, one)):
+        savings.append(f"one kept field in place of {len(settings.fields)}")
+    if settings.boundary == "free" and settings.edge == "accept" and there.fits(needed(cells, periodic)):
+        savings.append("boundary = 'periodic'")
+    raise TooLargeError(too_large(shape, needed, there, savings))
+
+
+def require_memory_of_curve(shape: tuple[int, int], settings: Settings) -> None:
+    """Refuse a curve of friction on a surface of so many cells that takes more memory than there is."""
+    _require(shape, partial(curve_bytes, settings))
+
+
+def require_surface(shape: tuple[int, int]) -> None:
+    """Refuse a surface that cannot be made in the memory there is. [cells]"""
+    _require(shape, lambda cells: 8.0 * _MADE * cells)
+
+
+def _require(shape: tuple[int, int], needed: Callable[[float], float]) -> None:
+    """Refuse what needs more memory than there is, by the number of cells. [byte]"""
+    cells = math.prod(shape)
+    if cells >= WORTH_ASKING and not (there := memory_available()).fits(needed(cells)):
+        raise TooLargeError(too_large(shape, needed, there))
+
+
+def too_large(
+    shape: tuple[int, int], needed: Callable[[float], float], there: Available, savings: Sequence[str] = ()
+) -> str:
+    """What is said of a case that does not fit.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Cells of the surface.
+    needed : callable
+        Memory by the number of cells. [byte]
+    there : Available
+        What there is.
+    savings : sequence of str
+        What else would make it fit, beside the finest grid of whole strides.
+    """
+    advice = list(savings)
+    for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
+        few = [math.ceil(count / stride) for count in shape]
+        size = needed(math.prod(few))
+        if there.fits(size):
+            wanted = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(size)}"
+            advice.insert(0, f"{wanted} (resample = {few} under [surface], rv.resample in Python)")
+            break
+    fitting = f"what would fit: {'; or '.join(advice)}" if advice else "expected more memory, or a coarser grid"
+    return (
+        f"{shape[0]} x {shape[1]} cells need about {amount(needed(math.prod(shape)))} of memory, and "
+        f"{amount(there.size)} are {there.words}: {fitting}"
+    )
+
+
+def least_rows(settings: Settings, program: Program) -> float:
+    """Kept times, at least."""
+    if settings.times is None:
+        return float(len(program.segments))
+    return float(settings.times if isinstance(settings.times, int) else len(settings.times))
+
+
+def amount(size: float) -> str:
+    """A number of bytes as one reads it.
+
+    Examples
+    --------
+    >>> amount(2.13e9), amount(350e6), amount(-1)
+    ('2.1 GB', '350 MB', '0 MB')
+    """
+    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{max(size, 0) / 1e6:.0f} MB"

@@ -25,8 +25,7 @@ from roughvisc.experiment.notes import (
 )
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
-from roughvisc.experiment.refusal import require_memory_of_curve
-from roughvisc.experiment.resources import curve_bytes
+from roughvisc.experiment.resources import curve_bytes, require_memory_of_curve
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.kernel import wave_limits

@@ -12,8 +12,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.errors import InputError, TooLargeError, TransientError
-from roughvisc.experiment import refusal
-from roughvisc.experiment import resources as available
+from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import PROCESS, Available, cores, curve_bytes, memory_available, threads_for
 from roughvisc.experiment.steady_sliding import SlidingRows
@@ -54,7 +53,7 @@ def limited(monkeypatch):
     """Sets how much memory there is."""
 
     def limit(size, words="free in this machine"):
-        for module in (refusal, side_module):
+        for module in (resources, side_module):
             monkeypatch.setattr(module, "memory_available", lambda: Available(size, words))
 
     return limit
@@ -97,7 +96,7 @@ def test_simulate__refuses_what_cannot_fit_and_says_what_would(limited):
 
 
 def test_small_case__is_not_asked_about(monkeypatch):
-    monkeypatch.setattr(refusal, "memory_available", lambda: pytest.fail("the memory was looked at"))
+    monkeypatch.setattr(resources, "memory_available", lambda: pytest.fail("the memory was looked at"))
     height = rv.sphere(1e-2, 1e-3, (24, 21))
     rv.simulate(height, rv.elastic(1e6), rv.Program().load(1e-3, over=0), progress=False)
 
@@ -107,11 +106,13 @@ def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
     settings = Settings(boundary="periodic", times=2)
     fields = 8.0 * ball.size
     limited(12 * fields)
-    refusal.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=ball.values, **given)
+    resources.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=ball.values, **given)
     off = ball.values + 1e-6 * np.arange(600)
     with pytest.raises(TooLargeError):
-        refusal.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=off, **given)
-    refusal.require_memory(ball.shape, Settings(boundary="free", times=2), rv.Body(RUBBER), PRESS, heights=off, **given)
+        resources.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=off, **given)
+    resources.require_memory(
+        ball.shape, Settings(boundary="free", times=2), rv.Body(RUBBER), PRESS, heights=off, **given
+    )
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
@@ -135,9 +136,9 @@ def test_curves_of_friction__run_side_by_side_as_memory_allows(study, limited):
     sizes = '[solve]\nboundary = "periodic"\n[sweep]\n"surface.shape" = [[600, 512], [512, 600]]\n'
     cases = read_cases(study(head + curve + sizes))
     each = PROCESS + curve_bytes(cases[0].solving(), 600 * 512)
-    limited(2.1 * each / refusal.PART)
+    limited(2.1 * each / resources.PART)
     assert side_module.side_by_side(cases, 2) == 2
-    limited(1.9 * each / refusal.PART)
+    limited(1.9 * each / resources.PART)
     assert side_module.side_by_side(cases, 2) == 1
 
 
@@ -159,8 +160,8 @@ def test_curve_of_friction__is_refused_where_it_cannot_fit(study, limited, tmp_p
 
 def test_control_groups__of_both_versions_and_all_levels_count(tmp_path, monkeypatch):
     groups, process = tmp_path / "groups", tmp_path / "self"
-    monkeypatch.setattr(available, "_GROUPS", groups)
-    monkeypatch.setattr(available, "_PROC_SELF", process)
+    monkeypatch.setattr(resources, "_GROUPS", groups)
+    monkeypatch.setattr(resources, "_PROC_SELF", process)
     process.mkdir()
 
     def group(folder, names, limit, used, cache, statistic):
@@ -174,13 +175,13 @@ def test_control_groups__of_both_versions_and_all_levels_count(tmp_path, monkeyp
     group(groups / "memory" / "job" / "task", first, 9223372036854771712, 5000, 0, "total_inactive_file")
     group(groups / "memory" / "job", first, 9000, 5000, 1000, "total_inactive_file")
     (process / "cgroup").write_text("4:memory:/job/task\n3:cpu:/\n")
-    assert min(one.size for one in available._groups()) == 9000 - (5000 - 1000)
+    assert min(one.size for one in resources._groups()) == 9000 - (5000 - 1000)
     group(groups / "job" / "task", second, "max", 5000, 0, "inactive_file")
     group(groups / "job", second, 8000, 5000, 500, "inactive_file")
     (process / "cgroup").write_text("0::/job/task\n")
-    assert [one.size for one in available._groups()] == [8000 - (5000 - 500)]
+    assert [one.size for one in resources._groups()] == [8000 - (5000 - 500)]
     (process / "cgroup").unlink()
-    assert not list(available._groups())
+    assert not list(resources._groups())
 
 
 def test_limit_of_the_address_space__counts():
@@ -202,7 +203,7 @@ def test_limit_of_the_address_space__counts():
 
 def test_limit_of_a_dask_worker__counts(monkeypatch):
     worker = SimpleNamespace(memory_manager=SimpleNamespace(memory_limit=10**6))
-    monkeypatch.setattr(available, "_dask_worker", lambda: worker)
+    monkeypatch.setattr(resources, "_dask_worker", lambda: worker)
     assert memory_available().words == "left of the Dask worker's memory limit"
 
 

@@ -21,8 +21,7 @@ from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.notes import body_note, layer_note, omitted_effects
 from roughvisc.experiment.profile import Profile, uses_window
-from roughvisc.experiment.refusal import PART, amount, too_large
-from roughvisc.experiment.resources import PROCESS, Available, cores, memory_available
+from roughvisc.experiment.resources import PART, PROCESS, Available, amount, cores, memory_available, too_large
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.operator import Boundary
@@ -369,8 +368,8 @@ def _row(
     quarter = work(cells / 4) / work(cells)
     seconds = wall_time(settings, solved, found, choice, convolution)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
-    if needed(cells) > PART * there.size:
-        row["refusal"] = too_large(shape, needed, there, [])
+    if not there.fits(needed(cells)):
+        row["refusal"] = too_large(shape, needed, there)
     if found.fraction < NEARLY_FULL:
         row["warning"] = ""
     return row | {
@@ -448,8 +447,8 @@ def _general_row(
     def needed(cells: float) -> float:
         return PROCESS + experiment.bytes_needed(settings, body, cells, area)
 
-    if needed(cells) > PART * there.size:
-        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there, [])
+    if not there.fits(needed(cells)):
+        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there)
     return row | {
         "audit": _audit(case, surface, found) if marched else "",
         "rows": found.rows,

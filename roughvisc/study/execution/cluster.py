@@ -16,8 +16,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.refusal import PART, WORTH_ASKING
-from roughvisc.experiment.resources import PROCESS, cores, memory_available
+from roughvisc.experiment.resources import PART, PROCESS, WORTH_ASKING, cores, memory_available
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import program_version
 from roughvisc.topography.grid import nominal_area

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
-from roughvisc.experiment.refusal import require_surface
-from roughvisc.experiment.resources import keep_memory
+from roughvisc.experiment.resources import keep_memory, require_surface
 from roughvisc.groups import attributes_of
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
