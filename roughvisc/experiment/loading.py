@@ -436,7 +436,7 @@ class LoadingRows(Rows):
 
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
         """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
-        gap = self.profile.gap[rows] + step.displacement_on(rows)
+        gap = self.profile.gap[rows] + step.on_rows(step.moved, rows)
         self._clip_gap(gap, step.level, rows)
         gap[contact[rows]] = 0.0
         return gap

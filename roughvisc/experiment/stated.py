@@ -58,8 +58,8 @@ def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
 
     def counted(rows: slice) -> tuple[int, int]:
         here = contact[rows]
-        inside = here & (step.pressure_on(rows) <= pressure)
-        outside = ~here & (scene.gap[rows] + step.displacement_on(rows) - step.level <= closed)
+        inside = here & (step.on_rows(shown.contact, rows) <= pressure)
+        outside = ~here & (scene.gap[rows] + step.on_rows(step.moved, rows) - step.level <= closed)
         if scene.present is not None:
             outside &= scene.present[rows]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))

@@ -110,6 +110,13 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
     return end if taken >= cells else began + (end - began) * (taken / cells)
 
 
+def one_of(value: Any, words: Any, expected: str, key: str) -> Any:
+    """A value that is one of a few words: a direction, or what is controlled."""
+    if value not in get_args(words):
+        raise InputError(f"{key}: found {shown(value)}: expected {expected}")
+    return value
+
+
 Control = Literal["load", "approach", "pressure"]
 #: what may be prescribed -> its unit
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
@@ -145,8 +152,7 @@ class Segment:
     slide: Slide | None = None
 
     def __post_init__(self) -> None:
-        if self.control not in UNITS:
-            raise InputError(f"control: found {shown(self.control)}: expected {CONTROLS}")
+        one_of(self.control, Control, CONTROLS, "control")
         if not (math.isfinite(self.duration) and self.duration >= 0):
             raise InputError(f"duration of a {self.control} segment is {self.duration!r}: expected a number >= 0 [s]")
         if self.end is not None and not math.isfinite(self.end):
@@ -224,20 +230,6 @@ class Segment:
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
 #: Segments that a program tells one by one.
 TOLD = 8
-
-
-def known_control(control: Any, key: str) -> Any:
-    """What is controlled, if there is such a thing."""
-    if control not in get_args(Control):
-        raise InputError(f"{key}: found {shown(control)}: expected {CONTROLS}")
-    return control
-
-
-def known_direction(direction: Any, key: str) -> Any:
-    """A direction of sliding, if there is such a one."""
-    if direction not in get_args(Direction):
-        raise InputError(f"{key}: found {shown(direction)}: expected {DIRECTIONS}")
-    return direction
 
 
 def in_words(segments: Sequence[Segment]) -> list[str]:
@@ -408,7 +400,7 @@ class Program:
         here = f"program.{len(self.segments)}"
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
-        kept = known_control(control, f"{here}.control")
+        kept = one_of(control, Control, CONTROLS, f"{here}.control")
         return self._then(Segment(kept, stated_quantity(duration, "s", f"{here}.hold", least=0)))
 
     def slide(
@@ -454,7 +446,8 @@ class Program:
         else:
             lasting = far / stated_quantity(speed, "m/s", f"{here}.speed", above=0)
         control = self.segments[-1].control if self.segments else "load"
-        return self._then(Segment(control, lasting, slide=Slide(far, known_direction(direction, f"{here}.direction"))))
+        towards = one_of(direction, Direction, DIRECTIONS, f"{here}.direction")
+        return self._then(Segment(control, lasting, slide=Slide(far, towards)))
 
     @classmethod
     def table(
@@ -478,7 +471,7 @@ class Program:
         InputError
             If the lengths differ, or the times do not increase from zero; the message names the row.
         """
-        unit = UNITS[known_control(control, "control")]
+        unit = UNITS[one_of(control, Control, CONTROLS, "control")]
         if len(times) != len(values) or not len(times):
             raise InputError(f"table has {len(times)} times and {len(values)} values: expected as many, at least one")
         if times[0] != 0 and stated_quantity(times[0], "s", "table.times.0"):
@@ -526,7 +519,7 @@ class Program:
         InputError
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
-        unit, instead = UNITS[known_control(control, "control")], INSTEAD[control]
+        unit, instead = UNITS[one_of(control, Control, CONTROLS, "control")], INSTEAD[control]
         middle = stated_quantity(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
         height = stated_quantity(amplitude, unit, "cycle.amplitude", instead=instead)
         length = stated_quantity(period, "s", "cycle.period", above=0)

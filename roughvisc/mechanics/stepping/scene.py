@@ -461,18 +461,10 @@ class Step:
         """The same on all cells, not to be changed; had anew each time where it is no field of its own. [m]"""
         return self.moved.field()
 
-    def pressure_on(self, rows: slice) -> Array:
-        """Pressure shown on some rows of cells, not to be changed. [Pa]"""
-        return self.shown.contact.part(self._cells_of(rows)).reshape(-1, self.scene.operator.shape[1])
-
-    def displacement_on(self, rows: slice) -> Array:
-        """Total displacement of them, not to be changed. [m]"""
-        return self.moved.part(self._cells_of(rows)).reshape(-1, self.scene.operator.shape[1])
-
-    def _cells_of(self, rows: slice) -> slice:
-        """Flat indices."""
+    def on_rows(self, field: Sparse | Sum, rows: slice) -> Array:
+        """Its pressure [Pa] or its total displacement [m] on some rows of cells, not to be changed."""
         columns = self.scene.operator.shape[1]
-        return slice(rows.start * columns, rows.stop * columns)
+        return field.part(slice(rows.start * columns, rows.stop * columns)).reshape(-1, columns)
 
     def with_fields(self) -> Step:
         """The same with all its fields at hand, for what asks for them again and again."""
