@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from roughvisc.experiment.coarser import on_fewer_cells
 from roughvisc.experiment.loading import Loading
 from roughvisc.problem import Problem
 from roughvisc.solve import solve
-from roughvisc.study.cost.estimate import Copies, CostEstimate, coarse, march_of
+from roughvisc.study.cost.estimate import CoarseRun, Copies, CostEstimate, coarse, march_of
 from roughvisc.study.cost.press import Pressed
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
@@ -63,7 +64,11 @@ def on_coarse_grids(case: Case, height: xr.DataArray) -> CostEstimate:
     experiment = case.experiment().on_area(nominal_area(height))
     cheaper, count, dearer = experiment.cheaper()
     settings = replace(case.solving(), fields=(), grid_error=False)
-    halved, found = (solve(Problem(few, case.body(), settings), cheaper) for few in _copies(case, height))
+    copies = _copies(case, height)
+    halved = solve(Problem(copies[0], case.body(), settings), cheaper)
+    began = time.perf_counter()
+    found = solve(Problem(copies[1], case.body(), settings), cheaper)
+    took = time.perf_counter() - began
     count = count or found.sizes[experiment.axis]
     finest, before = (float(one["convolutions"].mean()) for one in (found, halved))
     growth = min(max(finest / max(before, 1.0), _GROWS[0]), _GROWS[1])
@@ -83,6 +88,7 @@ def on_coarse_grids(case: Case, height: xr.DataArray) -> CostEstimate:
         fraction=float(found["contact_fraction"].max()),
         kept=tuple(contact.tolist()),
         pressed=_pressed(found),
+        coarse_run=CoarseRun(copies[1], found.sizes[experiment.axis], float(found["convolutions"].sum()), took),
         halved=_pressed(halved) if max(height.shape) > _COARSE[1] else None,
     )
 

@@ -137,34 +137,48 @@ def shortened(program: Program, height: xr.DataArray) -> Program:
     return replace(program, segments=tuple(segments))
 
 
-#: Sides of the coarse grids, in cells: from two of them the growth with the grid is known. On seven studies at 128
-#: to 512 squared the convolutions so found were -1 to +22 % off, the steps -8 to +7 %.
-_COARSE = (17, 33)
+#: Least and largest side of the finer of two coarse grids, in cells, from which the growth with the grid is known. In
+#: between it is a third of the case's, and the other one is half of it. `python workflows/benchmarks/plans.py`
+#: measures what is so found.
+_COARSE = (33, 129)
 #: Cost may grow from a grid to one twice as fine by factors within these.
 _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
 #: A coarse march ends after so many convolutions, or steps, which take about three seconds: counts, so that what is
 #: foretold does not depend on how busy the machine is.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 20_000, 3_000
-#: Seconds for timing solves.
-_CALIBRATION = 2.0
+#: Seconds for timing solves, in all and of one grid, which may be narrow and then takes a few milliseconds. [s, cells]
+_CALIBRATION, _ENOUGH, _NARROW = 2.0, (0.1, 0.5), 128**2
 #: Largest grid that a solve is timed on; larger ones are taken to cost as N log N. [cells]
 _TIMED = 1024**2
 #: What the grid's error costs: the march again on a quarter of the cells and a sixteenth, which is dearer by the cell.
 _AGAIN = 1.5
+#: Seconds to begin a case and to write its file, whatever its size.
+_FILE = 0.05
 #: Seconds to keep a byte of a field, and to write it to the file in the end; bytes on disk for a byte that is rounded.
 _WRITE, _ROUNDED = 3e-9, 0.5
 #: An approach leaves a window that reaches this much deeper.
 _BEYOND = 1.05
-#: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed.
-_CHUNK, _COMPRESSED = 8, 0.3
+#: Frames in a chunk of the file at most; contact fraction of the middle one below which pressures are compressed, and
+#: that of a surface which is its own mirror image.
+_CHUNK, _COMPRESSED = 8, (0.24, 0.4)
 
 
 class Passed(NamedTuple):
-    """A step of a coarse march: approach and extent of its contact along x and y [m], and what it took."""
+    """A step of a coarse march: approach, extent of its contact along x and y [m], what it took, and its time [s]."""
 
     level: float
     width: tuple[float, float]
     convolutions: float
+    time: float = 0.0
+
+
+class CoarseRun(NamedTuple):
+    """A run on a coarse surface: its steps, or rows, the convolutions of all, and the time that it took [s]."""
+
+    height: xr.DataArray
+    steps: int
+    convolutions: float
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -203,6 +217,8 @@ class CostEstimate:
         The largest contact on cells as fine as are pressed at once.
     halved : Pressed or None
         The same on cells twice as long, where these are coarser than the surface's.
+    coarse_run : CoarseRun or None
+        From which all this is carried on.
     """
 
     steps: float
@@ -222,6 +238,7 @@ class CostEstimate:
     at_border: bool = False
     pressed: Pressed | None = None
     halved: Pressed | None = None
+    coarse_run: CoarseRun | None = None
 
 
 class Copies:
@@ -305,19 +322,22 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         return press(copies.of(shapes[grid], most), push or Push(load=0.0), settings.boundary, case.body().kernel)
 
     last, grid = len(shapes) - 1, 0
-    first = marched(0, _COARSE[0], last > 0)
+    coarser, finer = coarse_sides(height.shape)
+    first = marched(0, coarser, last > 0)
     while first.at_border and grid < last:
         grid += 1
-        first = marched(grid, _COARSE[0], grid < last)
+        first = marched(grid, coarser, grid < last)
     coarsely = grid  # on a coarse grid the outermost cells reach farther inwards
     while grid > 0 and not pressed(grid - 1, first.push).at_border:
         grid -= 1
     while grid < last and pressed(grid, first.push).at_border:
         grid += 1
     if grid != coarsely:
-        first = marched(grid, _COARSE[0])
-    second = marched(grid, _COARSE[1])
-    octaves = math.log2(max(math.sqrt(math.prod(shapes[grid])) / _COARSE[1], 1.0))
+        first = marched(grid, coarser)
+    second = marched(grid, finer)
+    if not second.whole and first.course[-1].time > second.course[-1].time:
+        second = _carried_on(second, first)
+    octaves = math.log2(max(math.sqrt(math.prod(shapes[grid])) / finer, 1.0))
     in_all = [(one.steps - one.slid, one.convolutions - one.slid_convolutions) for one in (first, second)]
     taken = {
         "steps": in_all[1][0] * _growth(in_all[0][0], in_all[1][0], _STEPS_GROW) ** octaves,
@@ -351,10 +371,27 @@ def _rescaled(found: CostEstimate, pressed: Pressed) -> CostEstimate:
     finest = (pressed.approach, *pressed.width)
     level, *widths = (new / old if new > 0 and old > 0 else 1.0 for new, old in zip(finest, largest, strict=True))
     course = tuple(
-        Passed(level * passed.level, (widths[0] * passed.width[0], widths[1] * passed.width[1]), passed.convolutions)
+        passed._replace(level=level * passed.level, width=(widths[0] * passed.width[0], widths[1] * passed.width[1]))
         for passed in found.course
     )
     return replace(found, course=course, level=level * found.level)
+
+
+def _carried_on(found: CostEstimate, coarser: CostEstimate) -> CostEstimate:
+    """A march that was broken off, as the one on fewer cells went on from there."""
+    before = [passed.convolutions for passed in coarser.course if passed.time <= found.course[-1].time]
+    steps, work = len(found.course), sum(passed.convolutions for passed in found.course)
+    return replace(
+        found,
+        steps=steps * coarser.steps / max(len(before), 1),
+        convolutions=work * coarser.convolutions / max(sum(before), 1.0),
+    )
+
+
+def coarse_sides(shape: Sequence[int]) -> tuple[int, int]:
+    """Cells a side of the two coarse grids of a grid."""
+    finer = min(max(max(shape) // 3, _COARSE[0]), _COARSE[1]) // 2 * 2 + 1
+    return finer // 2 + 1, finer
 
 
 def _growth(first: float, second: float, limits: tuple[float, float]) -> float:
@@ -374,7 +411,8 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     slid = slid_work = 0
     kept, contacts = set(scene.times or ()), []
     course: list[Passed] = []
-    forces, largest, push, bordering = [0.0], -1.0, Push(load=0.0), False
+    began = time.perf_counter()
+    forces, largest, push, bordering = [0.0], (-1.0, 0.0), Push(load=0.0), False
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
         now = step.shown.time
         steps += 1
@@ -388,15 +426,15 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
         taken_off = staircase_area(touching, scene) / (scene.operator.cell_area * touching.size)
         fraction = max(fraction, share - taken_off)
         level, force = max(level, step.level), max(force, step.shown.force)
-        course.append(Passed(step.level, width_of(touching, profile), step.state.convolutions - work))
+        course.append(Passed(step.level, width_of(touching, profile), step.state.convolutions - work, now))
         bordering = bordering or at_border(scene, step.shown.contact)
         if in_slide(step):
             slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
         work, reached = step.state.convolutions, now
         instants.append(now)
         forces.append(step.shown.force)
-        if share - taken_off > largest:
-            largest = share - taken_off
+        if (share - taken_off, step.level) > largest:  # of few cells as many may touch at several approaches
+            largest = (share - taken_off, step.level)
             push = Push(approach=step.level) if step.control == "approach" else _push(scene, instants, forces)
         if outgrowing and bordering:
             break
@@ -411,7 +449,8 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
     known = (part, contact, bool(whole), level, force, fraction, tuple(contacts), slid, slid_work)
     known = (*known, tuple(course), push, bordering)
-    return CostEstimate(steps * stretch, kept_rows, work * stretch, *known)
+    coarse_run = CoarseRun(height, steps, work, time.perf_counter() - began)
+    return CostEstimate(steps * stretch, kept_rows, work * stretch, *known, coarse_run=coarse_run)
 
 
 def _push(scene: Scene, instants: Sequence[float], forces: Sequence[float]) -> Push:
@@ -444,7 +483,7 @@ class ConvolutionTimer:
         if self._left <= 0 and alike:  # as N log N from the grid nearest in size
             nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
             return self._found[nearest] * work(height.size) / work(math.prod(nearest[0]))
-        cells = height.size
+        cells, enough = height.size, _ENOUGH[height.size > _NARROW]
         if cells > _TIMED:
             height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
@@ -460,10 +499,17 @@ class ConvolutionTimer:
             )
             now = time.perf_counter()
             seconds = min(seconds, (now - start) / max(state.convolutions, 1))
-            if now - began > min(0.5, self._left) or gap.max() == 0:
+            if now - began > min(enough, self._left) or gap.max() == 0:
                 break
         self._left -= time.perf_counter() - began
         return seconds * work(cells) / work(height.size)
+
+    def beside(self, run: CoarseRun | None, boundary: str, kernel: Kernel) -> float:
+        """Seconds that a step takes beside its convolutions where fields are small: the interpreter's. [s]"""
+        if run is None or run.steps == 0:
+            return 0.0
+        left = run.seconds - run.convolutions * self.seconds(run.height, boundary, kernel)
+        return max(left, 0.0) / run.steps
 
 
 def work(cells: float) -> float:
@@ -521,15 +567,20 @@ def solved_on(stages: tuple[Stage, ...], found: CostEstimate) -> Solved:
     return Solved(stages[: reached + 1], tuple(shares.tolist()))
 
 
-def wall_time(settings: Settings, solved: Solved, found: CostEstimate, choice: Choice, convolution: float) -> float:
-    """Seconds for a case in one process with one thread, by those of a convolution on the final surface. [s]"""
+def wall_time(
+    settings: Settings, solved: Solved, found: CostEstimate, choice: Choice, convolution: float, beside: float = 0.0
+) -> float:
+    """Seconds for a case in one process with one thread.
+
+    By those of a convolution on the final surface, and by those of a step ``beside`` its convolutions. [s]
+    """
     cells = solved.cells
     modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0
     past = found.contact * found.steps / 2 if isinstance(choice.memory, History) else 0.0
-    stepping = found.steps * solved.mean(float) * 8 * (10 + 4 * modes + past) * 0.3e-9
+    stepping = found.steps * (beside + solved.mean(float) * 8 * (10 + 4 * modes + past) * 0.3e-9)
     writing = found.rows * cells * 8 * len(settings.fields) * _WRITE
     again = _AGAIN if settings.grid_error else 1.0
-    return found.convolutions * convolution * solved.mean(work) / work(cells) * again + stepping + writing
+    return found.convolutions * convolution * solved.mean(work) / work(cells) * again + stepping + writing + _FILE
 
 
 def bytes_needed(
@@ -540,14 +591,14 @@ def bytes_needed(
     return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
-def disk(case: Case, cells: int, found: CostEstimate) -> float:
+def disk(case: Case, cells: int, found: CostEstimate, mirrored: bool = False) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
     rows = found.rows
     if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
         rows = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
     kept = np.array(found.kept or (found.contact,))
-    few = kept[len(kept) // 2] < _COMPRESSED  # the frame that the writer asks
+    few = kept[len(kept) // 2] < _COMPRESSED[mirrored]  # the frame that the writer asks
     names = case.settings.keep.fields
     pressure = found.rows * (float(np.mean(kept)) + 0.01) if few else rows * dense
     fields = sum(pressure if name == "pressure" else rows * dense for name in names)

@@ -182,11 +182,11 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
 
     Notes
     -----
-    The numbers of steps and convolutions are extrapolated from runs on grids of 17 and 33 points a side at the same
-    tolerance. Times come from a solve on the real grid that is timed for at most two seconds. If the grid or its window
-    follows the contact, the coarse grids cover the final extent, and each convolution is weighted by its cells. The
-    estimates are accurate to about 25 %, or 50 % if the pressure of a soft material jumps with each cell that makes
-    contact, or if a grid grows. Other experiments run on grids of 24 and 48 cells, a friction curve at some of its
+    The numbers of steps and convolutions are extrapolated from runs at the same tolerance on grids of a sixth and a
+    third of the points a side, between 17 and 129. Times come from a solve on the real grid that is timed for at most
+    two seconds, and from the time of the coarse run. If the grid or its window follows the contact, the coarse grids
+    cover the final extent, and each convolution is weighted by its cells. The estimates are accurate to about 25 %, or
+    50 % if the pressure of a soft material jumps with each cell that makes contact, or if a grid grows. Other experiments run on grids of 24 and 48 cells, a friction curve at some of its
     speeds; these estimates are accurate to a factor of two. The contact fraction is that of an elastic solution on at
     most 256 cells a side, or of the experiment on 48.
     """
@@ -366,7 +366,8 @@ def _row(
     sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
     final = float(choice.material.contact_compliance(case.program().duration))
     quarter = work(cells / 4) / work(cells)
-    seconds = wall_time(settings, solved, found, choice, convolution)
+    beside = stopwatch.beside(found.coarse_run, settings.boundary, case.body().kernel)
+    seconds = wall_time(settings, solved, found, choice, convolution, beside)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     if not there.fits(needed(cells)):
         row["refusal"] = too_large(shape, needed, there)
@@ -391,11 +392,11 @@ def _row(
         "convolutions": found.convolutions,
         "wall_time": seconds,
         "memory": needed(cells),
-        "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter),
+        "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter, beside),
         "half_memory": needed(cells // 4),
         "rms_slope": surface.slope,
         "half_rms_slope": surface.half_slope,
-        "disk": disk(case, cells, found),
+        "disk": disk(case, cells, found, surface.mirrored or surface.grows),  # an indenter is symmetric
     }
 
 
@@ -458,7 +459,8 @@ def _general_row(
         "warning": full_contact_warning(nominal, relaxed),
         **_contact(found, marched),
         "convolutions": found.convolutions,
-        "wall_time": found.convolutions * convolution,
+        "wall_time": found.convolutions * convolution
+        + found.rows * stopwatch.beside(found.coarse_run, settings.boundary, body.kernel),
         "memory": needed(cells),
         "disk": disk(case, cells, found),
     }

@@ -20,7 +20,7 @@ from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.cost import estimate
 from roughvisc.study.cost import plan as plan_module
 from roughvisc.study.cost import plan as totals_module
-from roughvisc.study.cost.estimate import CostEstimate, Solved, Stage, coarse, wall_time
+from roughvisc.study.cost.estimate import CostEstimate, Passed, Solved, Stage, coarse, wall_time
 from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.variables import STEPPED
 from roughvisc.views.console import tables
@@ -195,7 +195,10 @@ def test_plan__says_what_runs_side_by_side_and_what_half_the_resolution_costs(st
     monkeypatch.setattr(totals_module, "cores", lambda: 4)
     monkeypatch.setattr("roughvisc.study.execution.cluster.cores", lambda: 4)
     monkeypatch.setattr(plan_module, "memory_available", lambda: Available(1e12, "free in this machine"))
-    planned = rv.plan(several)
+    with monkeypatch.context() as without:  # what is the same on any grid
+        without.setattr(estimate.ConvolutionTimer, "beside", lambda *_: 0.0)
+        without.setattr(estimate, "_FILE", 0.0)
+        planned = rv.plan(several)
     assert (planned.attrs["processes"], planned.attrs["threads"]) == (3, 1)
     # on a quarter of the cells: a quarter of all that is not the process
     assert float(planned.half_memory[0]) - 210e6 == pytest.approx((float(planned.memory[0]) - 210e6) / 4, rel=0.01)
@@ -408,15 +411,20 @@ def test_disk__takes_the_fields_and_fifteen_histories_of_each_row(study):
 def test_wall_time__is_that_of_the_convolutions_of_the_fields_passed_through_and_of_writing(study):
     settings = study(ROUGH)[0].solving()
     march, cells = CostEstimate(1000, 0, 400, 0.0, 0.1, True), 2**20 - 2
-    passed = [wall_time(settings, whole(cells), march, remembered(m), 0.0) for m in (rv.elastic(1e6), ZENER)]
+
+    def seconds(*given):
+        return wall_time(settings, *given) - estimate._FILE
+
+    passed = [seconds(whole(cells), march, remembered(m), 0.0) for m in (rv.elastic(1e6), ZENER)]
     byte = 0.3e-9
     assert passed == pytest.approx([1000 * 8 * cells * n * byte for n in (10, 14)])
     elastic = remembered(rv.elastic(1e6))
-    assert wall_time(settings, whole(cells, 0.25), march, elastic, 0.0) == pytest.approx(passed[0] / 4)
-    rows = wall_time(settings, whole(cells), replace(march, rows=50), elastic, 0.0) - passed[0]
+    assert seconds(whole(cells, 0.25), march, elastic, 0.0) == pytest.approx(passed[0] / 4)
+    rows = seconds(whole(cells), replace(march, rows=50), elastic, 0.0) - passed[0]
     assert rows == pytest.approx(50 * 8 * cells * 3e-9)
+    assert seconds(whole(cells), march, elastic, 0.0, 1e-3) - passed[0] == pytest.approx(1000 * 1e-3)
     part = (2**18 - 2) / cells  # as N log N
-    one = wall_time(settings, whole(cells, part), replace(march, steps=0), elastic, 0.01)
+    one = seconds(whole(cells, part), replace(march, steps=0), elastic, 0.01)
     assert one == pytest.approx(400 * 0.01 * part * 18 / 20, rel=1e-4)
 
 
@@ -438,6 +446,7 @@ def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
     monkeypatch.setattr(estimate, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
     monkeypatch.setattr(estimate, "_TIMED", 15**2)
     monkeypatch.setattr(estimate, "_CALIBRATION", 100.0)
+    monkeypatch.setattr(estimate, "_NARROW", 0)
     watch = estimate.ConvolutionTimer()
 
     def seconds(shape):
@@ -453,6 +462,12 @@ def test_solve_that_is_timed__is_small_and_stands_for_larger_ones(monkeypatch):
         watch._found[grid] *= 1 if grid[0] == (60, 41) else 7
     assert seconds((31, 33)) == expected((31, 33))
     assert not timed
+    # what a coarse run took beside its convolutions, each step; never less than nothing
+    height = rv.sphere(1e-3, 2e-4, (15, 14))
+    each = seconds((15, 14))
+    for beside, expected_beside in [(0.3, 0.1), (-0.3, 0.0)]:
+        run = estimate.CoarseRun(height, 3, 40, 40 * each + beside)
+        assert watch.beside(run, "free", HALF_SPACE) == pytest.approx(expected_beside)
 
 
 @pytest.mark.parametrize(("time_step", "steps"), [("auto", 12 * 1.2), (0.01, 12)])
@@ -463,6 +478,15 @@ def test_cost__grows_from_grid_to_grid_as_between_the_coarse_ones(study, monkeyp
     case = vary(study(ROUGH)[0], {"solve.time_step": time_step})
     grown = estimate.march_of(case, rv.sphere(1e-3, 2e-4, 66))
     assert (grown.steps, grown.rows, grown.convolutions) == pytest.approx((steps, steps, 150 * 1.5))
+
+
+def test_march_that_is_broken_off__goes_on_as_the_one_on_fewer_cells():
+    """That had done 2 of its 4 steps and 30 of its 60 convolutions when the finer one ended."""
+    nowhere = (0.0, (0.0, 0.0))
+    coarser = CostEstimate(4, 1, 60, 0.0, 0.1, True, course=tuple(Passed(*nowhere, 15.0, t) for t in (0, 1, 4, 16)))
+    found = CostEstimate(99, 1, 999, 0.0, 0.1, False, course=tuple(Passed(*nowhere, 10.0, t) for t in (0, 0.5, 1)))
+    carried = estimate._carried_on(found, coarser)
+    assert (carried.steps, carried.convolutions) == (6, 60)
 
 
 def test_march_of_equal_steps__is_foreseen_from_a_part_of_it(study, monkeypatch):
