@@ -183,12 +183,13 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     Notes
     -----
     The numbers of steps and convolutions are extrapolated from runs at the same tolerance on grids of a sixth and a
-    third of the points a side, between 17 and 129. Times come from a solve on the real grid that is timed for at most
-    two seconds, and from the time of the coarse run. If the grid or its window follows the contact, the coarse grids
-    cover the final extent, and each convolution is weighted by its cells. The estimates are accurate to about 25 %, or
-    50 % if the pressure of a soft material jumps with each cell that makes contact, or if a grid grows. Other experiments run on grids of 24 and 48 cells, a friction curve at some of its
-    speeds; these estimates are accurate to a factor of two. The contact fraction is that of an elastic solution on at
-    most 256 cells a side, or of the experiment on 48.
+    third of the points a side, between 17 and 129. Times come from a solve on the real grid that is timed for at
+    most two seconds, and from the time of the coarse run. If the grid or its window follows the contact, the coarse
+    grids cover the final extent, and each convolution is weighted by its cells. The estimates are accurate to about
+    25 %, or 50 % if the pressure of a soft material jumps with each cell that makes contact, or if a grid grows.
+    Other experiments run on grids of 24 and 48 cells, a friction curve at some of its speeds; these estimates are
+    accurate to a factor of two. The contact fraction is that of an elastic solution on at most 256 cells a side, or
+    of the experiment on 48.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
