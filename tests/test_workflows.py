@@ -256,6 +256,21 @@ def test_layers_benchmark__compares_bodies_of_as_many_exponentials(monkeypatch):
     assert all(row["stated_error"] <= 1e-2 for row in (layer, as_many, own))
 
 
+@pytest.mark.thorough
+def test_plans_and_limit__are_measured(monkeypatch, capsys):
+    """A solve takes longer than its transforms, and a plan is that of the case that runs."""
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    limit, plans = importlib.import_module("limit"), importlib.import_module("plans")
+    for case in limit.CELLS:
+        row = limit.measure(case, 32)
+        assert row["convolutions"] > 0
+        assert row["whole"] > row["convolutions"] * row["pair"] > 0
+    for kind in ("elastic", "ball under approach", "friction"):
+        said, found = plans.planned(kind, 40), plans.taken(kind, 40)
+        assert 0.5 < said["convolutions"] / found["convolutions"] < 2, kind
+        assert 0.8 < said["disk"] / found["disk"] < 1.25, kind
+
+
 def test_big_scans_and_results__are_measured(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     scans, results = importlib.import_module("big_scans"), importlib.import_module("big_results")

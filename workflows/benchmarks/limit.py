@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
 CELLS = {
     "creep": (64, 128, 256, 512, 1024),
@@ -61,10 +62,10 @@ def measure(case, cells):
         solved.append((time.process_time() - began, found.convolutions))
         return found
 
-    step.solve_contact = timed
-    began = time.process_time()
-    ds = solve()
-    whole = time.process_time() - began
+    with mock.patch.object(step, "solve_contact", timed):
+        began = time.process_time()
+        ds = solve()
+        whole = time.process_time() - began
     total = int(ds.roughvisc.cost.convolutions.sum())
 
     shape = (cells, cells)  # of the ball: a quarter of twice as many a side, by cosines
