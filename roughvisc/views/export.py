@@ -12,8 +12,8 @@ from roughvisc.labels import heading
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import FLAGS
-from roughvisc.variables.axes import axis_of
-from roughvisc.views.figures.axes import frame_at, require, row_text, rows_of
+from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.views.figures.rows import frame_at, require, rows_of
 from roughvisc.views.figures.sections import deformed_surface
 
 
@@ -82,9 +82,10 @@ def deformed(dataset: xr.Dataset, time: Quantity = -1) -> xr.DataArray:
     rows = rows_of(dataset)
     frame = frame_at(rows, time)
     surface = deformed_surface(dataset, frame).drop_vars(str(rows.name), errors="ignore").rename("height")
+    place = AXES[str(rows.name)].place(float(rows[frame]), 3)
     surface.attrs = {
         "units": "m",
         "long_name": "height of the deformed surface of the half-space",
-        "history": f"{dataset.attrs.get('history', '')}\ndeformed surface at {row_text(rows[frame])}".lstrip("\n"),
+        "history": f"{dataset.attrs.get('history', '')}\ndeformed surface at {place}".lstrip("\n"),
     }
     return surface

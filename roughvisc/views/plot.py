@@ -16,8 +16,8 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import fullest_frame, require, rows_of
 from roughvisc.views.figures.files import write_figure
+from roughvisc.views.figures.rows import fullest_frame, require, rows_of
 
 if TYPE_CHECKING:  # for editors; at run time each is imported when it is first used
     from matplotlib.figure import Figure

@@ -18,28 +18,11 @@ from matplotlib.lines import Line2D
 from roughvisc.errors import InputError
 from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
+from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES
-from roughvisc.views.figures.axes import (
-    BLUE,
-    RowAxis,
-    Unit,
-    at_rows,
-    broken,
-    fullest_frame,
-    legend_above,
-    letter_panels,
-    new_figure,
-    note_below,
-    require,
-    rows_of,
-    spread_axis,
-    spread_frames,
-    styled,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import note, touching
 from roughvisc.views.figures.fields import (
-    Scale,
     as_shown,
     colour_bar,
     draw_map,
@@ -50,10 +33,10 @@ from roughvisc.views.figures.fields import (
     measured_part,
     plane_ratio,
     plane_unit,
-    value_scale,
 )
-from roughvisc.views.figures.histories import leave_room, steps_of
-from roughvisc.views.figures.sections import cut_position, deformed_line, draw_contact
+from roughvisc.views.figures.histories import steps_of
+from roughvisc.views.figures.rows import RowAxis, at_rows, fullest_frame, require, rows_of, spread_frames
+from roughvisc.views.figures.sections import cut_position, deformed_surface, draw_contact
 from roughvisc.views.figures.transport import (
     draw_flux,
     flow_legend,
@@ -161,7 +144,7 @@ def _check(frames: int, rate: float) -> None:
         raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
 
 
-@styled
+@style.apply
 def _moving(
     dataset: xr.Dataset, field: str | None, count: int
 ) -> tuple[Figure, Callable[[int], list[Artist]], list[int]]:
@@ -187,9 +170,9 @@ def _moving(
         *(_moving_section(ax, dataset, chosen) for ax in cuts),
         *(_moving_history(ax, dataset, name, ax is right[-1]) for ax, name in zip(right, histories, strict=True)),
     ]
-    letter_panels((on_map, *cuts, *right))
+    style.letter_panels((on_map, *cuts, *right))
     figure.align_ylabels(right)
-    note_below(figure, note(dataset, field))
+    style.note_below(figure, note(dataset, field))
     named = _legend(movers, on_map, cuts, right, chosen)
     letter = on_map.get_title(loc="left")
     title = on_map.set_title(letter, loc="left")
@@ -200,7 +183,7 @@ def _moving(
             move(frame)
         return [title]
 
-    legend_above(figure, named)
+    style.legend_above(figure, named)
     draw(chosen[0])
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the first picture's layout holds for all
@@ -236,10 +219,10 @@ def _heading(dataset: xr.Dataset, frame: int) -> str:
 def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes, list[Axes], list[Axes]]:
     """Figure, panel of the map, of the section if there is one, and of the histories, as the map's proportions suit."""
     if not histories:
-        figure = new_figure(4.4, 0.8 + 3.3 * float(np.clip(ratio, 0.3, 1.3)) + 1.4 * sectioned)
+        figure = style.new_figure(4.4, 0.8 + 3.3 * float(np.clip(ratio, 0.3, 1.3)) + 1.4 * sectioned)
         grid = figure.add_gridspec(1 + sectioned, 1, height_ratios=[3.3 * ratio, 1.4][: 1 + sectioned])
         return figure, figure.add_subplot(grid[0]), [figure.add_subplot(grid[1])] if sectioned else [], []
-    figure = new_figure(7.6, 4.6 if ratio <= _TALL else 6.4)
+    figure = style.new_figure(7.6, 4.6 if ratio <= _TALL else 6.4)
     if ratio > _TALL:  # the map takes a column, and the section stands above the histories
         columns = figure.add_gridspec(1, 2, width_ratios=[1, 1.3])
         on_map, rows = figure.add_subplot(columns[0]), histories + sectioned
@@ -251,14 +234,8 @@ def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes
     return figure, left[0], list(left[1:]), list(columns[1].subgridspec(histories, 1).subplots(squeeze=False)[:, 0])
 
 
-def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> Scale:
-    """The scale that suits all pictures; one is in memory at a time."""
-    fields = (as_shown(dataset, name, frame).values for frame in chosen)
-    return joint_scale([value_scale(name, values[np.isfinite(values)]) for values in fields])
-
-
 def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
-    scale = _scale(dataset, field, chosen)
+    scale = joint_scale(as_shown(dataset, field, frame) for frame in chosen)
     unit, plane = unit_for([scale.high], VARIABLES[field].units), plane_unit(dataset)
     image = draw_map(ax, as_shown(dataset, field, chosen[0]), unit, plane, **scale.limits(unit))
     colour_bar(figure, [image], scale, unit, location=_side(dataset))
@@ -304,7 +281,7 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     """Profile and deformed surface along x, on the line that carries most when the contact is largest."""
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
-    surfaces = [deformed_line(dataset, frame, "y", index) for frame in chosen]
+    surfaces = [deformed_surface(dataset, frame, y=index).values for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
     plane, unit = plane_unit(dataset), unit_for(np.ptp(known), "m")
@@ -316,8 +293,8 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     ax.set_ylim(low - margin, top)
     ax.fill_between(x, unit(height), low - margin, color="0.72", lw=0, label="profile")
     ax.plot(x, unit(height), color="0.25", lw=0.9)
-    body = ax.fill_between(x, unit(surfaces[0]), top, color=BLUE, alpha=0.16, lw=0, label="half-space")
-    (line,) = ax.plot(x, unit(surfaces[0]), color=BLUE, lw=1)
+    body = ax.fill_between(x, unit(surfaces[0]), top, color=style.BLUE, alpha=0.16, lw=0, label="half-space")
+    (line,) = ax.plot(x, unit(surfaces[0]), color=style.BLUE, lw=1)
     marked = draw_contact(ax, x, np.full(len(x), np.nan))
     ax.set_xlabel(plane.label("x"))
     ax.set_ylabel(unit.label("Height"))
@@ -341,7 +318,7 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     axis, (unit, spans) = RowAxis.of(clock), rate_unit(steps[name])
     times, shown = axis.unit(rows_of(steps)), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
-    (run,) = ax.plot([], [], color=BLUE, lw=1.4)
+    (run,) = ax.plot([], [], color=style.BLUE, lw=1.4)
     (now,) = ax.plot([], [], "o", color="k", ms=5)
     axis.apply(ax, clock)
     ax.minorticks_off()  # each costs time in every picture
@@ -349,11 +326,11 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
     if spans:
-        spread_axis(ax.yaxis, shown)
+        style.spread_axis(ax.yaxis, shown)
         ax.set_ylim(shown[shown > 0].min() / 3, 3 * shown.max())
     else:
-        leave_room(ax, shown)
-    ax.set_ylabel(broken(unit.label(VARIABLES[name].label), 1.0))
+        style.leave_room(ax, shown)
+    ax.set_ylabel(style.broken(unit.label(VARIABLES[name].label), 1.0))
     ax.grid(color="0.9", lw=0.5)
 
     reached = np.searchsorted(rows_of(steps).values, rows_of(dataset).values, side="right")

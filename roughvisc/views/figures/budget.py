@@ -7,20 +7,20 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.units import unit_for
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.views.figures.axes import BLUE, ORANGE, RowAxis, letter_panels, new_figure, styled
+from roughvisc.views.figures import style
+from roughvisc.views.figures.rows import RowAxis
 
 #: Bars of sources that raise and lower the number, and of those that only do one of the two.
-_BOTH, _ONE = BLUE, ORANGE
+_BOTH, _ONE = style.BLUE, style.ORANGE
 #: Half-width of the logarithm beyond which errors are drawn as factors, and the part of it below which no bar is seen.
 _FACTORS, _SEEN = 0.5, 0.01
 
 
-@styled
+@style.apply
 def budget(dataset: xr.Dataset, row: int | None = None) -> Figure:
     """The sources of error of a number as bars, and the number over its axis with the interval that they make.
 
@@ -46,15 +46,15 @@ def budget(dataset: xr.Dataset, row: int | None = None) -> Figure:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
     row = dataset["value"].size - 1 if row is None else row
     several = dataset["value"].size > 1
-    figure = new_figure(6.8 if several else 4.4, 2.9)
-    axes = figure.subplots(1, 2 if several else 1, squeeze=False, width_ratios=[1.25, 1.0][: 2 if several else 1])[0]
+    figure = style.new_figure(6.8 if several else 4.4, 2.9)
+    axes = figure.subplots(1, 1 + several, squeeze=False, width_ratios=[1.25, 1.0][: 1 + several])[0]
     _draw_sources(axes[0], dataset, row)
     if (dataset["direction"].isel({axis_of(dataset.variables): row}) != 0).any():
         bars = [Patch(color=_BOTH, label="in both directions"), Patch(color=_ONE, label="in one direction")]
         figure.legend(handles=bars, loc="outside upper left", ncols=2, handlelength=1.2)
     if several:
         _draw_interval(axes[1], dataset)
-        letter_panels(axes)
+        style.letter_panels(axes)
     return figure
 
 
@@ -76,19 +76,17 @@ def _draw_sources(ax: Axes, dataset: xr.Dataset, row: int) -> None:
             low, high = (-half if towards <= 0 else 0.0), (half if towards >= 0 else 0.0)
             ax.barh(place, shown(high) - shown(low), left=shown(low), height=0.62, color=_ONE if towards else _BOTH)
         if not half > _SEEN * reach:
-            word = {"open": "open", "none": "none"}.get(str(one["state"].values), "below 1 %" if half < 0.01 else "")
-            ax.annotate(
-                word, (shown(0.0), place), (5, 0), "data", "offset points", va="center", fontsize=7.5, color="0.35"
-            )
+            state = str(one["state"].values)
+            word = state if state in ("open", "none") else "below 1 %" if half < 0.01 else ""
+            look = {"va": "center", "fontsize": 7.5, "color": "0.35"}
+            ax.annotate(word, (shown(0.0), place), (5, 0), textcoords="offset points", **look)
     if np.isfinite(together).all():
         ax.barh(places[-1], shown(together[1]) - shown(together[0]), left=shown(together[0]), height=0.62, color="0.35")
     ax.axvline(shown(0.0), color="black", lw=0.7)
     place = AXES[axis].place(float(dataset[axis].values[row]))
     if wide:
         ax.set_xscale("log")
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        ax.xaxis.set_minor_formatter(NullFormatter())
+        style.plain_log_ticks(ax.xaxis, fine=True)
     ends = [min([-1e-4, *(end for end in together if end < 0)]), max([1e-4, *(end for end in together if end > 0)])]
     room = 0.15 * (ends[1] - ends[0])
     ax.set_xlim(shown(ends[0] - room), shown(ends[1] + room))

@@ -12,45 +12,32 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
+from roughvisc.units import unit_for
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.views.figures.axes import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    RowAxis,
-    legend_over,
-    letter_panels,
-    new_figure,
-    require,
-    rows_of,
-    styled,
-    unit_for,
-)
-from roughvisc.views.figures.histories import leave_room, marker_of, steps_of
+from roughvisc.views.figures import style
+from roughvisc.views.figures.histories import steps_of
+from roughvisc.views.figures.rows import RowAxis, require, rows_of
 
 #: What is stated of accuracy first, then its parts, and what comes on top.
 _ERRORS = (
     ("stated_error", "stated", "k", 1.6),
-    ("time_error", "time steps", ORANGE, 1.0),
-    ("residual", "contact solver (estimate)", PURPLE, 1.0),
-    ("grid_error_pressure", "grid, pressure", SKY, 1.0),
-    ("grid_error_area", "grid, area", GREEN, 1.0),
-    ("grid_error_approach", "grid, approach", BLUE, 1.0),
-    ("grid_error_gap", "grid, gap", VERMILION, 1.0),
+    ("time_error", "time steps", style.ORANGE, 1.0),
+    ("residual", "contact solver (estimate)", style.PURPLE, 1.0),
+    ("grid_error_pressure", "grid, pressure", style.SKY, 1.0),
+    ("grid_error_area", "grid, area", style.GREEN, 1.0),
+    ("grid_error_approach", "grid, approach", style.BLUE, 1.0),
+    ("grid_error_gap", "grid, gap", style.VERMILION, 1.0),
 )
 #: Of results of earlier versions, which state one for pressure and approach.
-_FORMER = ("grid_error", "grid", SKY, 1.0)
-_COSTS = (("convolutions", "convolutions", BLUE), ("iterations", "iterations", SKY))
+_FORMER = ("grid_error", "grid", style.SKY, 1.0)
+_COSTS = (("convolutions", "convolutions", style.BLUE), ("iterations", "iterations", style.SKY))
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
 #: Width of a panel. [inch]
 _WIDTH = 5.6
 
 
-@styled
+@style.apply
 def diagnostics(dataset: xr.Dataset) -> Figure:
     """What the solver did: cost of each row, length of each step, and the stated error with its parts.
 
@@ -83,17 +70,17 @@ def diagnostics(dataset: xr.Dataset) -> Figure:
     chosen = [draw for draw, known in drawn if known]
     if not chosen:
         raise InputError("the result holds neither iterations nor errors: nothing to draw")
-    figure = new_figure(_WIDTH + 1.0, 0.6 + 1.6 * len(chosen))
+    figure = style.new_figure(_WIDTH + 1.0, 0.6 + 1.6 * len(chosen))
     axes = list(figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0])
     axis = RowAxis.of(steps)
     for ax, draw in zip(axes, chosen, strict=True):
         draw(ax, axis, dataset, steps)
         axis.apply(ax, steps)
         ax.grid(color="0.9", lw=0.5)
-        legend_over(ax, _WIDTH)
+        style.legend_over(ax, _WIDTH)
         if ax is not axes[-1]:
             ax.set_xlabel("")
-    letter_panels(axes)
+    style.letter_panels(axes)
     figure.align_ylabels(axes)
     return figure
 
@@ -103,12 +90,12 @@ def _draw_cost(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArray
     rows = axis.unit(rows_of(dataset))
     found = [(dataset[name].values.astype(float), label, colour) for name, label, colour in _COSTS if name in dataset]
     for values, label, colour in found:
-        ax.plot(rows, values, color=colour, marker=marker_of(len(rows)), ms=2.5, lw=1, label=label)
+        ax.plot(rows, values, color=colour, marker=style.marker_of(len(rows)), ms=2.5, lw=1, label=label)
     shown = np.concatenate([values for values, _, _ in found])
     if shown.min() > 0 and shown.max() > 100 * shown.min():
         ax.set_yscale("log")
     else:
-        leave_room(ax, shown)
+        style.leave_room(ax, shown)
         ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
     ax.set_ylabel(f"Per {AXES[str(rows_of(dataset).name)].rows.removesuffix('s')}")
 
@@ -118,7 +105,7 @@ def _draw_steps(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArra
     lengths = np.diff(steps.values)
     known = lengths > 0
     unit = unit_for(lengths, "s")
-    ax.plot(axis.unit(steps)[1:][known], unit(lengths)[known], ".", color=BLUE, ms=3)
+    ax.plot(axis.unit(steps)[1:][known], unit(lengths)[known], ".", color=style.BLUE, ms=3)
     ax.set_yscale("log")
     ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylabel(unit.label("Step length"))
@@ -133,8 +120,8 @@ def _draw_accuracy(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataA
         rows, values = axis.unit(rows_of(dataset)), dataset[name].values.astype(float)
         known = np.isfinite(values) & (values > 0)
         if known.any():
-            style = {"marker": marker_of(len(rows)), "ms": 2.5, "lw": width}
-            ax.plot(rows[known], values[known], color=colour, label=label, **style)
+            look = {"marker": style.marker_of(len(rows)), "ms": 2.5, "lw": width}
+            ax.plot(rows[known], values[known], color=colour, label=label, **look)
             floor, ceiling = min(floor, values[known].min()), max(ceiling, values[known].max())
     tolerance = dataset.attrs.get("tolerance")
     if tolerance:

@@ -9,43 +9,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from roughvisc.errors import InputError
 from roughvisc.observables import cluster_areas, clusters, gap_distribution, pressure_distribution
-from roughvisc.units import quantities
+from roughvisc.units import quantities, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import (
-    BLUE,
-    CONTACT,
-    RowAxis,
-    at_rows,
-    frame_at,
-    legend_above,
-    legend_over,
-    letter_panels,
-    new_figure,
-    require,
-    rows_of,
-    say_inside,
-    spread_axis,
-    spread_frames,
-    styled,
-    telling_frames,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import row_parts
+from roughvisc.views.figures.rows import RowAxis, at_rows, frames_at, require, rows_of, spread_frames, telling_frames
 
+_DISTRIBUTIONS = {"pressure": pressure_distribution, "gap": gap_distribution}
 _MOST_LINES = 24
 #: Contact clusters below which their number and their areas are no distribution.
 _FEWEST_CLUSTERS = 3
 
 
 def _frames(dataset: xr.Dataset, times, count: int) -> list[int]:
-    if times is None:
-        return telling_frames(dataset, count)
-    chosen = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
-    if not 0 < chosen.size <= _MOST_LINES:
-        raise InputError(f"{chosen.size} times to draw: choose 1 to {_MOST_LINES}")
-    return [frame_at(rows_of(dataset), float(time)) for time in chosen]
+    return telling_frames(dataset, count) if times is None else frames_at(rows_of(dataset), times, _MOST_LINES)
 
 
 def _colours(count: int) -> np.ndarray:
@@ -53,7 +31,7 @@ def _colours(count: int) -> np.ndarray:
     return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, count) if count > 1 else [0.0])
 
 
-@styled
+@style.apply
 @quantities(times="s")
 def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> Figure:
     """Probability densities of the contact pressure and of the gap at chosen times.
@@ -78,24 +56,19 @@ def distributions(dataset: xr.Dataset, times=None, bins: int | None = None) -> F
     has the integral 1.
     """
     require(dataset)
-    panels = [
-        (name, find)
-        for name, find in (("pressure", pressure_distribution), ("gap", gap_distribution))
-        if name in dataset
-    ]
+    panels = [(name, find) for name, find in _DISTRIBUTIONS.items() if name in dataset]
     if not panels:
         require(dataset, "pressure", "gap")
     frames = _frames(dataset, times, 5)
     chosen, texts = at_rows(dataset, frames), RowAxis.of(rows_of(dataset))
-    figure = new_figure(3.4 * len(panels) + 0.2, 3.0)
+    figure = style.new_figure(3.4 * len(panels) + 0.2, 3.0)
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, (name, find) in zip(axes, panels, strict=True):
         count = bins or _bin_count(chosen[name])
         _draw_density(ax, chosen, find(chosen, count)[f"{name}_density"], name, texts)
-    by_label = {label: line for ax in axes for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    ordered = [label for label in map(texts.text, rows_of(chosen)) if label in by_label]
-    legend_above(figure, {label: by_label[label] for label in ordered})
-    letter_panels(axes)
+    named = style.named_in(*axes)
+    style.legend_above(figure, {label: named[label] for label in map(texts.text, rows_of(chosen)) if label in named})
+    style.letter_panels(axes)
     return figure
 
 
@@ -106,7 +79,7 @@ def _bin_count(field: xr.DataArray) -> int:
 
 
 def _no_contact(ax: Axes, text: str = "no contact") -> None:
-    say_inside(ax, text)
+    style.say_inside(ax, text)
     ax.set_yticks([])
 
 
@@ -136,7 +109,7 @@ def has_clusters(dataset: xr.Dataset) -> bool:
     return bool((clusters(shown)["cluster_count"] >= _FEWEST_CLUSTERS).any())
 
 
-@styled
+@style.apply
 @quantities(times="s")
 def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     """Number of contact clusters and their largest and mean area over time, and the distribution of their areas.
@@ -158,23 +131,23 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     require(dataset, "x", "y")
     followed = at_rows(dataset, spread_frames(rows_of(dataset), 100))
     found = clusters(followed).compute()
-    figure = new_figure(7.2, 3.0)
+    figure = style.new_figure(7.2, 3.0)
     count, area, sizes = figure.subplots(1, 3)
     axis = RowAxis.of(rows_of(dataset))
     times_shown = axis.unit(rows_of(followed))
-    marker = "o" if len(times_shown) <= 40 else ""
-    count.plot(times_shown, found["cluster_count"], color=BLUE, marker=marker)
+    marker = style.marker_of(len(times_shown))
+    count.plot(times_shown, found["cluster_count"], color=style.BLUE, marker=marker)
     count.set_ylabel("Contact clusters")
     most = max(int(found["cluster_count"].max()), 1)
     count.set_ylim(-0.05 * most, 1.1 * most)
     count.yaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
     unit = unit_for(found["cluster_area_largest"], "m^2")
-    area.plot(times_shown, unit(found["cluster_area_largest"]), color=CONTACT, marker=marker, label="largest")
-    area.plot(times_shown, unit(found["cluster_area_mean"]), color=BLUE, marker=marker, ls="--", label="mean")
+    area.plot(times_shown, unit(found["cluster_area_largest"]), color=style.CONTACT, marker=marker, label="largest")
+    area.plot(times_shown, unit(found["cluster_area_mean"]), color=style.BLUE, marker=marker, ls="--", label="mean")
     area.set_ylabel(unit.label("Cluster area"))
     if found["cluster_count"].any():
-        spread_axis(area.yaxis, unit([found["cluster_area_largest"], found["cluster_area_mean"]]))
-        legend_over(area, 1.9)
+        style.spread_axis(area.yaxis, unit([found["cluster_area_largest"], found["cluster_area_mean"]]))
+        style.legend_over(area, 1.9)
     else:
         _no_contact(area)
     for ax in (count, area):
@@ -182,7 +155,7 @@ def contact_clusters(dataset: xr.Dataset, times=None) -> Figure:
     _draw_sizes(sizes, dataset, _frames(dataset, times, 4))
     for ax in (count, area, sizes):
         ax.grid(color="0.9", lw=0.5)
-    letter_panels((count, area, sizes))
+    style.letter_panels((count, area, sizes))
     return figure
 
 
@@ -203,13 +176,13 @@ def _draw_sizes(ax: Axes, dataset: xr.Dataset, frames: list[int]) -> None:
                 ax.plot(row, np.arange(1, len(row) + 1), color=colour, **look)
                 ax.plot(row[:1], [1], "o", color=colour, ms=3.5 if len(row) == 1 else 2)
         ax.locator_params(axis="x", nbins=4)
-        spread_axis(ax.xaxis, unit(areas))
-        spread_axis(ax.yaxis, [1, most])
+        style.spread_axis(ax.xaxis, unit(areas))
+        style.spread_axis(ax.yaxis, [1, most])
         if ax.get_yscale() == "log":
             ax.set_ylim(bottom=0.8)
         else:
             ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-        legend_over(ax, 1.9)
+        style.legend_over(ax, 1.9)
     ax.set_xlabel(unit.label("Cluster area"))
     ax.set_ylabel("Clusters at least as large")

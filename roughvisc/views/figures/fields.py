@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -13,7 +14,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colorbar import Colorbar, make_axes
-from matplotlib.colors import Colormap
+from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
@@ -25,28 +26,12 @@ from roughvisc.errors import InputError
 from roughvisc.groups import attributes_of
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
-from roughvisc.units import in_si
+from roughvisc.units import Unit, in_si, unit_for
 from roughvisc.variables import FIELDS, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.views.figures.axes import (
-    ABSENT,
-    CONTACT,
-    NO_CONTACT,
-    RowAxis,
-    Unit,
-    broken,
-    frame_at,
-    legend_above,
-    letter_panels,
-    new_figure,
-    note_below,
-    require,
-    rows_of,
-    styled,
-    telling_frames,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import note, present, touching
+from roughvisc.views.figures.rows import RowAxis, frames_at, require, rows_of, telling_frames
 
 #: Perceptually even maps without the colour of contact: pressure and flux darken as they rise, gap as it closes.
 COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
@@ -54,8 +39,8 @@ COLOUR_MAPS["flux"] = "cividis_r"
 _MOST_MAPS = 24
 #: Values from which some may lie beyond a scale.
 _MANY = 1_000
-#: Part of a map that the outline of the contact may cover: beyond it there is none.
-_MOST_INK = 0.1
+#: Width of the outline of the contact, and part of a map that it may cover: beyond it there is none. [point], [-]
+_OUTLINE, _MOST_INK = 0.7, 0.1
 #: Length of a map's longer side, about. [point]
 _LONG_SIDE = 126.0
 #: Share of the values within the colour scale, and by how much the outermost must exceed it to lie beyond the scale.
@@ -75,8 +60,8 @@ def colour_map(name: str) -> Colormap:
 
     The last two lie below the scale.
     """
-    under = {"pressure": NO_CONTACT, "gap": CONTACT}.get(name)
-    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=ABSENT, under=under)
+    under = {"pressure": style.NO_CONTACT, "gap": style.CONTACT}.get(name)
+    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=style.ABSENT, under=under)
 
 
 def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
@@ -155,15 +140,12 @@ def draw_outline(ax: Axes, spots: xr.DataArray, plane: Unit):
     mask = spots.transpose("y", "x").values
     if mask.all() or not mask.any() or not can_be_outlined(mask):
         return None
+    limits = {name: cell_edges(spots[name])[[0, -1]] for name in ("x", "y")}
     # a rim out of contact closes the outline at the border of the map
-    x, y = (plane(_with_rim(spots[name].values)) for name in ("x", "y"))
-    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=CONTACT, linewidths=_OUTLINE)
+    x, y = (plane(np.r_[low, spots[name], high]) for name, (low, high) in limits.items())
+    lines = ax.contour(x, y, np.pad(mask.astype(float), 1), levels=[0.5], colors=style.CONTACT, linewidths=_OUTLINE)
     lines.set_gid("contact outline")
     return lines
-
-
-#: Width of the outline. [point]
-_OUTLINE = 0.7
 
 
 def can_be_outlined(mask: np.ndarray) -> bool:
@@ -172,11 +154,6 @@ def can_be_outlined(mask: np.ndarray) -> bool:
         return False
     faces = sum(np.count_nonzero(np.diff(mask, axis=axis)) for axis in (0, 1))
     return bool(faces * _OUTLINE * max(mask.shape) / _LONG_SIDE <= _MOST_INK * mask.size)
-
-
-def _with_rim(centres: np.ndarray) -> np.ndarray:
-    limits = cell_edges(centres)
-    return np.concatenate([limits[:1], centres, limits[-1:]])
 
 
 def as_shown(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
@@ -192,13 +169,13 @@ def map_legend(images: Sequence[AxesImage]) -> dict[str, Artist]:
     shown = [(str(image.get_gid()), np.ma.asarray(image.get_array()), image.norm.vmin or 0.0) for image in images]
     below = {name for name, values, low in shown if (values.filled(np.inf) < low).any()}
     if outlined:
-        named["contact"] = Line2D([], [], color=CONTACT, lw=1.0)
+        named["contact"] = Line2D([], [], color=style.CONTACT, lw=1.0)
     if "gap" in below:
-        named["contact"] = Patch(color=CONTACT, lw=0)
+        named["contact"] = Patch(color=style.CONTACT, lw=0)
     if "pressure" in below:
-        named["no contact"] = Patch(facecolor=NO_CONTACT, edgecolor="0.5", lw=0.4)
+        named["no contact"] = Patch(facecolor=style.NO_CONTACT, edgecolor="0.5", lw=0.4)
     if any(np.ma.getmaskarray(values).any() for _, values, _ in shown):
-        named["missing"] = Patch(color=ABSENT, lw=0)
+        named["missing"] = Patch(color=style.ABSENT, lw=0)
     return named
 
 
@@ -210,13 +187,11 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
         return sorted(chosen, key=lambda row: float(rows[row]))
     if times is None:
         return telling_frames(dataset, 4)
-    asked = np.atleast_1d(np.asarray(in_si(times, AXES[over].variables[over].units, "times"), dtype=float))
-    if not 0 < asked.size <= _MOST_MAPS:
-        raise InputError(f"{asked.size} times to map: choose 1 to {_MOST_MAPS}, or use animate for all of them")
-    return [frame_at(rows, float(time)) for time in asked.ravel()]
+    asked = in_si(times, AXES[over].variables[over].units, "times")
+    return frames_at(rows, asked, _MOST_MAPS, "map", ", or use animate for all of them")
 
 
-@styled
+@style.apply
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
     """Maps of fields at chosen times, or speeds, with the contact; one colour scale a field for all of them.
 
@@ -260,9 +235,9 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressu
     figure, axes = _map_panels(dataset, len(frames), len(stored))
     images = [_draw_field(figure, p, dataset, name, frames) for name, p in zip(stored, axes, strict=True)]
     _label_maps(axes, dataset, _frame_texts(dataset, frames))
-    legend_above(figure, map_legend(list(chain.from_iterable(images))))
+    style.legend_above(figure, map_legend(list(chain.from_iterable(images))))
     mirrored = "" if dataset is whole else "The part that was measured; its mirror images are not drawn."
-    note_below(figure, mirrored, _nominal(dataset, frames), note(dataset, *stored))
+    style.note_below(figure, mirrored, _nominal(dataset, frames), note(dataset, *stored))
     return figure
 
 
@@ -275,7 +250,7 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int) -> tuple[Figure, 
     height = width * min(ratio, 2.5) + (0.3 if rows > 1 else 0.15)
     size = (width * columns + 0.17 * (columns - 1) + 1.3, max(height * rows, 1.3) * fields + 0.9)
     # side by side, maps that are narrower than their titles need the whole width
-    figure = new_figure(*size, layout="constrained" if ratio > 2 else "compressed")
+    figure = style.new_figure(*size, layout="constrained" if ratio > 2 else "compressed")
     axes = figure.subplots(rows * fields, columns, sharex=True, sharey=True, squeeze=False)
     return figure, axes.reshape(fields, rows, columns)
 
@@ -283,7 +258,7 @@ def _map_panels(dataset: xr.Dataset, frames: int, fields: int) -> tuple[Figure, 
 def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str, frames: list[int]) -> list[AxesImage]:
     """One field in its panels, on one colour scale, with the contact."""
     shown = [as_shown(dataset, name, frame) for frame in frames]
-    scale = value_scale(name, np.concatenate([one.values[np.isfinite(one.values)] for one in shown]))
+    scale = value_scale(name, np.concatenate([one.values.ravel() for one in shown]))
     unit, plane = unit_for([scale.high], VARIABLES[name].units), plane_unit(dataset)
     limits = scale.limits(unit)
     images = [draw_map(ax, one, unit, plane, **limits) for ax, one in zip(axes.ravel(), shown, strict=False)]
@@ -342,6 +317,7 @@ def value_scale(name: str, values: np.ndarray) -> Scale:
 
     Those of pressure and gap begin at zero, but that of pressure in contact everywhere may begin higher.
     """
+    values = values[np.isfinite(values)]
     if not values.size:
         return Scale(name, 0.0, 0.0, 0.0, 0.0, False)
     lowest, highest = float(values.min()), float(values.max())
@@ -361,15 +337,12 @@ def value_scale(name: str, values: np.ndarray) -> Scale:
     return Scale(name, low, high, lowest, highest, marked)
 
 
-def joint_scale(scales: Sequence[Scale]) -> Scale:
-    """The scale that holds all of some scales of one field."""
-    ends = {
-        "low": min(one.low for one in scales),
-        "high": max(one.high for one in scales),
-        "lowest": min(one.lowest for one in scales),
-        "highest": max(one.highest for one in scales),
-    }
-    return Scale(scales[0].name, **ends, marked=any(one.marked for one in scales))
+def joint_scale(fields: Iterable[xr.DataArray]) -> Scale:
+    """The scale that holds those of some maps of one field, of which one is in memory at a time."""
+    scales = [value_scale(str(field.name), field.values) for field in fields]
+    low, high = min(one.low for one in scales), max(one.high for one in scales)
+    lowest, highest = min(one.lowest for one in scales), max(one.highest for one in scales)
+    return Scale(scales[0].name, low, high, lowest, highest, marked=any(one.marked for one in scales))
 
 
 def colour_bar(
@@ -398,67 +371,42 @@ def colour_bar(
     location = location or ("bottom" if flat else "right")
     # room is made for it by the layout; where in it the bar stands follows from its maps
     axes, look = make_axes(panels, location=location, pad=0.02, fraction=0.06)
-    axes.set_axes_locator(_AlongMaps(panels, location))
+    axes.set_axes_locator(partial(_along_maps, panels, location))
     bar = figure.colorbar(image, cax=axes, extend=scale.extend, orientation=look["orientation"])
-    axes.set_axes_locator(_OfAnyAspect(axes.get_axes_locator()))
+    axes.set_axes_locator(partial(_of_any_aspect, axes.get_axes_locator()))
     said = unit.label(label or VARIABLES[scale.name].label)
-    said = said if location != "right" else broken(said, _LABELLED)
-    bar.set_label((", " if location != "right" else "\n").join(filter(None, (said, scale.spikes(unit)))))
-    low, _ = image.get_clim()
-    constant = not scale.high > scale.low
-    if image.norm.__class__.__name__ == "Normalize":
+    upright = location == "right"
+    said = style.broken(said, _LABELLED) if upright else said
+    bar.set_label(("\n" if upright else ", ").join(filter(None, (said, scale.spikes(unit)))))
+    if type(image.norm) is Normalize:
         bar.locator = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
-    if constant:
-        bar.set_ticks([low], labels=[f"{float(unit(scale.low)):.3g}"])
+    if not scale.high > scale.low:
+        bar.set_ticks([image.norm.vmin], labels=[f"{float(unit(scale.low)):.3g}"])
     bar.outline.set_linewidth(0.6)
     return bar
 
 
-class _AlongMaps:
-    """Place of a colour bar: along maps as they lie when they are drawn, which the layout does not know.
-
-    Parameters
-    ----------
-    panels : list of matplotlib.axes.Axes
-        The maps.
-    location : {"right", "top", "bottom"}
-        On which side of them.
-    """
-
-    def __init__(self, panels: Sequence[Axes], location: str) -> None:
-        self._panels, self._location = panels, location
-
-    def __call__(self, axes: Axes, renderer: Any) -> Bbox:
-        maps, room = Bbox.union([ax.get_position() for ax in self._panels]), axes.get_position(original=True)
-        width, height = axes.get_figure(root=True).get_size_inches()
-        if self._location == "right":
-            left = maps.x1 + _BAR_PAD / width
-            return Bbox.from_extents(left, maps.y0, left + _BAR_WIDTH / width, maps.y1)
-        middle, half = (room.y0 + room.y1) / 2, _BAR_WIDTH / height / 2
-        return Bbox.from_extents(maps.x0, middle - half, maps.x1, middle + half)
+def _along_maps(panels: Sequence[Axes], location: str, axes: Axes, renderer: Any) -> Bbox:
+    """Place of a colour bar: along maps as they lie when they are drawn, which the layout does not know."""
+    maps, room = Bbox.union([ax.get_position() for ax in panels]), axes.get_position(original=True)
+    width, height = axes.get_figure(root=True).get_size_inches()
+    if location == "right":
+        left = maps.x1 + _BAR_PAD / width
+        return Bbox.from_extents(left, maps.y0, left + _BAR_WIDTH / width, maps.y1)
+    middle, half = (room.y0 + room.y1) / 2, _BAR_WIDTH / height / 2
+    return Bbox.from_extents(maps.x0, middle - half, maps.x1, middle + half)
 
 
-class _OfAnyAspect:
-    """A place that matplotlib gives a colour bar, without the aspect that it gives with it.
-
-    Parameters
-    ----------
-    place : callable
-        Of the bar between its arrows.
-    """
-
-    def __init__(self, place: Any) -> None:
-        self._place = place
-
-    def __call__(self, axes: Axes, renderer: Any) -> Bbox:
-        found: Bbox = self._place(axes, renderer)
-        axes.set_box_aspect(None)
-        return found
+def _of_any_aspect(place: Callable[[Axes, Any], Bbox], axes: Axes, renderer: Any) -> Bbox:
+    """The place that matplotlib gives a colour bar between its arrows, without the aspect that it sets with it."""
+    found = place(axes, renderer)
+    axes.set_box_aspect(None)
+    return found
 
 
 def _label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> None:
     """Letters and titles above, coordinates on the outer panels only; panels without a frame removed."""
-    plane, kept, said = plane_unit(dataset), [], []
+    plane, said = plane_unit(dataset), {}
     fields, rows, columns = axes.shape
     for (field, row, column), ax in np.ndenumerate(axes):
         number = row * columns + column
@@ -467,9 +415,8 @@ def _label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) ->
             continue
         lowest = field == fields - 1 and number + columns >= len(titles)
         label_plane(ax, dataset, plane, 4, x=lowest, y=column == 0)
-        kept.append(ax)
-        said.append(titles[number] if field == 0 or rows > 1 else "")
-    letter_panels(kept, said)
+        said[ax] = titles[number] if field == 0 or rows > 1 else ""
+    style.letter_panels(list(said), list(said.values()))
 
 
 #: Direction of the motion -> where it points on a map.

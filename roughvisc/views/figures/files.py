@@ -10,7 +10,7 @@ from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.files import atomic_write
-from roughvisc.views.figures.axes import verbatim
+from roughvisc.views.figures import style
 
 
 def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
@@ -50,5 +50,5 @@ def _with_title(figure: Figure, title: str) -> Bbox:
     width, height = figure.get_size_inches()
     whole = title.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")  # lines end at commas
     lines = textwrap.wrap(whole, int(13 * width))
-    figure.text(0.5, 1 + 0.03 / height, "\n".join(map(verbatim, lines)), ha="center", va="bottom", fontsize=9)
+    figure.text(0.5, 1 + 0.03 / height, "\n".join(map(style.verbatim, lines)), ha="center", va="bottom", fontsize=9)
     return Bbox.from_extents(0, 0, width, height + 0.08 + 0.16 * len(lines))

@@ -12,26 +12,17 @@ from matplotlib.patches import Patch
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.observables import history
+from roughvisc.units import Unit, unit_for
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.sliding import SLIDING
-from roughvisc.views.figures.axes import (
-    BLUE,
-    CONTACT,
-    Unit,
-    legend_above,
-    legend_over,
-    letter_panels,
-    new_figure,
-    require,
-    styled,
-    unit_for,
-)
-from roughvisc.views.figures.histories import failed_frames, leave_room
+from roughvisc.views.figures import style
+from roughvisc.views.figures.histories import failed_frames
+from roughvisc.views.figures.rows import require
 
-_PANELS = (("friction_coefficient", BLUE), ("contact_area", CONTACT))
+_PANELS = (("friction_coefficient", style.BLUE), ("contact_area", style.CONTACT))
 
 
-@styled
+@style.apply
 def friction_against_distance(dataset: xr.Dataset) -> Figure:
     """Friction coefficient and contact area against the distance slid, at every accepted step.
 
@@ -57,7 +48,7 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
     across = unit_for(steps["sliding_distance"].values, "m")
     distance = across(steps["sliding_distance"].values)
     panels = [panel for panel in _PANELS if panel[0] in steps]
-    figure = new_figure(4.6, 1.3 + 1.5 * len(panels))
+    figure = style.new_figure(4.6, 1.3 + 1.5 * len(panels))
     axes = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
     failed = failed_frames(steps)
     for ax, (name, colour) in zip(axes, panels, strict=True):
@@ -65,16 +56,16 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
         values = unit(steps[name].values)
         _draw_against_distance(ax, distance, values, colour)
         ax.plot(distance[failed], values[failed], "x", color="k", ms=5, mew=1.2)
-        leave_room(ax, values[_shown(distance)])
+        style.leave_room(ax, values[_shown(distance)])
         ax.set_ylabel(unit.label(VARIABLES[name].label))
         ax.grid(color="0.9", lw=0.5)
     axes[0].axhline(0.0, color="0.3", lw=0.6)
     if len(_stops(distance)):
         axes[0].plot([], [], color="0.3", label="sliding")
         axes[0].plot([], [], color="0.3", lw=0.9, ls=(0, (1, 1.5)), label="at a stop")
-        legend_over(axes[0], 3.6)
+        style.legend_over(axes[0], 3.6)
     axes[-1].set_xlabel(across.label(VARIABLES["sliding_distance"].label))
-    letter_panels(axes)
+    style.letter_panels(axes)
     figure.align_ylabels(axes)
     return figure
 
@@ -116,7 +107,7 @@ _TOLD = {
 _MUCH = 0.05
 
 
-@styled
+@style.apply
 def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
@@ -146,14 +137,14 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
     across = unit_for(ordered["speed"].values, "m/s")
     told = {"computed": Line2D([], [], color="0.3")}
-    figure = new_figure(3.8, 3.0)
+    figure = style.new_figure(3.8, 3.0)
     ax = figure.add_subplot()
-    for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, (BLUE, CONTACT), strict=True):
+    for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, (style.BLUE, style.CONTACT), strict=True):
         told |= _draw(axes, ordered, names, across, colour, persson)
     if len(told) > 1:
         known = [name for name in _TOLD if name in told]
         figure.set_figheight(3.0 + 0.18 * len(known))
-        legend_above(figure, {_TOLD[name]: told[name] for name in known})
+        style.legend_above(figure, {_TOLD[name]: told[name] for name in known})
     ax.set_xscale("log")
     ax.set_xlabel(across.label(SLIDING["speed"].label))
     ax.grid(color="0.9", lw=0.5)

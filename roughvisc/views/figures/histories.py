@@ -20,38 +20,18 @@ from roughvisc.observables.area_theories import asperity_fraction, nominal_area_
 from roughvisc.observables.cycles import cycle_energy, has_cycles
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import quantities
+from roughvisc.units import quantities, unit_for
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.views.figures.axes import (
-    BLUE,
-    CONTACT,
-    CYCLE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SMALL,
-    RowAxis,
-    broken,
-    legend_above,
-    legend_over,
-    letter_panels,
-    new_figure,
-    require,
-    rows_of,
-    spans_decades,
-    spread_axis,
-    styled,
-    unit_for,
-    verbatim,
-)
+from roughvisc.views.figures import style
+from roughvisc.views.figures.rows import RowAxis, require, rows_of, spans_decades
 
 _PANELS = (
-    ("force", BLUE),
-    ("approach", GREEN),
-    ("contact_area", CONTACT),
-    ("mean_gap", PURPLE),
-    ("work", ORANGE),
+    ("force", style.BLUE),
+    ("approach", style.GREEN),
+    ("contact_area", style.CONTACT),
+    ("mean_gap", style.PURPLE),
+    ("work", style.ORANGE),
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
@@ -70,25 +50,11 @@ _ITSELF = {"contact_area": "corrected", "work": "in all"}
 _ONE_COLUMN = 3
 
 
-def marker_of(count: int) -> str:
-    """Points are marked as long as they can be told apart."""
-    return "o" if count <= 40 else ""
-
-
 def failed_frames(dataset: xr.Dataset) -> np.ndarray:
     """Frames whose step did not converge."""
     if "status" not in dataset:
         return np.zeros(rows_of(dataset).size, dtype=bool)
     return dataset["status"].values == NOT_CONVERGED
-
-
-def leave_room(ax: Axes, *values: np.ndarray) -> None:
-    """Linear limits from zero to somewhat above the largest value; a constant history lies in the middle."""
-    shown = np.concatenate([np.ravel(one) for one in values])
-    shown = shown[np.isfinite(shown)]
-    lowest, highest = (min(shown.min(), 0.0), max(shown.max(), 0.0)) if shown.size else (0.0, 1.0)
-    span = (highest - lowest) or 1.0
-    ax.set_ylim(lowest - 0.04 * span, highest + 0.15 * span)
 
 
 def steps_of(dataset: xr.Dataset) -> xr.Dataset:
@@ -103,7 +69,7 @@ def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Datase
     beside = [one for one in _BESIDE.get(name, ()) if one[0] in steps and steps[one[0]].notnull().any()]
     ax.plot(times, unit(values), color=colour, label=_ITSELF[name] if beside else "_")
     kept = axis.unit(rows_of(dataset))
-    if marker := marker_of(len(kept)):
+    if marker := style.marker_of(len(kept)):
         ax.plot(kept, unit(dataset[name]), ls="", marker=marker, color=colour)
     else:
         ax.plot(kept, np.zeros(len(kept)), "|", color="0.4", ms=5, mew=0.4, transform=ax.get_xaxis_transform())
@@ -111,9 +77,9 @@ def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Datase
     ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5)
     for other, said, shade, dashes in beside:
         ax.plot(times, unit(steps[other]), color=shade, ls=dashes, lw=0.9, label=said)
-    leave_room(ax, *(unit(steps[one]) for one in (name, *(one[0] for one in beside))))
+    style.leave_room(ax, *(unit(steps[one]) for one in (name, *(one[0] for one in beside))))
     ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
-    ax.set_ylabel(broken(unit.label(VARIABLES[name].label), 1.0))
+    ax.set_ylabel(style.broken(unit.label(VARIABLES[name].label), 1.0))
 
 
 def marks_of_rows(dataset: xr.Dataset, steps: xr.Dataset) -> dict[str, Line2D]:
@@ -122,7 +88,7 @@ def marks_of_rows(dataset: xr.Dataset, steps: xr.Dataset) -> dict[str, Line2D]:
     count = rows_of(dataset).size
     if rows_of(steps).size > count:
         named["accepted steps"] = Line2D([], [], color="0.3")
-    look = {"marker": marker_of(count)} if marker_of(count) else {"marker": "|", "mew": 0.4, "ms": 5}
+    look = {"marker": style.marker_of(count)} if style.marker_of(count) else {"marker": "|", "mew": 0.4, "ms": 5}
     named[rows] = Line2D([], [], color="0.3", ls="", **look)
     if failed_frames(steps).any():
         named["not converged"] = Line2D([], [], color="k", ls="", marker="x", ms=5, mew=1.2)
@@ -144,7 +110,7 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
         right.set_ylabel("of nominal\n[%]")
 
 
-@styled
+@style.apply
 def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     """Force, approach, contact area, mean gap and work over the axis of a result.
 
@@ -184,7 +150,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         raise InputError(f"the result holds none of {names}: nothing to draw over {over}")
     columns = 1 if len(panels) <= _ONE_COLUMN else 2
     rows = -(-len(panels) // columns)
-    figure = new_figure(4.6 if columns == 1 else 7.2, 1.5 * rows + 0.8)
+    figure = style.new_figure(4.6 if columns == 1 else 7.2, 1.5 * rows + 0.8)
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for empty in axes[len(panels) :]:
         empty.remove()
@@ -198,9 +164,9 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         ax.tick_params(labelbottom=lowest)
         ax.set_xlabel(ax.get_xlabel() if lowest else "")
         ax.grid(axis="both", color="0.9", lw=0.5)
-        legend_over(ax, 3.6 if columns == 1 else 2.7)
-    letter_panels(axes)
-    legend_above(figure, marks_of_rows(dataset, steps))
+        style.legend_over(ax, 3.6 if columns == 1 else 2.7)
+    style.letter_panels(axes)
+    style.legend_above(figure, marks_of_rows(dataset, steps))
     figure.align_ylabels(axes)
     return figure
 
@@ -219,7 +185,7 @@ def has_loop(dataset: xr.Dataset) -> bool:
     return bool(fallen > _BACK * np.ptp(approach))
 
 
-@styled
+@style.apply
 def hysteresis(dataset: xr.Dataset) -> Figure:
     """Force against approach at every accepted step, the direction of time marked, and the work done in all.
 
@@ -240,9 +206,9 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
     force, approach = steps["force"].values, steps["approach"].values
     across, up = unit_for(approach, "m"), unit_for(force, "N")
     x, y = across(approach), up(force)
-    figure = new_figure(3.6, 3.1)
+    figure = style.new_figure(3.6, 3.1)
     ax = figure.add_subplot()
-    ax.plot(x, y, color=BLUE, marker=marker_of(len(x)), ms=2)
+    ax.plot(x, y, color=style.BLUE, marker=style.marker_of(len(x)), ms=2)
     _draw_arrows(ax, x, y)
     ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="start")
     if len(x) > 1:
@@ -259,9 +225,9 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
         ax.set_title("The approach does not come back: no loop", color="0.4")
     ax.set_xlabel(across.label(VARIABLES["approach"].label))
     ax.set_ylabel(up.label(VARIABLES["force"].label))
-    leave_room(ax, y)
+    style.leave_room(ax, y)
     ax.grid(color="0.9", lw=0.5)
-    legend_above(figure, {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)})
+    style.legend_above(figure, style.named_in(ax))
     return figure
 
 
@@ -280,13 +246,11 @@ def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray, count: int = 5) -> None
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
     if length[-1] == 0:
         return
+    look = {"arrowstyle": "-|>", "color": style.BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
     for place in (np.arange(count) + 0.5) / count * length[-1]:
-        k = min(max(int(np.searchsorted(length, place)), 1), len(x) - 1)
-        share = (place - length[k - 1]) / (length[k] - length[k - 1])
-        start = np.array([x[k - 1], y[k - 1]])
-        tip = start + share * (np.array([x[k], y[k]]) - start)
-        style = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
-        ax.annotate("", tip, start, arrowprops=style)
+        before = int(np.searchsorted(length, place)) - 1
+        tip = (np.interp(place, length, x), np.interp(place, length, y))
+        ax.annotate("", tip, (x[before], y[before]), arrowprops=look)
 
 
 _AREA = "contact_area"
@@ -321,21 +285,16 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
 
 def _case_name(results: xr.Dataset, number: int) -> str:
     """What was varied in a case, as its coordinates tell; else its number."""
-    varied = [one for name, one in results.coords.items() if one.dims == ("case",) and name not in _NOT_VARIED]
-    said = [f"{str(one.attrs.get('long_name', one.name)).rpartition('.')[2].replace('_', ' ')} " for one in varied]
-    values = [one.values[number] for one in varied]
-    texts = [
-        name + (unit_for([value], one.attrs["units"]).text(value) if "units" in one.attrs else str(value))
-        for name, value, one in zip(said, values, varied, strict=True)
-    ]
+    texts = []
+    for key, coordinate in results.coords.items():
+        if coordinate.dims == ("case",) and key not in ("case", "case_key", "roughvisc_version"):
+            name = str(coordinate.attrs.get("long_name", key)).rpartition(".")[2].replace("_", " ")
+            value, si = coordinate.values[number], coordinate.attrs.get("units")
+            texts.append(f"{name} {value if si is None else unit_for([value], si).text(value)}")
     return ", ".join(texts) or str(results["case"].values[number])
 
 
-#: Coordinates of several cases that tell nothing of what was varied.
-_NOT_VARIED = ("case", "case_key", "roughvisc_version")
-
-
-@styled
+@style.apply
 @quantities(contact_modulus="Pa")
 def area_against_load(results, *, contact_modulus=None) -> Figure:
     r"""Contact area, corrected for the grid, against force at every accepted step, one line a case.
@@ -372,53 +331,46 @@ def area_against_load(results, *, contact_modulus=None) -> Figure:
     loads, areas = ([one[name].values for one in steps.values()] for name in ("force", _AREA))
     across, up = unit_for(np.concatenate(loads), "N"), unit_for(np.concatenate(areas), "m^2")
     moduli = _stated_moduli(cases) if contact_modulus is None else contact_modulus
-    figure = new_figure(4.0, 3.0 + 0.15 * min(len(cases), 12) + (0.0 if moduli == {} else 1.2))
+    figure = style.new_figure(4.0, 3.0 + 0.15 * min(len(cases), 12) + (0.0 if moduli == {} else 1.2))
     ax = figure.add_subplot()
     for number, (label, x, y) in enumerate(zip(cases, map(across, loads), map(up, areas), strict=True)):
-        colour = CYCLE[number % len(CYCLE)] if len(cases) <= len(CYCLE) else "0.5"
+        colour = style.CYCLE[number % len(style.CYCLE)] if len(cases) <= len(style.CYCLE) else "0.5"
         nested = 2.2 - 1.2 * number / max(1, len(cases) - 1)  # a line shows on both sides of another on it
-        style = {"color": colour, "marker": marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
-        ax.plot(x, y, label=verbatim(label) if len(cases) <= 12 else "_", **style)
+        look = {"color": colour, "marker": style.marker_of(len(x)), "ms": 1.5 + nested, "lw": nested}
+        ax.plot(x, y, label=style.verbatim(label) if len(cases) <= 12 else "_", **look)
     top = float(np.max(np.concatenate(loads)))
     drawn = _draw_theories(ax, next(iter(cases.values())), moduli, top, across, up)
     if spans_decades(np.sort(np.concatenate(loads))):
-        spread_axis(ax.xaxis, across(np.concatenate(loads)))
-        spread_axis(ax.yaxis, up(np.concatenate(areas)))
+        style.spread_axis(ax.xaxis, across(np.concatenate(loads)))
+        style.spread_axis(ax.yaxis, up(np.concatenate(areas)))
     else:
-        leave_room(ax, *map(up, areas))
+        style.leave_room(ax, *map(up, areas))
         ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
     ax.set_xlabel(across.label(VARIABLES["force"].label))
     ax.set_ylabel(up.label(VARIABLES[_AREA].label))
     ax.grid(color="0.9", lw=0.5)
-    named = {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if drawn:
-        figure.supxlabel(_THEORIES, fontsize=SMALL, color="0.35")
-    if len(named) > 1:
-        legend_above(figure, named)
+        figure.supxlabel(_THEORIES, fontsize=style.SMALL, color="0.35")
+    if len(named := style.named_in(ax)) > 1:
+        style.legend_above(figure, named)
     return figure
 
 
 def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     """Contact moduli that the results tell by themselves, where the theories hold; else none. [Pa]"""
     stated = [json.loads(one.attrs.get("case", "{}")) for one in cases.values()]
-    first = next(iter(cases.values()))
-    alike = all(one.get("material") == stated[0].get("material") for one in stated)
-    rough = stated[0].get("surface", {}).get("generate") not in _SMOOTH
-    if (
-        not (
-            "material" in stated[0]
-            and alike
-            and rough
-            and first.attrs.get("boundary") == "periodic"
-            and "height" in first
-        )
-        or {"thickness", "kernel"} & attributes_of(first.attrs).keys()
-    ):
+    first, material = next(iter(cases.values())), stated[0].get("material")
+    of_one_material = material is not None and all(one.get("material") == material for one in stated)
+    rough = "height" in first and stated[0].get("surface", {}).get("generate") not in _SMOOTH
+    endless = (
+        first.attrs.get("boundary") == "periodic" and not {"thickness", "kernel"} & attributes_of(first.attrs).keys()
+    )
+    if not (of_one_material and rough and endless):
         return {}
-    material = material_of(first)
+    known = material_of(first)
     end = max(float(one["time"][-1]) for one in cases.values())
     named = {"at once": 0.0, f"after {unit_for([end], 's').text(end)}": end}
-    compliances = {name: float(material.contact_compliance(time)) for name, time in named.items()}
+    compliances = {name: float(known.contact_compliance(time)) for name, time in named.items()}
     if len(set(compliances.values())) == 1:
         return {"": 1 / compliances["at once"]}
     return {name: 1 / compliance for name, compliance in compliances.items() if compliance > 0}

@@ -15,29 +15,12 @@ from roughvisc.groups import attributes_of
 from roughvisc.observables import contact
 from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import axis_of
-from roughvisc.views.figures.axes import (
-    BLUE,
-    CONTACT,
-    GREEN,
-    SMALL,
-    RowAxis,
-    Unit,
-    at_rows,
-    frame_at,
-    legend_above,
-    letter_panels,
-    new_figure,
-    require,
-    rows_of,
-    say_inside,
-    styled,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
 from roughvisc.views.figures.fields import measured_part, plane_unit
+from roughvisc.views.figures.rows import RowAxis, at_rows, frame_at, require, rows_of
 
 
 def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:
@@ -67,26 +50,16 @@ def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
     return inner
 
 
-def deformed_line(dataset: xr.Dataset, frame: int, across: str, index: int) -> np.ndarray:
-    """Height of the half-space's surface over one line of the profile, in the frame of the profile. [m]
+def deformed_surface(dataset: xr.Dataset, frame: int, **line: int) -> xr.DataArray:
+    """Height of the half-space's surface in the frame of the profile; of one line of cells alone with ``y=12``. [m]
 
     From the displacement where it is stored, which is known above absent cells too; else the height plus the gap.
     """
     frame_of = at_rows(dataset, frame)
-    height = dataset["height"].isel({across: index}).values
-    if "displacement" not in dataset:
-        require(dataset, "gap")
-        return height + frame_of["gap"].isel({across: index}).values
-    return frame_of["displacement"].isel({across: index}).values + _offset(frame_of)
-
-
-def deformed_surface(dataset: xr.Dataset, frame: int) -> xr.DataArray:
-    """The whole of what :func:`deformed_line` gives a line of. [m]"""
-    frame_of = at_rows(dataset, frame)
     if "displacement" in dataset:
-        return frame_of["displacement"].load() + _offset(frame_of)
+        return frame_of["displacement"].isel(line).load() + _offset(frame_of)
     require(dataset, "gap")
-    return dataset["height"] + frame_of["gap"].load()
+    return (dataset["height"] + frame_of["gap"]).isel(line).load()
 
 
 def _offset(frame_of: xr.Dataset) -> float:
@@ -103,7 +76,7 @@ def _parts(frame_of: xr.Dataset, name: str) -> Iterator[np.ndarray]:
     return (values for _, values in row_parts(frame_of[name], rows_of_chunk(frame_of["displacement"])))
 
 
-@styled
+@style.apply
 @quantities(time="s", at="m")
 def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quantity | None = None) -> Figure:
     """A cut through the contact: pressure above, below it the profile and the deformed surface that rests on it.
@@ -130,52 +103,44 @@ def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quant
     across = "y" if axis == "x" else "x"
     frame = frame_at(rows_of(dataset), time)
     index = cut_position(dataset, frame, across) if at is None else int(np.abs(dataset[across].values - at).argmin())
-    figure = new_figure(5.0, 3.9)
+    figure = style.new_figure(5.0, 3.9)
     top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
-    unit = draw_section(top, bottom, dataset, frame, axis, index)
-    place = float(dataset[across][index])
-    where = f"{across} = {plane_unit(dataset).text(place)}"
+    plane, cut = plane_unit(dataset), at_rows(dataset, frame).isel({across: index})
+    limits = plane(cell_edges(dataset[axis]))
+    _draw_pressure(top, cut, limits)
+    stated = dataset["height"].attrs.get("highest")
+    highest = float(largest(dataset["height"]) if stated is None else stated)
+    surface = deformed_surface(dataset, frame, **{across: index}).values
+    unit = _draw_surfaces(bottom, cut, surface, highest, limits)
+    bottom.set_xlabel(plane.label(axis))
+    bottom.set_xlim(limits[0], limits[-1])
+    where = f"{across} = {plane.text(float(dataset[across][index]))}"
     top.set_title(f"{RowAxis.of(rows_of(dataset)[[frame]]).text(rows_of(dataset)[frame])},  {where}", loc="right")
-    letter_panels((top, bottom))
+    style.letter_panels((top, bottom))
     figure.align_ylabels((top, bottom))
-    legend_above(figure, {label: one for one, label in zip(*bottom.get_legend_handles_labels(), strict=True)})
-    _note_exaggeration(figure, bottom, unit.factor / plane_unit(dataset).factor)
+    style.legend_above(figure, style.named_in(bottom))
+    _note_exaggeration(figure, bottom, unit.factor / plane.factor)
     return figure
 
 
-def draw_section(top: Axes, bottom: Axes, dataset: xr.Dataset, frame: int, axis: str, index: int) -> Unit:
-    """Draw the two panels of a section at the ``index`` of the other axis; returns the unit of heights."""
-    across = "y" if axis == "x" else "x"
-    plane = plane_unit(dataset)
-    x = plane(cell_edges(dataset[axis]))
-    _draw_pressure(top, dataset, frame, across, index, x)
-    unit = _draw_surfaces(bottom, dataset, frame, across, index, x)
-    bottom.set_xlabel(plane.label(axis))
-    bottom.set_xlim(x[0], x[-1])
-    return unit
-
-
-def _draw_pressure(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, x: np.ndarray) -> None:
-    if "pressure" not in dataset:
+def _draw_pressure(ax: Axes, cut: xr.Dataset, limits: np.ndarray) -> None:
+    if "pressure" not in cut:
         ax.set_yticks([])
-        say_inside(ax, "pressure was not kept")
+        style.say_inside(ax, "pressure was not kept")
         return
-    pressure = dataset["pressure"].isel({axis_of(dataset.variables): frame, across: index}).values
+    pressure = cut["pressure"].values
     unit = unit_for(pressure, "Pa")
-    ax.stairs(unit(pressure), x, fill=True, color=GREEN, alpha=0.3)
-    ax.stairs(unit(pressure), x, color=GREEN, lw=1)
+    ax.stairs(unit(pressure), limits, fill=True, color=style.GREEN, alpha=0.3)
+    ax.stairs(unit(pressure), limits, color=style.GREEN, lw=1)
     top = float(unit(np.nanmax(pressure, initial=0.0))) or 1.0
     ax.set_ylim(0, 1.12 * top)
     ax.set_ylabel(unit.label(VARIABLES["pressure"].label))
 
 
-def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index: int, limits: np.ndarray) -> Unit:
-    height = dataset["height"].isel({across: index}).values
-    surface = deformed_line(dataset, frame, across, index)
-    x = (limits[1:] + limits[:-1]) / 2
-    stated = dataset["height"].attrs.get("highest")
-    highest = float(largest(dataset["height"]) if stated is None else stated)
-    level = highest - float(dataset["approach"][frame]) if "approach" in dataset else np.nan
+def _draw_surfaces(ax: Axes, cut: xr.Dataset, surface: np.ndarray, highest: float, limits: np.ndarray) -> Unit:
+    """Profile, deformed surface and contact on a line of cells; the unit of heights."""
+    height, x = cut["height"].values, (limits[1:] + limits[:-1]) / 2
+    level = highest - float(cut["approach"]) if "approach" in cut else np.nan
     known = np.concatenate([height, surface])
     known = known[np.isfinite(known)]
     if np.isfinite(level) and not (known.size and np.ptp(known)):
@@ -184,24 +149,23 @@ def _draw_surfaces(ax: Axes, dataset: xr.Dataset, frame: int, across: str, index
     h, s = unit(height), unit(surface)
     low, high = (float(unit(known.min())), float(unit(known.max()))) if known.size else (0.0, 1.0)
     margin = 0.12 * ((high - low) or 1.0)
-    ax.set_ylim(low - margin, high + 2 * margin)
+    bottom, top = low - margin, high + 2 * margin
+    ax.set_ylim(bottom, top)
     wide = np.concatenate([limits[:1], x, limits[-1:]])  # the outer halves of the outermost cells
-    ax.fill_between(wide, np.pad(h, 1, "edge"), low - margin, color="0.72", lw=0, label="profile")
-    ax.fill_between(wide, np.pad(s, 1, "edge"), high + 2 * margin, color=BLUE, alpha=0.16, lw=0, label="half-space")
+    ax.fill_between(wide, np.pad(h, 1, "edge"), bottom, color="0.72", lw=0, label="profile")
+    ax.fill_between(wide, np.pad(s, 1, "edge"), top, color=style.BLUE, alpha=0.16, lw=0, label="half-space")
     ax.plot(x, h, color="0.25", lw=1)
-    ax.plot(x, s, color=BLUE, lw=1)
-    touching = contact(dataset.isel({axis_of(dataset.variables): frame, across: index})).values
-    marked = np.where(touching, h, np.nan)
-    draw_contact(ax, x, marked)
-    if low - margin < unit(level) < high + 2 * margin:
-        ax.axhline(unit(level), color=BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
+    ax.plot(x, s, color=style.BLUE, lw=1)
+    draw_contact(ax, x, np.where(contact(cut), h, np.nan))
+    if bottom < unit(level) < top:
+        ax.axhline(unit(level), color=style.BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
     ax.set_ylabel(unit.label(VARIABLES["height"].label))
     return unit
 
 
 def draw_contact(ax: Axes, x: np.ndarray, height: np.ndarray) -> Line2D:
     """Line of the contact on a section, which shows a single cell too."""
-    (line,) = ax.plot(x, height, color=CONTACT, lw=2.4, marker="o", ms=2.4, mew=0, label="contact")
+    (line,) = ax.plot(x, height, color=style.CONTACT, lw=2.4, marker="o", ms=2.4, mew=0, label="contact")
     return line
 
 
@@ -211,5 +175,5 @@ def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
     box, limits = ax.get_window_extent(), ax.viewLim
     ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
     text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
-    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=SMALL, gid="exaggeration")
+    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=style.SMALL, gid="exaggeration")
     note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.colors import LogNorm
@@ -9,10 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
-from roughvisc.views.figures.axes import VERMILION, new_figure, styled
+from roughvisc.views.figures import style
+
+#: A case that was refused.
+_REFUSED: dict[str, Any] = {"facecolor": "0.9", "edgecolor": "0.5", "hatch": "////", "lw": 0}
 
 
-@styled
+@style.apply
 def stability_map(dataset: xr.Dataset, *, name: str = "error", expected: float | None = None) -> Figure:
     """Errors over two parameters, each of many decades, as a map.
 
@@ -43,16 +48,17 @@ def stability_map(dataset: xr.Dataset, *, name: str = "error", expected: float |
     right = np.isfinite(values) & (values > 0)
     highest = max(expected or 0.0, float(values[right].max(initial=1e-15)))
     lowest = min(1e-2 * highest, max(float(values[right].min(initial=highest)), 1e-6 * highest))
-    figure = new_figure(5.6, 3.9)
+    figure = style.new_figure(5.6, 3.9)
     axes = figure.subplots()
     shown = np.ma.masked_invalid(np.maximum(values, lowest))
     image = axes.pcolormesh(shown, cmap="cividis", norm=LogNorm(lowest, highest), edgecolors="w", lw=0.6)
     refused = np.isnan(values)
     wrong = np.isinf(values) | (values > expected if expected else False)
     for row, column in np.argwhere(refused):
-        axes.fill_between([column, column + 1], row, row + 1, facecolor="0.9", edgecolor="0.5", hatch="////", lw=0)
+        axes.fill_between([column, column + 1], row, row + 1, **_REFUSED)
     for row, column in np.argwhere(wrong):
-        axes.plot([column, column + 1, column + 1, column, column], [row, row, row + 1, row + 1, row], color=VERMILION)
+        corners = (column + np.array([0, 1, 1, 0, 0]), row + np.array([0, 0, 1, 1, 0]))
+        axes.plot(*corners, color=style.VERMILION)
     for axis, dim in ((axes.xaxis, across), (axes.yaxis, up)):
         ticks = np.log10(dataset[dim].values)
         axis.set_ticks(np.arange(len(ticks)) + 0.5, [f"$10^{{{tick:.3g}}}$" for tick in ticks])
@@ -61,9 +67,9 @@ def stability_map(dataset: xr.Dataset, *, name: str = "error", expected: float |
     figure.colorbar(image, ax=axes, extend="min", label=str(error.attrs.get("long_name", name)))
     legend = []
     if refused.any():
-        legend.append(Patch(facecolor="0.9", edgecolor="0.5", hatch="////", lw=0, label="refused, with a reason"))
+        legend.append(Patch(**_REFUSED, label="refused, with a reason"))
     if wrong.any():
-        legend.append(Patch(facecolor="none", edgecolor=VERMILION, label=f"beyond {expected:g}"))
+        legend.append(Patch(facecolor="none", edgecolor=style.VERMILION, label=f"beyond {expected:g}"))
     if legend:
         figure.legend(handles=legend, loc="outside upper center", ncols=2)
     return figure

@@ -22,20 +22,9 @@ from roughvisc.topography.blocks import (
 )
 from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.spectrum import MOST_MISSING, psd, unmeasured
+from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures.axes import (
-    BLUE,
-    VERMILION,
-    Unit,
-    legend_over,
-    letter_panels,
-    new_figure,
-    note_below,
-    say_inside,
-    spread_axis,
-    styled,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn, stride
 from roughvisc.views.figures.fields import Scale, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
 
@@ -86,7 +75,7 @@ def _label(height: xr.DataArray) -> str:
     return f"{VARIABLES['height'].label}, levelled" if levelled else VARIABLES["height"].label
 
 
-@styled
+@style.apply
 def surface(height: xr.DataArray) -> Figure:
     """Quick look at a surface: map, profile through its middle, distribution of heights, power spectrum.
 
@@ -124,12 +113,12 @@ def surface(height: xr.DataArray) -> Figure:
         ends = " to ".join(unit.text(one) for one in extremes_of(height.values))
         notes += [f"the map is of means of {every} × {every} points; heights are {ends}"]
     said = "; ".join(notes)
-    note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
+    style.note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
     _draw_profile(panels["profile"], on_map, height, unit, plane)
     levelled = height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
     _draw_heights(panels["heights"], levelled, unit)
     _draw_spectrum(panels["spectrum"], levelled)
-    letter_panels(list(panels.values()))
+    style.letter_panels(list(panels.values()))
     return figure
 
 
@@ -142,16 +131,16 @@ def _panels(ratio: float) -> tuple[Figure, dict[str, Axes]]:
     elif ratio > 1.7:
         rows, size = (("map", "profile"), ("map", "heights"), ("map", "spectrum")), (6.4, 6.4)
         heights = (1, 1, 1)
-    figure = new_figure(*size)
+    figure = style.new_figure(*size)
     panels = figure.subplot_mosaic(rows, height_ratios=heights)
     return figure, panels
 
 
 def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plane: Unit) -> None:
     middle = height.sizes["y"] // 2
-    ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=BLUE, lw=0.9)
+    ax.plot(plane(height["x"]), unit(height.isel(y=middle)), color=style.BLUE, lw=0.9)
     if not height.isel(y=middle).notnull().any():
-        say_inside(ax, "all missing")
+        style.say_inside(ax, "all missing")
     place = float(height["y"][middle])
     on_map.axhline(plane(place), color="w", lw=0.8, ls=(0, (4, 2)))
     limits = plane(cell_edges(height["x"]))
@@ -168,7 +157,7 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
     mean, deviation = float(unit(mean_of(levelled.values))), float(unit(deviation_of(levelled.values)))
     bins = int(np.clip(math.sqrt(count) / 1.5, 8, 100))
     if deviation == 0:
-        say_inside(ax, "flat: one height")
+        style.say_inside(ax, "flat: one height")
         ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
@@ -178,17 +167,17 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
         edges[:-1],
         bins=edges,
         weights=found * bins / ((high - low) * count),
-        color=BLUE,
+        color=style.BLUE,
         alpha=0.45,
         histtype="stepfilled",
         label="measured",
     )
     shown = np.linspace(low, high, 200)
     bell = np.exp(-(((shown - mean) / deviation) ** 2) / 2) / (deviation * math.sqrt(2 * math.pi))
-    ax.plot(shown, bell, color=VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
+    ax.plot(shown, bell, color=style.VERMILION, lw=1, label=f"normal, Sq = {unit.text(deviation * unit.factor)}")
     ax.set_ylim(bottom=0)
     ax.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
-    legend_over(ax, 2.4)
+    style.legend_over(ax, 2.4)
     ax.set_xlabel(unit.label("Height, levelled"))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
@@ -210,9 +199,9 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
         shown = density > 0
         if shown.any():
             x, y = wavevector[shown] * scale[symbol], density[shown] / scale[symbol] ** 4
-            ax.plot(x, y, color=BLUE, lw=1)
-            spread_axis(ax.xaxis, x, always=True)
-            spread_axis(ax.yaxis, y, always=True)
+            ax.plot(x, y, color=style.BLUE, lw=1)
+            style.spread_axis(ax.xaxis, x, always=True)
+            style.spread_axis(ax.yaxis, y, always=True)
             ax.set_ylim(bottom=max(ax.get_ylim()[0], _NOTHING * float(y.max())))
             ax.set_xlabel(f"Wavevector [rad/{symbol}]")
             ax.set_ylabel(f"Power spectral density\n[{symbol}⁴]")
@@ -220,6 +209,6 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
             ax.grid(color="0.9", lw=0.5)
             drawn = True
     if not drawn:
-        say_inside(ax, reason)
+        style.say_inside(ax, reason)
         ax.set_xticks([])
         ax.set_yticks([])

@@ -11,24 +11,23 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.study.trade.ladder import format_tolerance, step_text
 from roughvisc.study.trade.recommend import WORDS, main_quantities, pareto_front, uncertainty
 from roughvisc.variables import VARIABLES, current_name
-from roughvisc.views.figures.axes import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, letter_panels, new_figure, styled
+from roughvisc.views.figures import style
 
 #: family of settings -> marker and colour, told apart by either
 _FAMILIES = {
-    "tolerance": ("o", BLUE),
-    "coarser grid": ("v", VERMILION),
-    "finer grid": ("^", VERMILION),
-    "fixed steps": ("s", GREEN),
-    "direct history": ("D", PURPLE),
-    "rounded fields": ("P", SKY),
-    "seed paper's algorithm": ("X", ORANGE),
+    "tolerance": ("o", style.BLUE),
+    "coarser grid": ("v", style.VERMILION),
+    "finer grid": ("^", style.VERMILION),
+    "fixed steps": ("s", style.GREEN),
+    "direct history": ("D", style.PURPLE),
+    "rounded fields": ("P", style.SKY),
+    "seed paper's algorithm": ("X", style.ORANGE),
 }
 #: What the line is called below which nobody need pay.
 _FLOOR = "no setting is better"
@@ -49,7 +48,7 @@ _PLACES = (
 )
 
 
-@styled
+@style.apply
 def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figure:
     """Wall time against error of every setting, with the Pareto front: what no other setting beats in both.
 
@@ -85,19 +84,12 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
     shown = [name for name in quantities if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")
-    figure = new_figure(0.6 + 3.3 * len(shown), 3.7)
+    figure = style.new_figure(0.6 + 3.3 * len(shown), 3.7)
     axes = figure.subplots(1, len(shown), squeeze=False)[0]
     points = [_draw(ax, dataset, name) for ax, name in zip(axes, shown, strict=True)]
-    named = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(
-        list(named.values()),
-        list(named),
-        loc="outside upper center",
-        ncols=4 if len(shown) > 1 else 2,
-        handlelength=1.4,
-    )
-    if len(shown) > 1:
-        letter_panels(axes)
+    named, columns = style.named_in(*axes), 4 if len(shown) > 1 else 2
+    figure.legend(named.values(), named, loc="outside upper center", ncols=columns, handlelength=1.4)
+    style.letter_panels(axes)
     figure.draw_without_rendering()  # the layout must stand before labels can be kept apart
     for ax, rows in zip(axes, points, strict=True):
         _place(ax, dataset, *rows)
@@ -139,9 +131,7 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> tuple[np.ndarray, np.
         ax.axhspan(bottom, min(unsure, height[known].max()), color="0.93", zorder=0, label="reference not known")
     for axis, most in ((ax.xaxis, 30), (ax.yaxis, 300)):
         low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < most * low else (1.0,), numticks=20))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        style.plain_log_ticks(axis, fine=high < most * low, most=20)
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {WORDS[quantity]} [%]")
     ax.grid(color="0.9", lw=0.5)
@@ -180,22 +170,19 @@ def _place(ax: Axes, dataset: xr.Dataset, settings: np.ndarray, points: np.ndarr
     for i, at in zip(settings, points, strict=True):
         row = dataset.isel(setting=i)
         colour = 0.65 * np.array(to_rgb(_FAMILIES[str(row["family"].values)][1]))
-        least, kept = np.inf, None
+        label = ax.annotate(_brief(row), at, textcoords="offset points", fontsize=6, color=colour, zorder=4)
+        boxes, covered = [], []
         for offset, across, up in _PLACES:
-            style = {"ha": across, "va": up, "fontsize": 6, "color": colour, "zorder": 4}
-            label = ax.annotate(_brief(row), at, offset, textcoords="offset points", **style)
+            label.set(position=offset, ha=across, va=up)
             box = label.get_window_extent()
-            covered = sum(_common(box, other) for other in taken) + box.width * box.height - _common(box, frame)
-            if covered < least - 1e-9:
-                if kept is not None:
-                    kept[0].remove()
-                least, kept = covered, (label, box)
-            else:
-                label.remove()
-            if least <= 1e-9:
+            boxes.append(box)
+            covered.append(sum(_common(box, other) for other in taken) + box.width * box.height - _common(box, frame))
+            if covered[-1] <= 1e-9:
                 break
-        if kept is not None:
-            taken.append(kept[1])
+        least = int(np.argmin(np.array(covered) > min(covered) + 1e-9))  # the first of those that cover least
+        offset, across, up = _PLACES[least]
+        label.set(position=offset, ha=across, va=up)
+        taken.append(boxes[least])
 
 
 def _around(at: np.ndarray, reach: float) -> Bbox:

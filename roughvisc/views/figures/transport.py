@@ -18,28 +18,13 @@ from roughvisc.errors import InputError
 from roughvisc.observables import asked
 from roughvisc.observables import leakage as derived
 from roughvisc.observables.leakage import closing_times
-from roughvisc.units import Quantity, quantities, unit_for
+from roughvisc.units import Quantity, Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import (
-    BLUE,
-    CONTACT,
-    NO_CONTACT,
-    RowAxis,
-    Unit,
-    at_rows,
-    frame_at,
-    legend_above,
-    letter_panels,
-    new_figure,
-    require,
-    rows_of,
-    spread_axis,
-    styled,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.fields import Scale, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
-from roughvisc.views.figures.histories import leave_room, marker_of
+from roughvisc.views.figures.rows import RowAxis, at_rows, frame_at, require, rows_of
 
 #: Decades of the flux below its largest that a map shows.
 _DECADES = 3
@@ -47,7 +32,7 @@ _DECADES = 3
 _SPANS = 30.0
 
 
-@styled
+@style.apply
 @quantities(time="s")
 def leakage(dataset: xr.Dataset, time: Quantity | None = None) -> Figure:
     """Leak rate over time, with the time at which the contact closes, and a map of the flow at one time.
@@ -78,17 +63,18 @@ def leakage(dataset: xr.Dataset, time: Quantity | None = None) -> Figure:
     frame = frame_at(rows_of(dataset), time) if time is not None else int(flowing[-1]) if flowing.size else -1
     frame %= rows_of(dataset).size
     ratio = float(np.clip(plane_ratio(dataset), 0.4, 1.4))
-    figure = new_figure(7.2, 1.1 + 2.4 * max(ratio, 0.8))
+    figure = style.new_figure(7.2, 1.1 + 2.4 * max(ratio, 0.8))
     on_time, on_map = figure.subplots(1, 2, width_ratios=[1.25, 1])
     _draw_rate(on_time, dataset, frame)
     image = _draw_flow(figure, on_map, dataset, frame)
-    mapped = Line2D([], [], color="k", ls="", marker="o", ms=6, mfc="none", mew=1.2)
-    kept = Line2D([], [], color=BLUE, ls="", marker=marker_of(rows_of(dataset).size) or "None")
-    named = {AXES[str(rows_of(dataset).name)].rows: kept} if marker_of(rows_of(dataset).size) else {}
-    legend_above(figure, {**named, "mapped": mapped, **flow_legend(image)})
     rows = rows_of(dataset)
+    named: dict[str, Artist] = {}
+    if marker := style.marker_of(rows.size):
+        named[AXES[str(rows.name)].rows] = Line2D([], [], color=style.BLUE, ls="", marker=marker)
+    named["mapped"] = Line2D([], [], color="k", ls="", marker="o", ms=6, mfc="none", mew=1.2)
+    style.legend_above(figure, named | flow_legend(image))
     closed = "" if flowing.size else ", closed"
-    letter_panels((on_time, on_map), ("", RowAxis.of(rows).text(rows[frame]) + closed))
+    style.letter_panels((on_time, on_map), ("", RowAxis.of(rows).text(rows[frame]) + closed))
     return figure
 
 
@@ -125,16 +111,16 @@ def draw_flux(ax: Axes, flux: xr.DataArray, unit: Unit, plane: Unit, highest: fl
     """Map of the flux of one frame, up to the highest [m2/s] of all that are drawn."""
     lowest = highest * 10.0**-_DECADES
     image = draw_map(ax, visible(flux, highest * unit.factor), unit, plane, norm=LogNorm(lowest, highest))
-    image.set_cmap(image.get_cmap().with_extremes(bad=CONTACT, under=NO_CONTACT))
+    image.set_cmap(image.get_cmap().with_extremes(bad=style.CONTACT, under=style.NO_CONTACT))
     return image
 
 
 def flow_legend(image: AxesImage) -> dict[str, Artist]:
     """What a map of the flow shows besides its scale: contact, and fluid that stands still."""
     values = np.ma.asarray(image.get_array())
-    named: dict[str, Artist] = {"contact": Patch(color=CONTACT, lw=0)} if np.ma.getmaskarray(values).any() else {}
+    named: dict[str, Artist] = {"contact": Patch(color=style.CONTACT, lw=0)} if np.ma.getmaskarray(values).any() else {}
     if (values.filled(np.inf) < (image.norm.vmin or 0.0)).any():
-        named["no flow"] = Patch(facecolor=NO_CONTACT, edgecolor="0.5", lw=0.4)
+        named["no flow"] = Patch(facecolor=style.NO_CONTACT, edgecolor="0.5", lw=0.4)
     return named
 
 
@@ -154,12 +140,12 @@ def _draw_rate(ax: Axes, dataset: xr.Dataset, frame: int) -> None:
     unit, spans = rate_unit(dataset["leak_rate"])
     times = axis.unit(rows_of(dataset))
     shown = np.where(rate > 0, unit(rate), np.nan) if spans else unit(rate)
-    ax.plot(times, shown, color=BLUE, marker=marker_of(len(times)))
+    ax.plot(times, shown, color=style.BLUE, marker=style.marker_of(len(times)))
     ax.plot(times[[frame]], shown[[frame]], "o", color="k", ms=6, mfc="none", mew=1.2)
     if spans:
-        spread_axis(ax.yaxis, shown)
+        style.spread_axis(ax.yaxis, shown)
     else:
-        leave_room(ax, shown)
+        style.leave_room(ax, shown)
     if closes := closing_times(dataset):
         before, after = axis.unit(closes)
         ax.axvspan(before, after, color="0.9", lw=0)
@@ -190,7 +176,7 @@ def _draw_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, frame: int) -> Axe
 _ESTIMATES = (("holm", "Holm", (0, (4, 2))), ("greenwood", "Greenwood", (0, (1, 1.5))))
 
 
-@styled
+@style.apply
 def conductance(dataset: xr.Dataset) -> Figure:
     """Conductance of the contact spots over time, with its stated error as a band and the estimates as lines.
 
@@ -214,7 +200,7 @@ def conductance(dataset: xr.Dataset) -> Figure:
     found = [kind for kind in CONDUCTANCES if kind in held]
     if not found:
         raise InputError("the result holds no conductance: merge it with rv.observables.conductance(ds, resistivity)")
-    figure = new_figure(4.2, 0.6 + 2.5 * len(found))
+    figure = style.new_figure(4.2, 0.6 + 2.5 * len(found))
     axis = RowAxis.of(rows_of(dataset))
     axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
     for ax, kind in zip(axes, found, strict=True):
@@ -222,27 +208,27 @@ def conductance(dataset: xr.Dataset) -> Figure:
         axis.apply(ax, rows_of(dataset))
     for ax in axes[:-1]:
         ax.set_xlabel("")
-    letter_panels(axes)
-    legend_above(figure, {label: one for one, label in zip(*axes[0].get_legend_handles_labels(), strict=True)})
+    style.letter_panels(axes)
+    style.legend_above(figure, style.named_in(axes[0]))
     return figure
 
 
 def _draw(ax: Axes, axis: RowAxis, dataset: xr.Dataset, kind: str) -> None:
     """Values in full contact are infinite, and left out."""
-    finite = {name: dataset[name].where(np.isfinite(dataset[name])).values for name in _names(dataset, kind)}
-    unit, times = unit_for(finite[kind], VARIABLES[kind].units), axis.unit(rows_of(dataset))
-    values, error = unit(finite[kind]), unit(finite[f"{kind}_error"])
-    ax.fill_between(times, np.maximum(values - error, 0), values + error, color=BLUE, alpha=0.25, lw=0)
-    ax.plot(times, values, color=BLUE, marker=marker_of(len(times)), ms=2.5, label="computed, with its error")
+
+    def finite(name: str) -> np.ndarray:
+        return dataset[name].where(np.isfinite(dataset[name])).values
+
+    unit, times = unit_for(finite(kind), VARIABLES[kind].units), axis.unit(rows_of(dataset))
+    values, error = unit(finite(kind)), unit(finite(f"{kind}_error"))
+    ax.fill_between(times, np.maximum(values - error, 0), values + error, color=style.BLUE, alpha=0.25, lw=0)
+    marker = style.marker_of(len(times))
+    ax.plot(times, values, color=style.BLUE, marker=marker, ms=2.5, label="computed, with its error")
     shown = [values + error]
     for suffix, label, dashes in _ESTIMATES:
-        if (name := f"{kind}_{suffix}") in finite:
-            ax.plot(times, unit(finite[name]), color="0.35", ls=dashes, lw=0.9, label=label)
-            shown.append(unit(finite[name]))
-    leave_room(ax, *shown)
+        if (name := f"{kind}_{suffix}") in dataset:
+            shown.append(unit(finite(name)))
+            ax.plot(times, shown[-1], color="0.35", ls=dashes, lw=0.9, label=label)
+    style.leave_room(ax, *shown)
     ax.set_ylabel(unit.label(VARIABLES[kind].label))
     ax.grid(color="0.9", lw=0.5)
-
-
-def _names(dataset: xr.Dataset, kind: str) -> list[str]:
-    return [name for name in (kind, *(f"{kind}_{one}" for one in ("error", "holm", "greenwood"))) if name in dataset]

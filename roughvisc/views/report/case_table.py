@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.units import unit_for
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, Axis, axis_of
-from roughvisc.views.figures.axes import unit_for
 from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
 

@@ -17,24 +17,15 @@ from PIL import Image
 
 from roughvisc.observables import contact, history
 from roughvisc.topography.grid import spacing
+from roughvisc.units import Unit, unit_for
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import (
-    ABSENT,
-    CONTACT,
-    NO_CONTACT,
-    RowAxis,
-    Unit,
-    at_rows,
-    fullest_frame,
-    rows_of,
-    spread_frames,
-    unit_for,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
-from roughvisc.views.figures.fields import colour_map, joint_scale, measured_part, plane_ratio, plane_unit, value_scale
-from roughvisc.views.figures.sections import cut_position, deformed_line
+from roughvisc.views.figures.fields import colour_map, joint_scale, measured_part, plane_ratio, plane_unit
+from roughvisc.views.figures.rows import RowAxis, at_rows, fullest_frame, rows_of, spread_frames
+from roughvisc.views.figures.sections import cut_position, deformed_surface
 
 #: Frames a case and cells along the longer side of a map, the richest first.
 _LADDER = ((24, 288), (16, 256), (12, 192), (8, 160), (6, 128), (5, 96), (4, 64), (2, 48))
@@ -144,8 +135,7 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
 
 
 def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
-    fields = (present(dataset, name, frame).values for frame in chosen)
-    scale = joint_scale([value_scale(name, values[np.isfinite(values)]) for values in fields])
+    scale = joint_scale(present(dataset, name, frame) for frame in chosen)
     unit = unit_for([scale.low, scale.high], VARIABLES[name].units)
     high = scale.high if scale.high > scale.low else scale.low + 1.0
     return _Scale(name, unit, scale.low, high, scale.highest > scale.high)
@@ -184,8 +174,8 @@ def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
 
 def _palette(name: str) -> bytes:
     colours = colour_map(name)(np.linspace(0, 1, _LEVELS))[:, :3]
-    marked = to_rgb(NO_CONTACT if name == "pressure" else CONTACT)
-    return bytes(np.rint(255 * np.array([to_rgb(ABSENT), marked, *colours])).astype(np.uint8).ravel())
+    marked = to_rgb(style.NO_CONTACT if name == "pressure" else style.CONTACT)
+    return bytes(np.rint(255 * np.array([to_rgb(style.ABSENT), marked, *colours])).astype(np.uint8).ravel())
 
 
 # ---------------------------------------------------------------------------------------------------- sections
@@ -215,7 +205,7 @@ def _sections(dataset: xr.Dataset, chosen: list[int]) -> dict[str, Any] | None:
         return None
     index = cut_position(dataset, fullest_frame(dataset), "y")
     height = dataset["height"].isel(y=index).values
-    surfaces = [deformed_line(dataset, frame, "y", index) for frame in chosen]
+    surfaces = [deformed_surface(dataset, frame, y=index).values for frame in chosen]
     on_line = [contact(at_rows(dataset, frame).isel(y=index)).values for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]

@@ -26,10 +26,12 @@ from roughvisc.study.storage.store import no_results, result_files, whole_result
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
+from roughvisc.units import unit_for
 from roughvisc.variables.axes import axis_of
-from roughvisc.views.figures.axes import new_figure, require, styled, unit_for
+from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn
 from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
+from roughvisc.views.figures.rows import require
 from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
@@ -347,13 +349,13 @@ def _parameter(value: xr.DataArray) -> str:
     return unit_for([float(value)], value.attrs["units"]).text(float(value))
 
 
-@styled
+@style.apply
 def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Figure:
     """Maps of the heights before conditioning and as pressed, filled points marked.
 
     Colours end at the quantiles of 0.5 and 99.5 %, so that spikes do not hide the rest.
     """
-    figure = new_figure(7.0, 3.0)
+    figure = style.new_figure(7.0, 3.0)
     axes = figure.subplots(1, 2)
     heights = (found.before, found.after)
     for ax, height, title in zip(axes, heights, ("before", "as pressed"), strict=True):

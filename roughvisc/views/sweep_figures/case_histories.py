@@ -12,17 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from roughvisc.units import Unit
 from roughvisc.variables.axes import AXES
-from roughvisc.views.figures.axes import (
-    RowAxis,
-    Unit,
-    legend_above,
-    letter_panels,
-    new_figure,
-    rows_of,
-    styled,
-)
+from roughvisc.views.figures import style
 from roughvisc.views.figures.histories import steps_of
+from roughvisc.views.figures.rows import RowAxis, rows_of
 from roughvisc.views.sweep_figures.cases import (
     Parameter,
     cases_of,
@@ -38,7 +32,7 @@ from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_han
 _MOST_PANELS = 9
 
 
-@styled
+@style.apply
 def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
     """A history of every case over its axis, coloured by what was varied; kept times are dots, where these are few.
 
@@ -79,7 +73,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     count = len(facets.levels)
     columns = min(count, 2 if count in (2, 4) else 3)
     rows = -(-count // columns)
-    figure = new_figure(
+    figure = style.new_figure(
         4.6 if count == 1 else min(1.0 + 2.4 * columns, 7.4), (3.1 if rows == 1 else 1.0 + 1.9 * rows) + 0.2
     )
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
@@ -89,7 +83,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
         drawn = [(lines[i], cases.members[i], int(first.places[i]), bands[i]) for i in chosen]
         dotted |= _draw_panel(ax, axis, unit, colouring, drawn)
     if count > 1:
-        letter_panels(panels[:count], [textwrap.fill(text, 22) for text in named_texts(facets)])
+        style.letter_panels(panels[:count], [textwrap.fill(text, 22) for text in named_texts(facets)])
     _limits(list(panels[:count]), unit(np.concatenate([one.values for band in bands for one in band or ()] or [[]])))
     for ax in panels[:count]:
         axis.apply(ax, times, most=7 if count == 1 else 4)
@@ -106,7 +100,7 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
     named |= {str(handle.get_label()): handle for handle in band_handles(cases.bands)}
     if dotted:
         named[AXES[cases.axis].rows] = Line2D([], [], color="0.3", ls="", marker="o", ms=3)
-    legend_above(figure, named, title)
+    style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(panels[:count]))
     return figure
 

@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import Any
 
 from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.views.figures.axes import Unit, unit_for
+from roughvisc.units import Unit, unit_for
 
 #: What an infinite number stands for; the thickness alone may be one.
 ENDLESS = "half-space"

@@ -18,10 +18,11 @@ from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
+from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES, current_name
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.figures.axes import Unit, unit_for, verbatim
+from roughvisc.views.figures import style
 from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
 from roughvisc.views.sweep_figures.ensembles import Band, pooled
 
@@ -92,7 +93,7 @@ class Parameter:
         if self.numeric:
             return [ENDLESS if np.isinf(value) else self.unit.text(value, 4) for value in self.levels]
         texts = _category_texts(self.levels.tolist(), self.key)
-        return [verbatim(textwrap.shorten(text, 60, placeholder="…")) for text in texts]
+        return [style.verbatim(textwrap.shorten(text, 60, placeholder="…")) for text in texts]
 
 
 def _index(levels: list, value: Any) -> int:

@@ -11,9 +11,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, MaxNLocator
 
-from roughvisc.views.figures.axes import CYCLE
+from roughvisc.views.figures import style
+from roughvisc.views.figures.rows import unevenness
 from roughvisc.views.sweep_figures.cases import Parameter
 
 #: Lines up to which a legend names each.
@@ -27,10 +28,6 @@ def even_in_log(values) -> bool:
     values = np.unique(np.asarray(values, dtype=float))
     if len(values) < 2 or not values[0] > 0 or values[-1] < 10 * values[0]:
         return False
-
-    def unevenness(shown: np.ndarray) -> float:
-        return float(np.abs((shown - shown[0]) / (shown[-1] - shown[0]) - np.linspace(0, 1, len(shown))).max())
-
     return unevenness(np.log(values)) <= unevenness(values)
 
 
@@ -58,8 +55,8 @@ class Colouring:
     def colour(self, level: int):
         """Colour of the level of this number."""
         count = len(self.parameter.levels)
-        if not self.parameter.numeric and count <= len(CYCLE):
-            return CYCLE[level]
+        if not self.parameter.numeric and count <= len(style.CYCLE):
+            return style.CYCLE[level]
         if self.few or not self._graded:
             return line_colours(count)(level)
         return line_colours(256)(self._norm()(self.parameter.unit(self.parameter.levels[level])))
@@ -100,8 +97,6 @@ def readable_ticks(axis: Axis, low: float, high: float, logarithmic: bool) -> No
     if not logarithmic:
         axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
         return
-    narrow = high < 300 * low
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
-    plain = low >= 0.9e-3 and high < 1e5
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}") if plain else LogFormatterSciNotation())
-    axis.set_minor_formatter(NullFormatter())
+    style.plain_log_ticks(axis, fine=high < 300 * low, most=12)
+    if low < 0.9e-3 or high >= 1e5:
+        axis.set_major_formatter(LogFormatterSciNotation())

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
+from roughvisc.units import unit_for
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.sliding import SLIDING
-from roughvisc.views.figures.axes import legend_above, letter_panels, new_figure, styled, unit_for
+from roughvisc.views.figures import style
 from roughvisc.views.sweep_figures.cases import Parameter, cases_of, combined, middle_of_decades
 from roughvisc.views.sweep_figures.colouring import Colouring
 from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
@@ -23,7 +24,7 @@ _PANELS = ("friction_coefficient", "contact_fraction")
 _OPEN = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4, label="not converged")
 
 
-@styled
+@style.apply
 def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one of every case, against the logarithm of the speed.
 
@@ -57,7 +58,7 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     speeds = np.concatenate([member[over].values for member in cases.members])
     across = unit_for(middle_of_decades(speeds), "m/s")
     handles: list[Artist] = [*colouring.handles()] if len(colouring.parameter.levels) > 1 else []
-    figure = new_figure(6.6, 2.9 + 0.12 * len(handles))
+    figure = style.new_figure(6.6, 2.9 + 0.12 * len(handles))
     panels = figure.subplots(1, 2)
     settled = [
         _draw(panels, member, band, over, across, colouring.colour(int(place)))
@@ -69,10 +70,10 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
         ax.set_xlabel(across.label(_speed_label(reduced)))
         ax.set_ylabel(SLIDING[name].label)
         ax.grid(color="0.9", lw=0.5)
-    letter_panels(list(panels))
+    style.letter_panels(list(panels))
     title = colouring.parameter.name if handles else ""
     handles += band_handles(cases.bands) + ([] if all(settled) else [_OPEN])
-    legend_above(figure, {str(one.get_label()): one for one in handles}, title)
+    style.legend_above(figure, {str(one.get_label()): one for one in handles}, title)
     colouring.draw_bar(figure, list(panels))
     return figure
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 from roughvisc.errors import InputError
-from roughvisc.views.figures.axes import ABSENT, letter_panels, new_figure
+from roughvisc.views.figures import style
 from roughvisc.views.sweep_figures.case_text import ENDLESS
 from roughvisc.views.sweep_figures.cases import Cases, Parameter, label_of, quantity_unit
 from roughvisc.views.sweep_figures.colouring import even_in_log, readable_ticks
@@ -33,9 +33,9 @@ def draw_maps(
     low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
     logarithmic = low > 0 and high >= 30 * low
     norm = LogNorm(low, high) if logarithmic else Normalize(low, high if high > low else low + 1)
-    figure = new_figure(1.4 + 2.6 * len(values), 2.9)
+    figure = style.new_figure(1.4 + 2.6 * len(values), 2.9)
     panels = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
-    colours = matplotlib.colormaps["viridis"].with_extremes(bad=ABSENT)
+    colours = matplotlib.colormaps["viridis"].with_extremes(bad=style.ABSENT)
     for ax, row in zip(panels, shown, strict=True):
         cells = np.full((len(up.levels), len(across.levels)), np.nan)
         cells[up.places, across.places] = row
@@ -52,7 +52,7 @@ def draw_maps(
     bar.outline.set_linewidth(0.6)
     bar.minorticks_off()
     readable_ticks(bar.ax.yaxis, *mesh.get_clim(), logarithmic)
-    letter_panels(panels, titles)
+    style.letter_panels(panels, titles)
     return figure
 
 

@@ -16,16 +16,8 @@ from matplotlib.lines import Line2D
 from roughvisc.errors import InputError
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.views.figures.axes import (
-    RowAxis,
-    frame_at,
-    legend_above,
-    letter_panels,
-    new_figure,
-    rows_of,
-    spread_frames,
-    styled,
-)
+from roughvisc.views.figures import style
+from roughvisc.views.figures.rows import RowAxis, frame_at, rows_of, spread_frames
 from roughvisc.views.sweep_figures.cases import (
     Cases,
     Parameter,
@@ -46,7 +38,7 @@ _MOST_PANELS = 6
 _MOST_TIMES = 200
 
 
-@styled
+@style.apply
 @quantities(times="s")
 def sweep(
     results: Any,
@@ -212,7 +204,7 @@ def _lines_by_time(
     frames: list[list[int]],
 ) -> Figure:
     """One parameter: a line for each time."""
-    figure = new_figure(4.2, 3.2)
+    figure = style.new_figure(4.2, 3.2)
     ax = figure.add_subplot()
     unit = quantity_unit(cases, quantity, values)
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(values)))
@@ -222,7 +214,7 @@ def _lines_by_time(
         _draw_line(ax, across, members, unit(row), _failed(cases, frame), ends, color=colour, label=title)
     _finish(ax, cases, across, quantity, np.array([values, *bands]))
     named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    legend_above(figure, named | {str(one.get_label()): one for one in band_handles(cases.bands)})
+    style.legend_above(figure, named | {str(one.get_label()): one for one in band_handles(cases.bands)})
     return figure
 
 
@@ -238,7 +230,7 @@ def _families(
     """Several parameters: a panel for each time, in it a line for each combination of the others."""
     family = combined([one for one in cases.parameters if one.key != across.key])
     colouring = Colouring(family)
-    figure = new_figure(1.2 + 3.0 * len(values), 3.2 + 0.14 * len(colouring.handles()) / (1 + len(values)))
+    figure = style.new_figure(1.2 + 3.0 * len(values), 3.2 + 0.14 * len(colouring.handles()) / (1 + len(values)))
     axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
     unit = quantity_unit(cases, quantity, values)
     crossed = False
@@ -248,16 +240,18 @@ def _families(
         for level in range(len(family.levels)):
             members = np.flatnonzero(family.places == level)
             nested = 1 - 0.55 * level / max(1, len(family.levels) - 1)  # so that none hides another that it lies on
-            style = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
+            look = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
             ends = [unit(one[number][members]) for one in bands]
-            _draw_line(ax, across, members, unit(row[members]), failed[members], ends, **style)
+            _draw_line(ax, across, members, unit(row[members]), failed[members], ends, **look)
         _finish(ax, cases, across, quantity, np.array([values, *bands]))
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
     handles = [*colouring.handles(), *band_handles(cases.bands), *([_CROSS] if crossed else [])]
-    legend_above(figure, {str(one.get_label()): one for one in handles}, family.name if colouring.handles() else "")
+    style.legend_above(
+        figure, {str(one.get_label()): one for one in handles}, family.name if colouring.handles() else ""
+    )
     colouring.draw_bar(figure, list(axes))
-    letter_panels(axes, titles)
+    style.letter_panels(axes, titles)
     return figure
 
 
@@ -271,24 +265,24 @@ def _draw_line(
     shown: np.ndarray,
     failed: np.ndarray,
     ends: list[np.ndarray],
-    **style,
+    **look,
 ) -> None:
     """A line over the parameter, and its band; points of categories are not joined, nor that of an infinite value."""
     place = positions(across)[across.places[members]]
     order = np.argsort(place, kind="stable")
     few = len(members) <= 40
-    style |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
+    look |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
     columns = [place[order], *(one[order] for one in (shown, *ends))]
     if across.endless:
         last = int(np.isfinite(across.values[members]).sum())
         columns = [np.insert(one, last, np.nan) for one in columns]
     x, y, lower, upper, itself = columns
-    ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | style)
+    ax.plot(x, y, **{"ms": 3.5 if across.numeric else 5} | look)
     if known := int(np.isfinite(lower).sum()):
-        draw_band(ax, x, lower, upper, style["color"], across.numeric and known > 1)
+        draw_band(ax, x, lower, upper, look["color"], across.numeric and known > 1)
     if np.isfinite(itself).any():
         look = ITSELF_STYLE if across.numeric else {"ls": ""}
-        ax.plot(x, itself, marker="D", mfc="w", ms=4, color=style["color"], **look)
+        ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **look)
     if failed.any():
         ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
 

@@ -161,7 +161,7 @@ def test_deformed_line__is_that_of_the_whole_surface(coarse):
     ds = result(displacement=True)
     for one in (ds, ds.drop_vars("gap"), ds.drop_vars("displacement")):
         whole = sections.deformed_surface(one, 1)
-        np.testing.assert_allclose(sections.deformed_line(one, 1, "y", 13), whole.isel(y=13), rtol=1e-12)
+        np.testing.assert_allclose(sections.deformed_surface(one, 1, y=13), whole.isel(y=13), rtol=1e-12)
     np.testing.assert_allclose(sections.deformed_surface(ds, 1), ds["height"] + ds["gap"].isel(time=1), atol=1e-15)
 
 

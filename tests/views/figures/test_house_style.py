@@ -16,7 +16,7 @@ from roughvisc.labels import annotate
 from roughvisc.observables import conductance
 from roughvisc.units import unit_for
 from roughvisc.views import plot
-from roughvisc.views.figures import animate, axes, fields
+from roughvisc.views.figures import animate, fields, style
 
 
 def slid():
@@ -131,16 +131,16 @@ def test_contact__has_one_colour_and_is_named(drawn, name, sample):
     told = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     for ax in figure.axes:
         for outline in ax.findobj(lambda one: one.get_gid() == "contact outline"):
-            assert same_color(outline.get_edgecolor(), axes.CONTACT)
+            assert same_color(outline.get_edgecolor(), style.CONTACT)
             assert outline.get_linestyle() == [(0.0, None)], "solid"
             assert "contact" in told
         for line in ax.lines:
             if line.get_label() == "contact":
-                assert same_color(line.get_color(), axes.CONTACT)
+                assert same_color(line.get_color(), style.CONTACT)
                 assert "contact" in told
         for image in ax.findobj(AxesImage):
             colours = image.to_rgba(image.get_array())
-            marked = np.isclose(colours, [*np.array(axes.matplotlib.colors.to_rgba(axes.CONTACT))]).all(axis=-1)
+            marked = np.isclose(colours, [*np.array(style.matplotlib.colors.to_rgba(style.CONTACT))]).all(axis=-1)
             if marked.any():
                 assert image.get_gid() in ("gap", "flux")
                 assert "contact" in told

@@ -21,8 +21,7 @@ from roughvisc import observables, plot
 from roughvisc.errors import InputError
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.views.figures import animate as animation
-from roughvisc.views.figures import axes, sections
-from roughvisc.views.figures import axes as axes_module
+from roughvisc.views.figures import rows, sections, style
 
 SAMPLES = {
     "creep": made.hertz_creep,
@@ -116,22 +115,22 @@ def test_figures__refuse_many_cases_and_other_things(draw):
 
 
 def test_time_axis__chosen_by_the_data():
-    assert not axes.RowAxis.of(np.linspace(0, 5, 500)).logarithmic
-    assert axes.RowAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
-    assert axes.RowAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
-    assert not axes.RowAxis.of([0.0]).logarithmic
-    assert axes.RowAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
+    assert not rows.RowAxis.of(np.linspace(0, 5, 500)).logarithmic
+    assert rows.RowAxis.of(np.geomspace(1e-3, 1e3, 30)).logarithmic
+    assert rows.RowAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
+    assert not rows.RowAxis.of([0.0]).logarithmic
+    assert rows.RowAxis.of(np.linspace(0, 0.05, 9)).unit.symbol == "ms"
 
 
 def test_spread_frames__first_and_last_and_even():
     times = np.r_[0, np.geomspace(1e-3, 1e3, 499)]
-    frames = axes.spread_frames(times, 4)
+    frames = rows.spread_frames(times, 4)
     assert frames[[0, -1]].tolist() == [0, 499]
     assert len(frames) == 4
     assert np.all(np.abs(np.diff(frames) - 500 / 3) < 20)
-    assert axes.spread_frames(np.linspace(0, 1, 501), 3).tolist() == [0, 250, 500]
-    assert axes.spread_frames([3.0], 4).tolist() == [0]
-    assert axes.spread_frames([1.0, 2.0], 1).tolist() == [1]
+    assert rows.spread_frames(np.linspace(0, 1, 501), 3).tolist() == [0, 250, 500]
+    assert rows.spread_frames([3.0], 4).tolist() == [0]
+    assert rows.spread_frames([1.0, 2.0], 1).tolist() == [1]
 
 
 def test_telling_frames__show_contact_and_its_largest_extent():
@@ -140,20 +139,20 @@ def test_telling_frames__show_contact_and_its_largest_extent():
     area[13] = 2.0
     area[-1] = 1e-4
     ds = xr.Dataset({"contact_area": ("time", area)}, {"time": time})
-    frames = axes.telling_frames(ds, 4)
+    frames = rows.telling_frames(ds, 4)
     assert frames == [3, 7, 13, 15]
-    assert axes.fullest_frame(ds) == 13
-    assert axes.telling_frames(0 * ds, 3) == [0, 10, 20]
-    assert axes.telling_frames(ds.drop_vars("contact_area"), 3) == [0, 10, 20]
-    assert axes.fullest_frame(ds.drop_vars("contact_area")) == axes.fullest_frame(0 * ds) == 20
+    assert rows.fullest_frame(ds) == 13
+    assert rows.telling_frames(0 * ds, 3) == [0, 10, 20]
+    assert rows.telling_frames(ds.drop_vars("contact_area"), 3) == [0, 10, 20]
+    assert rows.fullest_frame(ds.drop_vars("contact_area")) == rows.fullest_frame(0 * ds) == 20
 
 
 def test_frame_at__nearest_time_or_counted_from_the_end():
     times = [0.0, 1.0, 10.0]
-    assert [axes.frame_at(times, t) for t in (0, 0.6, 5.4, 5.6, 99, -1, -3)] == [0, 1, 1, 2, 2, 2, 0]
+    assert [rows.frame_at(times, t) for t in (0, 0.6, 5.4, 5.6, 99, -1, -3)] == [0, 1, 1, 2, 2, 2, 0]
     for wrong in (-4, -0.5, np.nan):
         with pytest.raises(InputError, match="expected a"):
-            axes.frame_at(times, wrong)
+            rows.frame_at(times, wrong)
 
 
 # ---------------------------------------------------------------------------------------------------- histories
@@ -329,7 +328,7 @@ def test_maps__data_scale_and_absent_cells():
     absent = ds["height"].isnull().values.T
     for image in shown:
         assert np.array_equal(np.ma.getmaskarray(image.get_array()), absent)
-        assert tuple(image.get_cmap().get_bad()) == to_rgba(axes.ABSENT)
+        assert tuple(image.get_cmap().get_bad()) == to_rgba(style.ABSENT)
         assert image.axes.get_aspect() == 1.0
         np.testing.assert_allclose(image.get_extent(), [0, 1.2, 0, 0.9])
     assert len({image.get_clim() for image in shown[:3]}) == 1
@@ -596,8 +595,8 @@ def test_maps__contact_too_ragged_for_an_outline_has_a_colour_in_every_frame():
         for image, frame in zip(gaps, (0, -1), strict=True):
             touching = (ds["gap"].isel(time=frame) <= 0).values.T
             colours = image.to_rgba(image.get_array())
-            assert np.all(colours[touching] == to_rgba(axes.CONTACT))
-            assert not np.any(np.all(colours[~touching] == to_rgba(axes.CONTACT), axis=-1))
+            assert np.all(colours[touching] == to_rgba(style.CONTACT))
+            assert not np.any(np.all(colours[~touching] == to_rgba(style.CONTACT), axis=-1))
 
 
 def test_animate__of_a_mirrored_surface_shows_what_was_measured():
@@ -709,7 +708,7 @@ def test_surface__scale_is_not_moved_by_spikes_and_missing_points_are_grey():
     text = figure.get_supxlabel()
     assert "0.16 % of the points are missing (grey)" in text
     assert "0.081 % lie beyond the scale" in text
-    assert to_rgba(axes.ABSENT) == tuple(image.get_cmap().get_bad())
+    assert to_rgba(style.ABSENT) == tuple(image.get_cmap().get_bad())
     shades = image.get_cmap()(np.linspace(0, 1, 256))
     assert np.abs(shades - image.get_cmap().get_bad())[:, :3].max(axis=1).min() > 0.15, "no height has that colour"
     (label,) = [ax.get_ylabel() for ax in figure.axes if "max" in ax.get_ylabel()]
@@ -741,12 +740,12 @@ def test_leakage__lakes_contact_and_channels_are_told_apart():
     assert figure.axes[0].get_title(loc="right") == "closes between 1 and 2 s"
     (image,) = figure.axes[1].images
     colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
-    assert np.allclose(colours[2, 1], to_rgba(axes_module.CONTACT)[:3]), "contact"
-    assert np.allclose(colours[2, 0], to_rgba(axes_module.NO_CONTACT)[:3]), "a lake"
+    assert np.allclose(colours[2, 1], to_rgba(style.CONTACT)[:3]), "contact"
+    assert np.allclose(colours[2, 0], to_rgba(style.NO_CONTACT)[:3]), "a lake"
     assert {"contact", "no flow", "mapped", "kept times"} <= {*told(figure)}
     assert colours[2, 3].min() < 0.5, "the channel"
     closed = plot.leakage(xr.Dataset({"gap": (("time", "x", "y"), gap)}, axes), time=-1)
     (image,) = closed.axes[1].images
     colours = image.to_rgba(image.get_array())[..., :3].transpose(1, 0, 2)
-    assert np.allclose(colours[gap[1] > 0], to_rgba(axes_module.NO_CONTACT)[:3])
-    assert np.allclose(colours[gap[1] == 0], to_rgba(axes_module.CONTACT)[:3])
+    assert np.allclose(colours[gap[1] > 0], to_rgba(style.NO_CONTACT)[:3])
+    assert np.allclose(colours[gap[1] == 0], to_rgba(style.CONTACT)[:3])
