@@ -8,17 +8,21 @@ fields on Dask are worked on frame by frame, lazily unless a docstring says othe
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import xarray as xr
 
+from roughvisc.errors import InputError
 from roughvisc.observables.area_theories import area_by_theory
 from roughvisc.observables.conductance import conductance
 from roughvisc.observables.cycles import cycle_energy
 from roughvisc.observables.densities import gap_distribution, gap_statistics, pressure_distribution
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
-from roughvisc.observables.response import area_growth, history, older_name, secant_stiffness, stiffness, work
+from roughvisc.observables.response import area_growth, history, secant_stiffness, work
 from roughvisc.observables.spots import cluster_areas, clusters, contact, percolation
-from roughvisc.observables.tables import asked
 
 __all__ = [
     "area_by_theory",
@@ -38,13 +42,16 @@ __all__ = [
     "percolation",
     "pressure_distribution",
     "secant_stiffness",
-    "stiffness",
     "work",
 ]
 
 
 def __dir__() -> list[str]:
     return __all__
+
+
+#: Table of ``[observe]`` -> what derives it from a result; the keys of the table are its keyword arguments.
+OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conductance": conductance}
 
 
 def observe(dataset: xr.Dataset) -> xr.Dataset:
@@ -66,7 +73,7 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the cells of the grid are not equal.
     """
-    found = []
+    found: list[xr.Dataset] = []
     if "pressure" in dataset or "gap" in dataset:
         found += [clusters(dataset), percolation(dataset)]
     if "gap" in dataset:
@@ -74,6 +81,34 @@ def observe(dataset: xr.Dataset) -> xr.Dataset:
     if "contact_area" in dataset:
         found.append(area_growth(dataset))
     if "force" in dataset and "approach" in dataset:
-        secant = secant_stiffness(dataset)
-        found += [secant, older_name(secant), work(dataset)]
+        found += [secant_stiffness(dataset), work(dataset)]
     return xr.merge(found, compat="equals", join="exact")
+
+
+def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None = None) -> xr.Dataset:
+    """Compute the observables that the study of a result requests.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result.
+    observe : mapping, optional
+        Name of each observable -> its keyword arguments. Default: those of ``[observe]`` in the study, as the
+        attribute ``case`` states it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Only the new variables; none if nothing is requested.
+
+    Raises
+    ------
+    InputError
+        If an observable is unknown, or as in its own function.
+    """
+    if observe is None:
+        observe = json.loads(dataset.attrs.get("case", "{}")).get("observe", {})
+    if unknown := set(observe) - set(OBSERVABLES):
+        raise InputError(f"observe: {min(unknown)!r} is no observable: expected some of {', '.join(OBSERVABLES)}")
+    found = [OBSERVABLES[name](dataset, **arguments) for name, arguments in observe.items()]
+    return xr.merge(found, compat="equals", join="exact") if found else xr.Dataset()

@@ -147,7 +147,7 @@ def _sides_meet(dataset: xr.Dataset, sides: str | None) -> bool:
         raise InputError(f"sides is {sides!r}: expected 'closed' or 'periodic'")
     if sides == "periodic" and boundary != "periodic":
         raise InputError(f"sides is 'periodic' and the result's boundary is {boundary!r}: expected 'closed'")
-    return (sides or ("periodic" if boundary == "periodic" else "closed")) == "periodic"
+    return boundary == "periodic" and sides != "closed"
 
 
 def _flow(gap: np.ndarray, cells: tuple[float, float], wrap: bool) -> Flow:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import xarray as xr
 
@@ -42,14 +40,12 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
 
 def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:
     """Derivative along a path: second order where ``over`` runs on, the last secant where it turns or starts."""
-    slope = np.full(len(over), np.nan)
     if len(over) < 2:
-        return slope
+        return np.full(len(over), np.nan)
     step = np.diff(over)
     moving = np.abs(step) > 1e-12 * np.max(np.abs(over), initial=0.0, where=np.isfinite(over))
     secant = np.where(moving, np.diff(value) / np.where(moving, step, 1.0), np.nan)
-    slope[1:] = secant
-    slope[0] = secant[0]
+    slope = np.concatenate([secant[:1], secant])
     before, after = step[:-1], step[1:]
     runs_on = moving[:-1] & moving[1:] & (before * after > 0)
     total = np.where(runs_on, before + after, 1.0)
@@ -112,38 +108,6 @@ def secant_stiffness(dataset: xr.Dataset) -> xr.Dataset:
     """
     need_history(dataset, "force", "approach")
     return describe(xr.Dataset({"secant_stiffness": along_time(_slope, dataset["force"], dataset["approach"])}))
-
-
-def stiffness(dataset: xr.Dataset) -> xr.Dataset:
-    """:func:`secant_stiffness` under its older name, which the second minor release from now may drop.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``contact_stiffness`` over time. [N/m]
-
-    Raises
-    ------
-    InputError
-        If the result holds no force or no approach.
-    """
-    warnings.warn(
-        "observables.stiffness is now secant_stiffness, and its variable contact_stiffness is secant_stiffness: it is "
-        "the slope of the history; incremental_stiffness is that of the contact at a time",
-        FutureWarning,
-        stacklevel=2,
-    )
-    return older_name(secant_stiffness(dataset))
-
-
-def older_name(dataset: xr.Dataset) -> xr.Dataset:
-    """The secant stiffness as the variable that it was before."""
-    return describe(dataset.rename(secant_stiffness="contact_stiffness"))
 
 
 def work(dataset: xr.Dataset) -> xr.Dataset:

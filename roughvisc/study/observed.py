@@ -12,7 +12,7 @@ import dask
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.observables.tables import asked
+from roughvisc.observables import asked
 from roughvisc.study.execution.cluster import has_other_versions
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.execution.single import default_client

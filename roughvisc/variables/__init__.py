@@ -394,7 +394,6 @@ VARIABLES: dict[str, Variable] = {
         "slope of force over approach along the history; "
         "includes the creep between kept times; missing while the approach stands still",
     ),
-    "contact_stiffness": Variable(_SERIES, "N/m", "older name of secant_stiffness"),
     "trapezoidal_work": Variable(
         _SERIES,
         "J",

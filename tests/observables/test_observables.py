@@ -219,16 +219,6 @@ def test_secant_stiffness__turning_and_standing_still():
     assert np.isnan(observables.secant_stiffness(ds.isel(time=[0]))["secant_stiffness"]).all()
 
 
-def test_stiffness__warns_and_is_what_it_was():
-    ds = histories(np.arange(3), force=[0.0, 1.0, 4.0], approach=[0.0, 1.0, 2.0])
-    with pytest.warns(FutureWarning, match="now secant_stiffness"):
-        older = observables.stiffness(ds)["contact_stiffness"]
-    newer = observables.secant_stiffness(ds)["secant_stiffness"]
-    assert np.array_equal(older, newer)
-    assert older.attrs["long_name"] == "older name of secant_stiffness"
-    assert np.array_equal(observables.observe(ds)["contact_stiffness"], newer)
-
-
 def test_work__of_a_closed_loop_is_the_area_in_it():
     ds = histories(np.arange(5), force=[0.0, 0.0, 2.0, 2.0, 0.0], approach=[0.0, 3.0, 3.0, 0.0, 0.0])
     np.testing.assert_allclose(observables.work(ds)["trapezoidal_work"], [0.0, 0.0, 0.0, -6.0, -6.0])
