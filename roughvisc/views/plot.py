@@ -34,9 +34,8 @@ if TYPE_CHECKING:  # for editors; at run time each is imported when it is first 
     from roughvisc.views.figures.surfaces import surface
     from roughvisc.views.figures.trade import trade
     from roughvisc.views.figures.transport import conductance, leakage
-    from roughvisc.views.sweep_figures.case_histories import histories_of_cases
+    from roughvisc.views.sweep_figures.curves import friction_of_cases, histories_of_cases
     from roughvisc.views.sweep_figures.files import save_sweep_figures
-    from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
     from roughvisc.views.sweep_figures.sweeps import sweep
 
 __all__ = [
@@ -65,23 +64,22 @@ __all__ = [
     "trade",
 ]
 
-#: Modules that the figures are imported from -> their figures, and what tells whether one of them says anything.
+#: Modules that the figures are imported from when one is first used -> their figures.
 _MODULES = {
     "figures.animate": ("animate", "animation"),
     "figures.budget": ("budget",),
     "figures.diagnostics": ("diagnostics",),
-    "figures.distributions": ("contact_clusters", "distributions", "has_clusters"),
+    "figures.distributions": ("contact_clusters", "distributions"),
     "figures.fields": ("maps",),
     "figures.friction": ("friction", "friction_against_distance"),
-    "figures.histories": ("area_against_load", "has_loop", "history", "hysteresis"),
+    "figures.histories": ("area_against_load", "history", "hysteresis"),
     "figures.sections": ("section",),
     "figures.stability": ("stability_map",),
     "figures.surfaces": ("surface",),
     "figures.trade": ("trade",),
     "figures.transport": ("conductance", "leakage"),
-    "sweep_figures.case_histories": ("histories_of_cases",),
+    "sweep_figures.curves": ("friction_of_cases", "histories_of_cases"),
     "sweep_figures.files": ("save_sweep_figures",),
-    "sweep_figures.friction_curves": ("friction_of_cases",),
     "sweep_figures.sweeps": ("sweep",),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
@@ -92,8 +90,12 @@ def __getattr__(name: str) -> Any:
         raise AttributeError("rv.plot.friction_maps is no more: write rv.plot.maps(ds), where times= takes speeds too")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = getattr(import_module(f"roughvisc.views.{_HOMES[name]}"), name)
+    globals()[name] = _imported(_HOMES[name], name)
     return globals()[name]
+
+
+def _imported(module: str, name: str) -> Any:
+    return getattr(import_module(f"roughvisc.views.{module}"), name)
 
 
 def __dir__() -> list[str]:
@@ -117,18 +119,11 @@ FIGURES: dict[str, tuple[Any, tuple[str, ...], tuple[str, ...]]] = {
     "diagnostics": ("diagnostics", (), ("iterations", "convolutions", "stated_error")),
 }
 
-#: Those of them that are drawn only where they say something.
-TELLING: dict[str, Any] = {
-    "clusters": "has_clusters",
-    "hysteresis": "has_loop",
-}
+#: Those of them that are drawn only where they say something, and what tells that: module and function.
+TELLING = {"clusters": ("figures.distributions", "has_clusters"), "hysteresis": ("figures.histories", "has_loop")}
 
 #: What is drawn unless more is asked for, of each line the first that a result allows.
 DEFAULT = (("friction", "history"), ("maps",), ("leakage",), ("conductance",))
-
-
-def _function(named: Any) -> Any:
-    return named if callable(named) else globals().get(named) or __getattr__(named)
 
 
 def allowed_figures(dataset: xr.Dataset) -> list[str]:
@@ -161,10 +156,12 @@ def figures_of(dataset: xr.Dataset, leave: str = "", *, every: bool = True) -> I
         False: only the few of :func:`default_figures`; others are not imported.
     """
     for name in allowed_figures(dataset) if every else default_figures(dataset):
-        if name == leave or (name in TELLING and not _function(TELLING[name])(dataset)):
+        if name == leave or (name in TELLING and not _imported(*TELLING[name])(dataset)):
             continue
+        draw = FIGURES[name][0]
+        draw = draw if callable(draw) else __getattr__(draw)
         options = {"time": float(rows_of(dataset)[fullest_frame(dataset)])} if name == "section" else {}
-        yield name, _function(FIGURES[name][0])(dataset, **options)
+        yield name, draw(dataset, **options)
 
 
 def save_figures(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any
 
@@ -209,12 +209,14 @@ def cases_of(results: Any) -> Cases:
         If they are something else, or one case only.
     """
     if isinstance(results, xr.DataTree):
-        members = [_histories(whole_of(node.to_dataset())) for node in results.children.values()]
+        of_rows = [("step",), *((axis,) for axis in AXES)]
+        found = [whole_of(node.to_dataset()) for node in results.children.values()]
+        members = [one[[name for name in one.data_vars if one[name].dims in of_rows]].load() for one in found]
         scalars = [str(name) for member in members for name in member.coords if not member[name].dims]
         names = dict.fromkeys(name for name in scalars if name not in _NO_PARAMETERS)
-        columns = {name: [member[name] for member in members if name in member.coords] for name in names}
-        columns = {name: found for name, found in columns.items() if len(found) == len(members)}
-        parameters = {_key(found[0]): (np.array([one.item() for one in found]), found[0]) for found in columns.values()}
+        columns = [[member[name] for member in members if name in member.coords] for name in names]
+        of_all = [column for column in columns if len(column) == len(members)]
+        parameters = {_key(column[0]): (np.array([one.item() for one in column]), column[0]) for column in of_all}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
         results = whole_of(results)
         over = [dim for dim in ("case", REALISATION) if dim in results.dims]
@@ -237,7 +239,11 @@ def cases_of(results: Any) -> Cases:
         expect_current_names(member)
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
-    members = [_finite(member) for member in members]
+    # what is infinite, the conductance of full contact, has no place on an axis
+    members = [
+        one.assign({name: one[name].where(np.isfinite(one[name])) for name in CONDUCTANCES if name in one})
+        for one in members
+    ]
     numbers = parameters[REALISATION][0] if REALISATION in parameters else np.full(len(members), np.nan)
     settings = {key: found for key, found in parameters.items() if key not in (REALISATION, *DRAWN)}
     if not np.isfinite(numbers).any():
@@ -254,29 +260,17 @@ def cases_of(results: Any) -> Cases:
             one, bands[group] = pooled([members[place] for place in mine], [int(numbers[place]) for place in mine])
         together.append(one)
     first = [mine[0] for mine in groups.values()]
-    found = [
-        (key, values[first], str(source.attrs.get("units") or unit_of(key)))
+    varied = [
+        Parameter(key, _numbers(values[first]), str(source.attrs.get("units") or unit_of(key)), "")
         for key, (values, source) in settings.items()
     ]
-    return Cases(together, list(_independent(found)), bands)
+    return Cases(together, _independent(varied), bands)
 
 
 def _key(coordinate: xr.DataArray) -> str:
     """Dotted key of a varied parameter, which its identifier does not tell."""
     said = str(coordinate.attrs.get("long_name", ""))
     return said if identifier(said) == identifier(str(coordinate.name)) else str(coordinate.name)
-
-
-def _histories(dataset: xr.Dataset) -> xr.Dataset:
-    """What a case has over its axis, and over its steps, in memory."""
-    held = [name for name in dataset.data_vars if dataset[name].dims in (("step",), *((axis,) for axis in AXES))]
-    return dataset[held].load()
-
-
-def _finite(member: xr.Dataset) -> xr.Dataset:
-    """A case in which what is infinite, the conductance of full contact, is missing: it has no place on an axis."""
-    known = {name: member[name].where(np.isfinite(member[name])) for name in CONDUCTANCES if name in member}
-    return member.assign(known) if known else member
 
 
 def middle_of_decades(values: np.ndarray) -> np.ndarray:
@@ -296,18 +290,16 @@ def _numbers(values: np.ndarray) -> np.ndarray:
     return np.array([one[0] for one in read], dtype=float) if alone else values
 
 
-def _independent(found: Sequence[tuple[str, np.ndarray, str]]) -> Iterator[Parameter]:
-    """Parameters that vary, without those that follow one to one from another before them."""
+def _independent(varied: Sequence[Parameter]) -> list[Parameter]:
+    """Parameters that vary, by their names, without those that follow one to one from another before them."""
     kept: list[Parameter] = []
-    for key, values, si in found:
-        one = Parameter(key, _numbers(values), si, "")
+    for one in varied:
         pairs = [len(set(zip(one.places, other.places, strict=True))) for other in kept]
         alike = any(p == len(one.levels) == len(o.levels) for p, o in zip(pairs, kept, strict=True))
         if len(one.levels) > 1 and not alike:
             kept.append(one)
     names = names_of([one.key for one in kept])
-    for one in kept:
-        yield Parameter(one.key, one.values, one.si, names[one.key])
+    return [replace(one, name=names[one.key]) for one in kept]
 
 
 def combined(others: list[Parameter]) -> Parameter:

@@ -18,10 +18,9 @@ from roughvisc.study.storage.store import whole_result
 from roughvisc.variables.axes import AXES
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.files import write_figure
-from roughvisc.views.sweep_figures.case_histories import histories_of_cases
 from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of
-from roughvisc.views.sweep_figures.friction_curves import friction_of_cases
+from roughvisc.views.sweep_figures.curves import friction_of_cases, histories_of_cases
 from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of
 
 

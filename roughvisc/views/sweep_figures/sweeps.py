@@ -1,23 +1,28 @@
-"""Figures of sweeps: a quantity against what was varied, as lines or as a map."""
+"""A quantity against what was varied in a sweep, as lines or as a map."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from operator import attrgetter
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, NullFormatter
 
 from roughvisc.errors import InputError
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, Unit, quantities
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures import style
-from roughvisc.views.figures.rows import RowAxis, frame_at, rows_of, spread_frames
+from roughvisc.views.figures.rows import RowAxis, frame_at, frames_at, rows_of, spread_frames
+from roughvisc.views.sweep_figures.case_text import ENDLESS
 from roughvisc.views.sweep_figures.cases import (
     Cases,
     Parameter,
@@ -27,9 +32,8 @@ from roughvisc.views.sweep_figures.cases import (
     quantity_unit,
     without_zeros,
 )
-from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
-from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
-from roughvisc.views.sweep_figures.maps import draw_maps, positions, set_parameter_axis
+from roughvisc.views.sweep_figures.colouring import Colouring, even_in_log, readable_ticks
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, band_handles, draw_band
 
 #: Parameters with so many values or more make a map by default.
 _MAP_FROM = 4
@@ -90,26 +94,63 @@ def sweep(
     if as_map and len(across) < 2:
         raise InputError(f"a map needs two parameters that vary: found {', '.join(p.key for p in cases.parameters)}")
     frames = _frames(cases, quantity, times, one=len(cases.parameters) == 1)
-    values = _at_frames(cases.members, quantity, frames)
-    bands = [_at_frames([None if b is None else end(b) for b in cases.bands], quantity, frames) for end in _ENDS]
     titles = _titles(cases, frames)
     if times is None and len(frames) == 1 and not _all_last(cases, frames[0]):
         titles = [f"{titles[0]}, where the cases differ most"]
+    ends = [[None if band is None else getattr(band, end) for band in cases.bands] for end in _ENDS]
+    drawn = _Drawn(
+        cases,
+        quantity,
+        titles,
+        _at_frames(cases.members, quantity, frames),
+        [_at_frames(datasets, quantity, frames) for datasets in ends],
+        np.array([_failed(cases, row) for row in frames]),
+    )
     if as_map:
-        return draw_maps(cases, across[:2], quantity, values, titles)
-    if len(cases.parameters) == 1:
-        return _lines_by_time(cases, across[0], quantity, values, bands, titles, frames)
-    return _families(cases, across[0], quantity, values, bands, titles, frames)
+        return _draw_maps(drawn, *across[:2])
+    return (_lines_by_time if len(cases.parameters) == 1 else _families)(drawn, across[0])
 
-
-# ------------------------------------------------------------------------------------------------ what is drawn
 
 #: Both ends of a band, and the measured surface itself.
-_ENDS: tuple[Callable[[Band], xr.Dataset | None], ...] = (
-    attrgetter("lower"),
-    attrgetter("upper"),
-    attrgetter("itself"),
-)
+_ENDS = ("lower", "upper", "itself")
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What is drawn of a quantity.
+
+    Attributes
+    ----------
+    cases : Cases
+        What it is of.
+    quantity : str
+        Its name.
+    titles : list of str
+        What tells its times.
+    values : ndarray, shape (times, cases)
+        [SI]
+    bands : list of ndarray
+        The same of both ends of a band and of the measured surface itself; missing where there is none.
+    failed : ndarray of bool, shape (times, cases)
+        Whether a value is of a step that did not converge.
+    """
+
+    cases: Cases
+    quantity: str
+    titles: list[str]
+    values: np.ndarray
+    bands: list[np.ndarray]
+    failed: np.ndarray
+
+    @property
+    def unit(self) -> Unit:
+        """Unit to show values in."""
+        return quantity_unit(self.cases, self.quantity, self.values)
+
+    @property
+    def label(self) -> str:
+        """Label of an axis of the values."""
+        return label_of(self.cases, self.quantity, self.unit)
 
 
 def _at_frames(members: Sequence[xr.Dataset | None], quantity: str, frames: list[list[int]]) -> np.ndarray:
@@ -143,10 +184,8 @@ def _frames(cases: Cases, quantity: str, times: float | Sequence[float] | None, 
     """Frame of every case, for each time that is drawn."""
     clocks = [rows_of(member).values for member in cases.members]
     if times is not None:
-        asked = np.atleast_1d(np.asarray(times, dtype=float)).ravel()
-        if not 0 < asked.size <= _MOST_PANELS:
-            raise InputError(f"{asked.size} times to draw: choose 1 to {_MOST_PANELS}")
-        return [[frame_at(clock, float(time)) for clock in clocks] for time in asked]
+        of_each = [frames_at(clock, times, _MOST_PANELS) for clock in clocks]
+        return [list(row) for row in zip(*of_each, strict=True)]
     shared = all(np.array_equal(clock, clocks[0]) for clock in clocks)
     if not (one and shared):
         return [telling_frames_of(cases, quantity)]
@@ -194,85 +233,51 @@ def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
 # ------------------------------------------------------------------------------------------------------- lines
 
 
-def _lines_by_time(
-    cases: Cases,
-    across: Parameter,
-    quantity: str,
-    values: np.ndarray,
-    bands: list[np.ndarray],
-    titles: list[str],
-    frames: list[list[int]],
-) -> Figure:
+def _lines_by_time(drawn: _Drawn, across: Parameter) -> Figure:
     """One parameter: a line for each time."""
     figure = style.new_figure(4.2, 3.2)
     ax = figure.add_subplot()
-    unit = quantity_unit(cases, quantity, values)
-    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(values)))
-    for number, (row, colour, title, frame) in enumerate(zip(values, shades, titles, frames, strict=True)):
-        members = np.arange(len(row))
-        ends = [unit(one[number]) for one in bands]
-        _draw_line(ax, across, members, unit(row), _failed(cases, frame), ends, color=colour, label=title)
-    _finish(ax, cases, across, quantity, np.array([values, *bands]))
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.8, len(drawn.values)))
+    for number, (colour, title) in enumerate(zip(shades, drawn.titles, strict=True)):
+        _draw_line(ax, drawn, across, number, slice(None), color=colour, label=title)
+    _finish(ax, drawn, across)
     named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    style.legend_above(figure, named | {str(one.get_label()): one for one in band_handles(cases.bands)})
+    style.legend_above(figure, named | {str(one.get_label()): one for one in band_handles(drawn.cases.bands)})
     return figure
 
 
-def _families(
-    cases: Cases,
-    across: Parameter,
-    quantity: str,
-    values: np.ndarray,
-    bands: list[np.ndarray],
-    titles: list[str],
-    frames: list[list[int]],
-) -> Figure:
+def _families(drawn: _Drawn, across: Parameter) -> Figure:
     """Several parameters: a panel for each time, in it a line for each combination of the others."""
-    family = combined([one for one in cases.parameters if one.key != across.key])
-    colouring = Colouring(family)
-    figure = style.new_figure(1.2 + 3.0 * len(values), 3.2 + 0.14 * len(colouring.handles()) / (1 + len(values)))
-    axes = figure.subplots(1, len(values), sharey=True, squeeze=False)[0]
-    unit = quantity_unit(cases, quantity, values)
-    crossed = False
-    for number, (ax, row, frame) in enumerate(zip(axes, values, frames, strict=True)):
-        failed = _failed(cases, frame)
-        crossed |= bool(failed.any())
+    family = combined([one for one in drawn.cases.parameters if one.key != across.key])
+    colouring, times = Colouring(family), len(drawn.values)
+    named = colouring.handles()
+    figure = style.new_figure(1.2 + 3.0 * times, 3.2 + 0.14 * len(named) / (1 + times))
+    axes = figure.subplots(1, times, sharey=True, squeeze=False)[0]
+    for number, ax in enumerate(axes):
         for level in range(len(family.levels)):
-            members = np.flatnonzero(family.places == level)
             nested = 1 - 0.55 * level / max(1, len(family.levels) - 1)  # so that none hides another that it lies on
             look = {"color": colouring.colour(level), "lw": 2.3 * nested, "ms": 7.0 * nested}
-            ends = [unit(one[number][members]) for one in bands]
-            _draw_line(ax, across, members, unit(row[members]), failed[members], ends, **look)
-        _finish(ax, cases, across, quantity, np.array([values, *bands]))
+            _draw_line(ax, drawn, across, number, np.flatnonzero(family.places == level), **look)
+        _finish(ax, drawn, across)
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
-    handles = [*colouring.handles(), *band_handles(cases.bands), *([_CROSS] if crossed else [])]
-    style.legend_above(
-        figure, {str(one.get_label()): one for one in handles}, family.name if colouring.handles() else ""
-    )
+    handles = [*named, *band_handles(drawn.cases.bands), *([_CROSS] if drawn.failed.any() else [])]
+    style.legend_above(figure, {str(one.get_label()): one for one in handles}, family.name if named else "")
     colouring.draw_bar(figure, list(axes))
-    style.letter_panels(axes, titles)
+    style.letter_panels(axes, drawn.titles)
     return figure
 
 
 _CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged")
 
 
-def _draw_line(
-    ax: Axes,
-    across: Parameter,
-    members: np.ndarray,
-    shown: np.ndarray,
-    failed: np.ndarray,
-    ends: list[np.ndarray],
-    **look,
-) -> None:
+def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: Any, **look) -> None:
     """A line over the parameter, and its band; points of categories are not joined, nor that of an infinite value."""
-    place = positions(across)[across.places[members]]
+    place, failed = positions(across)[across.places[members]], drawn.failed[time][members]
+    shown, *ends = (drawn.unit(one[time][members]) for one in (drawn.values, *drawn.bands))
     order = np.argsort(place, kind="stable")
-    few = len(members) <= 40
-    look |= {"marker": "o" if few else "", "ls": "-" if across.numeric else ""}
-    columns = [place[order], *(one[order] for one in (shown, *ends))]
+    look |= {"marker": "o" if len(place) <= 40 else "", "ls": "-" if across.numeric else ""}
+    columns = [one[order] for one in (place, shown, *ends)]
     if across.endless:
         last = int(np.isfinite(across.values[members]).sum())
         columns = [np.insert(one, last, np.nan) for one in columns]
@@ -281,16 +286,15 @@ def _draw_line(
     if known := int(np.isfinite(lower).sum()):
         draw_band(ax, x, lower, upper, look["color"], across.numeric and known > 1)
     if np.isfinite(itself).any():
-        look = ITSELF_STYLE if across.numeric else {"ls": ""}
-        ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **look)
+        of_itself = ITSELF_STYLE if across.numeric else {"ls": ""}
+        ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **of_itself)
     if failed.any():
         ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
 
 
-def _finish(ax: Axes, cases: Cases, across: Parameter, quantity: str, values: np.ndarray) -> None:
+def _finish(ax: Axes, drawn: _Drawn, across: Parameter) -> None:
     """Scales, ticks and labels of a panel of lines."""
-    unit = quantity_unit(cases, quantity, values)
-    shown = unit(values)
+    shown = drawn.unit(np.array([drawn.values, *drawn.bands]))
     shown = shown[np.isfinite(shown)]
     set_parameter_axis(ax.xaxis, across)
     low, high = (shown.min(), shown.max()) if shown.size else (0.0, 1.0)
@@ -303,5 +307,96 @@ def _finish(ax: Axes, cases: Cases, across: Parameter, quantity: str, values: np
         span = (top - bottom) or 1.0
         ax.set_ylim(bottom - (0.05 * span if bottom < 0 else 0.0), top + 0.1 * span)
     readable_ticks(ax.yaxis, *ax.get_ylim(), logarithmic)
-    ax.set_ylabel(label_of(cases, quantity, unit))
+    ax.set_ylabel(drawn.label)
     ax.grid(color="0.9", lw=0.5)
+
+
+# -------------------------------------------------------------------------------------------------------- maps
+
+
+def _draw_maps(drawn: _Drawn, across: Parameter, up: Parameter) -> Figure:
+    """Two parameters: a panel for each time, in it a cell for each combination."""
+    cases = drawn.cases
+    if len(set(zip(across.places, up.places, strict=True))) < len(cases.members):
+        more = ", ".join(one.key for one in cases.parameters if one not in (across, up))
+        raise InputError(f"several cases lie in one cell of the map: choose among {more} first, or use kind='lines'")
+    shown = drawn.unit(drawn.values)
+    known = shown[np.isfinite(shown)]
+    low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
+    logarithmic = low > 0 and high >= 30 * low
+    norm = LogNorm(low, high) if logarithmic else Normalize(low, high if high > low else low + 1)
+    figure = style.new_figure(1.4 + 2.6 * len(shown), 2.9)
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    look: dict[str, Any] = {"cmap": matplotlib.colormaps["viridis"].with_extremes(bad=style.ABSENT), "norm": norm}
+    for ax, row in zip(panels, shown, strict=True):
+        cells = np.full((len(up.levels), len(across.levels)), np.nan)
+        cells[up.places, across.places] = row
+        mesh = ax.pcolormesh(_borders_between(across), _borders_between(up), np.ma.masked_invalid(cells), **look)
+        set_parameter_axis(ax.xaxis, across)
+        set_parameter_axis(ax.yaxis, up)
+        ax.tick_params(direction="out", which="both")
+        ax.label_outer(remove_inner_ticks=False)
+        ax.set_xlabel(across.label)
+    bar = figure.colorbar(mesh, ax=list(panels), pad=0.02, aspect=22)
+    bar.set_label(drawn.label)
+    bar.outline.set_linewidth(0.6)
+    bar.minorticks_off()
+    readable_ticks(bar.ax.yaxis, *mesh.get_clim(), logarithmic)
+    style.letter_panels(panels, drawn.titles)
+    return figure
+
+
+def positions(parameter: Parameter) -> np.ndarray:
+    """Where the levels of a parameter lie on its axis; an infinite one a step beyond the others."""
+    if not parameter.numeric:
+        return np.arange(len(parameter.levels), dtype=float)
+    places = parameter.unit(parameter.levels)
+    if parameter.endless:
+        last, before = places[-2], places[-3] if len(places) > 2 else places[-2] / 2
+        places[-1] = last * last / before if before > 0 else math.inf
+        if not even_in_log(places):
+            places[-1] = 2 * last - before
+    return places
+
+
+def _borders_between(parameter: Parameter) -> np.ndarray:
+    """Borders between the cells of a map, half way between the levels on the scale of the axis."""
+    places = positions(parameter)
+    logarithmic = parameter.numeric and even_in_log(places)
+    places = np.log(places) if logarithmic else places
+    middle = (places[1:] + places[:-1]) / 2
+    borders = np.concatenate([[2 * places[0] - middle[0]], middle, [2 * places[-1] - middle[-1]]])
+    return np.exp(borders) if logarithmic else borders
+
+
+def set_parameter_axis(axis: Axis, parameter: Parameter) -> None:
+    """Scale, limits, ticks and label of an axis of a parameter."""
+    places, count = positions(parameter), len(parameter.levels)
+    horizontal = axis.axis_name == "x"
+    logarithmic = parameter.numeric and even_in_log(places)
+    set_limits = axis.axes.set_xlim if horizontal else axis.axes.set_ylim
+    if logarithmic:
+        (axis.axes.set_xscale if horizontal else axis.axes.set_yscale)("log")
+    borders = _borders_between(parameter)
+    set_limits(borders[0], borders[-1])
+    if parameter.numeric:
+        scaled = np.log(places) if logarithmic else places
+        if parameter.endless or (count <= 6 and np.diff(scaled).min() > 0.11 * np.ptp(scaled)):
+            beyond = places[-1] if parameter.endless else math.inf
+            step = -(-count // 6)
+            axis.set_major_locator(FixedLocator(places[(count - 1) % step :: step]))
+            axis.set_major_formatter(lambda value, _: ENDLESS if value == beyond else f"{value:.4g}")
+            axis.set_minor_locator(FixedLocator([]))
+            axis.set_minor_formatter(NullFormatter())
+        else:
+            readable_ticks(axis, places[0], places[-1], logarithmic)
+    else:
+        step = -(-count // 25)
+        texts = parameter.texts()[::step]
+        axis.set_ticks(places[::step], labels=texts)
+        if horizontal and sum(map(len, texts)) > 34:
+            for label in axis.get_ticklabels():
+                label.set(rotation=30 if len(texts) <= 6 else 90, ha="right", rotation_mode="anchor")
+                label.set_va("top" if len(texts) <= 6 else "center")
+        axis.axes.tick_params(axis=axis.axis_name, length=0)
+    axis.set_label_text(parameter.label)

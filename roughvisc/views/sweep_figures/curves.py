@@ -1,4 +1,4 @@
-"""Histories of all cases of a sweep coloured by what was varied."""
+"""A curve of every case of a sweep, coloured by what was varied: histories, and friction against speed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from roughvisc.units import Unit
+from roughvisc.errors import InputError
+from roughvisc.units import Unit, unit_for
+from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES
+from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures import style
 from roughvisc.views.figures.histories import steps_of
 from roughvisc.views.figures.rows import RowAxis, rows_of
@@ -22,6 +25,7 @@ from roughvisc.views.sweep_figures.cases import (
     cases_of,
     combined,
     label_of,
+    middle_of_decades,
     named_texts,
     quantity_unit,
     without_zeros,
@@ -144,11 +148,6 @@ def _line(member: xr.Dataset, quantity: str) -> xr.DataArray:
     return line.copy(data=without_zeros(quantity, line.values))
 
 
-def _numbered(count: int) -> Parameter:
-    """Cases that nothing tells apart, by their number."""
-    return Parameter("case", np.arange(1, count + 1), "", "Case")
-
-
 def _limits(panels: list[Axes], bands: np.ndarray) -> None:
     """Linear from zero, or logarithmic where all that is drawn is positive and spans two decades; for all alike."""
     ax = panels[0]  # the others share its axis
@@ -165,3 +164,88 @@ def _limits(panels: list[Axes], bands: np.ndarray) -> None:
         span = (top - bottom) or 1.0
         ax.set_ylim(bottom - 0.05 * span, top + 0.12 * span)
     readable_ticks(ax.yaxis, *ax.get_ylim(), logarithmic)
+
+
+def _numbered(count: int) -> Parameter:
+    """Cases that nothing tells apart, by their number."""
+    return Parameter("case", np.arange(1, count + 1), "", "Case")
+
+
+# ---------------------------------------------------------------------------------------------------- friction
+
+_FRICTION = ("friction_coefficient", "contact_fraction")
+_OPEN = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4, label="not converged")
+
+
+@style.apply
+def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
+    """Friction coefficient and contact area over the nominal one of every case, against the logarithm of the speed.
+
+    Lines are coloured by what was varied. Speeds that did not converge are open circles. Of realisations the mean is
+    drawn, the band in which 95 % of patches lie and, of a scan, the scan itself.
+
+    Parameters
+    ----------
+    results : xarray.Dataset or xarray.DataTree
+        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives of a study of friction; of a tree the
+        speeds may differ.
+    reduced : bool
+        Against the speed times the shift factor of the material's temperature, ``a_T V``: curves of several
+        temperatures then fall on one master curve.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the results are no sweep of friction, or no temperature is stated where `reduced` asks for it.
+    """
+    cases = cases_of(results)
+    over = "reduced_speed" if reduced else "speed"
+    for name in (*_FRICTION, over):
+        if not all(name in member.variables and member[name].dims == ("speed",) for member in cases.members):
+            raise InputError(f"expected results of friction, with {name!r} over the speed in every case")
+    colouring = Colouring(combined(cases.parameters or [_numbered(len(cases.members))]))
+    speeds = np.concatenate([member[over].values for member in cases.members])
+    across = unit_for(middle_of_decades(speeds), "m/s")
+    handles: list[Artist] = [*colouring.handles()] if len(colouring.parameter.levels) > 1 else []
+    figure = style.new_figure(6.6, 2.9 + 0.12 * len(handles))
+    panels = figure.subplots(1, 2)
+    settled = [
+        _draw_friction(panels, member, band, over, across, colouring.colour(int(place)))
+        for member, band, place in zip(cases.members, cases.bands, colouring.parameter.places, strict=True)
+    ]
+    for ax, name in zip(panels, _FRICTION, strict=True):
+        ax.set_xscale("log")
+        ax.set_ylim(bottom=0)
+        ax.set_xlabel(across.label("Reduced speed $a_T V$" if reduced else SLIDING["speed"].label))
+        ax.set_ylabel(SLIDING[name].label)
+        ax.grid(color="0.9", lw=0.5)
+    style.letter_panels(list(panels))
+    title = colouring.parameter.name if handles else ""
+    handles += band_handles(cases.bands) + ([] if all(settled) else [_OPEN])
+    style.legend_above(figure, {str(one.get_label()): one for one in handles}, title)
+    colouring.draw_bar(figure, list(panels))
+    return figure
+
+
+def _draw_friction(
+    panels: list[Axes], member: xr.Dataset, band: Band | None, over: str, across: Any, colour: Any
+) -> bool:
+    """One case in both panels; whether all of it converged."""
+    ordered = member.sortby("speed")
+    speed, settled = across(ordered[over].values), ordered["status"].values != NOT_CONVERGED
+    for ax, name in zip(panels, _FRICTION, strict=True):
+        values = ordered[name].values
+        if band is not None:
+            lower, upper = (one.sortby("speed")[name].values for one in (band.lower, band.upper))
+            draw_band(ax, speed, lower, upper, colour)
+        if band is not None and band.itself is not None:
+            itself = band.itself.sortby("speed")
+            ax.plot(across(itself[over].values), itself[name].values, color=colour, **ITSELF_STYLE)
+        ax.plot(speed, values, "-", color=colour)
+        ax.plot(speed[settled], values[settled], "o", ms=2.5, color=colour)
+        ax.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)
+    return bool(settled.all())
