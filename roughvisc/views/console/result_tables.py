@@ -41,6 +41,7 @@ def result_table(dataset: xr.Dataset) -> Group:
     axis = AXES[axis_of(dataset)]
     row = dataset.isel({axis.name: axis.telling_row(dataset)})
     where = f"at {axis.place(float(row[axis.name]), 3)}" if axis.telling else "at the end"
+    grid_errors = [*GRID_ERROR.values(), *([] if "grid_error_pressure" in dataset else ["grid_error"])]
     shown = [name for name in axis.in_table("last") if name in row and name != axis.name and name not in _BESIDE]
     rows = [
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
@@ -50,7 +51,7 @@ def result_table(dataset: xr.Dataset) -> Group:
         *accuracy_rows([dataset], dataset.attrs.get("tolerance")),
         *(
             (f"Accuracy: worst {axis.variables[name].short}", number(dataset[name]))
-            for name in (*GRID_ERROR.values(), *(["grid_error"] if "grid_error_pressure" not in dataset else []))
+            for name in grid_errors
             if name in dataset and (dataset[name] != 0).any()
         ),
         *([("Shortest octave of waves", _octave(dataset))] if "last_octave_friction" in dataset else []),

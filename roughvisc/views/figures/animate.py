@@ -20,32 +20,11 @@ from roughvisc.observables import contact
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES
-from roughvisc.views.figures import style
+from roughvisc.views.figures import fields, style, transport
 from roughvisc.views.figures.coarsened import note, touching
-from roughvisc.views.figures.fields import (
-    as_shown,
-    colour_bar,
-    draw_map,
-    draw_outline,
-    joint_scale,
-    label_plane,
-    map_legend,
-    measured_part,
-    plane_ratio,
-    plane_unit,
-)
 from roughvisc.views.figures.histories import steps_of
 from roughvisc.views.figures.rows import RowAxis, at_rows, fullest_frame, require, rows_of, spread_frames
 from roughvisc.views.figures.sections import cut_position, deformed_surface, draw_contact
-from roughvisc.views.figures.transport import (
-    draw_flux,
-    flow_legend,
-    flux_of,
-    flux_scale,
-    rate_unit,
-    visible,
-    with_leak_rate,
-)
 
 #: A map's side along y over that along x from which the map takes the whole height.
 _TALL = 1.2
@@ -97,7 +76,6 @@ def animate(
         If the file name or the missing ffmpeg does not allow it, or the result holds no such field.
     """
     path = Path(path)
-    _check(frames, rate)
     writer = _writer(path, rate)
     unfinished = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     film = animation(dataset, field=field, frames=frames, rate=rate)
@@ -127,7 +105,8 @@ def animation(dataset: xr.Dataset, *, field: str | None = None, frames: int = 10
     InputError
         If the result holds no such field.
     """
-    _check(frames, rate)
+    if frames < 1 or rate <= 0:
+        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
     figure, move, chosen = _moving(dataset, field, frames)
     return _Film(figure, move, chosen, interval=1000 / rate, cache_frame_data=False)
 
@@ -137,11 +116,6 @@ class _Film(FuncAnimation):
 
     def _repr_html_(self) -> str:
         return super()._repr_html_() or self.to_jshtml()
-
-
-def _check(frames: int, rate: float) -> None:
-    if frames < 1 or rate <= 0:
-        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
 
 
 @style.apply
@@ -157,14 +131,14 @@ def _moving(
     require(dataset, "gap" if field == "flux" else field)
     chosen = [int(frame) for frame in spread_frames(rows_of(dataset), count)]
     if field == "flux":
-        dataset = with_leak_rate(dataset)
-        dataset = dataset.assign(flux=flux_of(dataset))
+        dataset = transport.with_leak_rate(dataset)
+        dataset = dataset.assign(flux=transport.flux_of(dataset))
     else:
-        dataset = measured_part(dataset)
+        dataset = fields.measured_part(dataset)
     first = [name for name in _FIRST[field != "flux" :] if name in dataset][:1]
     histories = first + [name for name in _HISTORIES if name in dataset]
     sectioned = "height" in dataset and ("gap" in dataset or "displacement" in dataset)
-    figure, on_map, cuts, right = _panels(plane_ratio(dataset), sectioned, len(histories))
+    figure, on_map, cuts, right = _panels(fields.plane_ratio(dataset), sectioned, len(histories))
     movers = [
         (_moving_flow if field == "flux" else _moving_map)(figure, on_map, dataset, field, chosen),
         *(_moving_section(ax, dataset, chosen) for ax in cuts),
@@ -198,7 +172,7 @@ def _legend(
     named: dict[str, Artist] = {}
     for frame in chosen:
         movers[0](frame)
-        named |= flow_legend(image) if image.get_gid() == "flux" else map_legend([image])
+        named |= transport.flow_legend(image) if image.get_gid() == "flux" else fields.map_legend([image])
     for ax in cuts:
         named |= {label: one for one, label in zip(*ax.get_legend_handles_labels(), strict=True) if label not in named}
     if right:
@@ -235,41 +209,37 @@ def _panels(ratio: float, sectioned: bool, histories: int) -> tuple[Figure, Axes
 
 
 def _moving_map(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
-    scale = joint_scale(as_shown(dataset, field, frame) for frame in chosen)
-    unit, plane = unit_for([scale.high], VARIABLES[field].units), plane_unit(dataset)
-    image = draw_map(ax, as_shown(dataset, field, chosen[0]), unit, plane, **scale.limits(unit))
-    colour_bar(figure, [image], scale, unit, location=_side(dataset))
-    label_plane(ax, dataset, plane)
+    scale = fields.joint_scale(fields.as_shown(dataset, field, frame) for frame in chosen)
+    unit, plane = unit_for([scale.high], VARIABLES[field].units), fields.plane_unit(dataset)
+    image = fields.draw_map(ax, fields.as_shown(dataset, field, chosen[0]), unit, plane, **scale.limits(unit))
+    fields.colour_bar(figure, [image], scale, unit, location=fields.bar_side(dataset))
+    fields.label_plane(ax, dataset, plane)
     outline = [None]
 
     def move(frame):
-        image.set_data(np.ma.masked_invalid(unit(as_shown(dataset, field, frame).transpose("y", "x"))))
+        image.set_data(np.ma.masked_invalid(unit(fields.as_shown(dataset, field, frame).transpose("y", "x"))))
         if outline[0] is not None:
             outline[0].remove()
         outline[0] = None
         if field != "gap" and ("pressure" in dataset or "gap" in dataset):
-            outline[0] = draw_outline(ax, touching(dataset, frame), plane)
+            outline[0] = fields.draw_outline(ax, touching(dataset, frame), plane)
 
     return move
 
 
-def _side(dataset: xr.Dataset) -> str:
-    """Where the colour bar of the map stands."""
-    return "right" if plane_ratio(dataset) > 0.4 else "top"
-
-
 def _moving_flow(figure: Figure, ax: Axes, dataset: xr.Dataset, field: str, chosen: list[int]):
     """Map of the flux over its largest at each time: over all times the last frames would show nothing."""
-    plane = plane_unit(dataset)
+    plane = fields.plane_unit(dataset)
 
     def part(frame: int) -> xr.DataArray:
         flux = at_rows(dataset[field], frame).load()
         highest = float(np.nan_to_num(flux.values).max())
-        return visible(flux / (highest or 1.0), 1.0).rename(field)
+        return transport.visible(flux / (highest or 1.0), 1.0).rename(field)
 
-    image = draw_flux(ax, part(chosen[0]), Unit(1.0, ""), plane, 1.0)
-    colour_bar(figure, [image], flux_scale(1.0), Unit(1.0, ""), "Flux over its largest", _side(dataset))
-    label_plane(ax, dataset, plane)
+    image = transport.draw_flux(ax, part(chosen[0]), Unit(1.0, ""), plane, 1.0)
+    scale, label = transport.flux_scale(1.0), "Flux over its largest"
+    fields.colour_bar(figure, [image], scale, Unit(1.0, ""), label, fields.bar_side(dataset))
+    fields.label_plane(ax, dataset, plane)
 
     def move(frame):
         image.set_data(np.ma.masked_invalid(part(frame).transpose("y", "x")))
@@ -284,7 +254,7 @@ def _moving_section(ax: Axes, dataset: xr.Dataset, chosen: list[int]):
     surfaces = [deformed_surface(dataset, frame, y=index).values for frame in chosen]
     known = np.concatenate([height, *surfaces])
     known = known[np.isfinite(known)]
-    plane, unit = plane_unit(dataset), unit_for(np.ptp(known), "m")
+    plane, unit = fields.plane_unit(dataset), unit_for(np.ptp(known), "m")
     x, limits = plane(dataset["x"]), plane(cell_edges(dataset["x"]))
     low, high = float(unit(known.min())), float(unit(known.max()))
     margin = 0.1 * ((high - low) or 1.0)
@@ -315,7 +285,7 @@ def _moving_history(ax: Axes, dataset: xr.Dataset, name: str, lowest: bool):
     steps = steps_of(dataset)
     clock = rows_of(steps)
     steps = steps if name in steps else dataset[[name]]
-    axis, (unit, spans) = RowAxis.of(clock), rate_unit(steps[name])
+    axis, (unit, spans) = RowAxis.of(clock), transport.rate_unit(steps[name])
     times, shown = axis.unit(rows_of(steps)), unit(steps[name].values)
     ax.plot(times, shown, color="0.75", lw=1)
     (run,) = ax.plot([], [], color=style.BLUE, lw=1.4)

@@ -75,6 +75,11 @@ def plane_ratio(dataset: xr.Dataset | xr.DataArray) -> float:
     return float(np.ptp(cell_edges(dataset["y"])) / np.ptp(cell_edges(dataset["x"])))
 
 
+def bar_side(dataset: xr.Dataset | xr.DataArray) -> str:
+    """Where the colour bar of a single map stands: at its right, or above a strip."""
+    return "top" if plane_ratio(dataset) < 0.4 else "right"
+
+
 def measured_part(dataset: xr.Dataset) -> xr.Dataset:
     """The part of a result that was measured, where the surface was made to repeat by its mirror images.
 

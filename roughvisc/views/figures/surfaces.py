@@ -26,7 +26,7 @@ from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn, stride
-from roughvisc.views.figures.fields import Scale, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import Scale, bar_side, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
 
 #: Robust standard deviations from the median to which the scale of heights reaches.
 _REACH = 5.0
@@ -62,17 +62,10 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
     return max(lowest, float(median - reach)), min(highest, float(median + reach))
 
 
-def _beyond(values: np.ndarray, low: float, high: float) -> tuple[float, float]:
+def _beyond(values: np.ndarray, low: float, high: float) -> float:
     """Share of the points below and above limits."""
-    below = sum(np.count_nonzero(values[rows] < low) for rows in row_blocks(values.shape))
-    above = sum(np.count_nonzero(values[rows] > high) for rows in row_blocks(values.shape))
-    return below / values.size, above / values.size
-
-
-def _label(height: xr.DataArray) -> str:
-    """What the heights are: as they were, or levelled."""
-    levelled = "levelled: polynomial" in str(height.attrs.get("history", ""))
-    return f"{VARIABLES['height'].label}, levelled" if levelled else VARIABLES["height"].label
+    blocks = (values[rows] for rows in row_blocks(values.shape))
+    return sum(np.count_nonzero((block < low) | (block > high)) for block in blocks) / values.size
 
 
 @style.apply
@@ -104,20 +97,21 @@ def surface(height: xr.DataArray) -> Figure:
     image = draw_map(on_map, drawn(height), unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
     beyond = _beyond(height.values, low, high)
     scale = Scale("height", low, high, *extremes_of(height.values), marked=False)
-    colour_bar(figure, [image], scale, unit, _label(height), location="top" if plane_ratio(height) < 0.4 else "right")
+    levelled = ", levelled" if "levelled: polynomial" in str(height.attrs.get("history", "")) else ""
+    colour_bar(figure, [image], scale, unit, VARIABLES["height"].label + levelled, bar_side(height))
     label_plane(on_map, height, plane)
     missing = (height.size - count_of(height.values)) / height.size
     notes = [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
-    notes += [f"{100 * sum(beyond):.2g} % lie beyond the scale of heights"] if sum(beyond) else []
+    notes += [f"{100 * beyond:.2g} % lie beyond the scale of heights"] if beyond else []
     if (every := stride(height)) > 1:
         ends = " to ".join(unit.text(one) for one in extremes_of(height.values))
         notes += [f"the map is of means of {every} × {every} points; heights are {ends}"]
     said = "; ".join(notes)
     style.note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
     _draw_profile(panels["profile"], on_map, height, unit, plane)
-    levelled = height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
-    _draw_heights(panels["heights"], levelled, unit)
-    _draw_spectrum(panels["spectrum"], levelled)
+    height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
+    _draw_heights(panels["heights"], height, unit)
+    _draw_spectrum(panels["spectrum"], height)
     style.letter_panels(list(panels.values()))
     return figure
 
@@ -183,32 +177,26 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
 
 
 def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
-    ax.set_xlabel("Wavevector [rad/m]")
-    ax.set_ylabel("Power spectral density\n[m⁴]")
-    drawn, reason = False, "too small or too flat"
     gaps = np.count_nonzero(unmeasured(levelled))
-    if gaps > MOST_MISSING * levelled.size:
-        reason = "too few measured points"
-    elif min(levelled.shape) >= 8:
+    bridged, wavevector, density = gaps <= MOST_MISSING * levelled.size, np.zeros(0), np.zeros(0)
+    if bridged and min(levelled.shape) >= 8:
         spectrum = psd(levelled, window="hann", bridge=True)
         spectrum = spectrum.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings that are seen whole
         wavevector, density = spectrum["wavevector"].values, spectrum["psd"].values
-        scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
-        symbol = "µm" if wavevector[-1] > 1e4 else "mm"
-        symbol = "nm" if wavevector[-1] > 1e8 else symbol
-        shown = density > 0
-        if shown.any():
-            x, y = wavevector[shown] * scale[symbol], density[shown] / scale[symbol] ** 4
-            ax.plot(x, y, color=style.BLUE, lw=1)
-            style.spread_axis(ax.xaxis, x, always=True)
-            style.spread_axis(ax.yaxis, y, always=True)
-            ax.set_ylim(bottom=max(ax.get_ylim()[0], _NOTHING * float(y.max())))
-            ax.set_xlabel(f"Wavevector [rad/{symbol}]")
-            ax.set_ylabel(f"Power spectral density\n[{symbol}⁴]")
-            ax.set_title("gaps bridged" if gaps else "", loc="right")
-            ax.grid(color="0.9", lw=0.5)
-            drawn = True
-    if not drawn:
-        style.say_inside(ax, reason)
+    symbol, scale = "m", 1.0
+    if (density > 0).any():
+        highest = wavevector[-1]
+        symbol, scale = ("nm", 1e-9) if highest > 1e8 else ("µm", 1e-6) if highest > 1e4 else ("mm", 1e-3)
+        x, y = wavevector[density > 0] * scale, density[density > 0] / scale**4
+        ax.plot(x, y, color=style.BLUE, lw=1)
+        style.spread_axis(ax.xaxis, x, always=True)
+        style.spread_axis(ax.yaxis, y, always=True)
+        ax.set_ylim(bottom=max(ax.get_ylim()[0], _NOTHING * float(y.max())))
+        ax.set_title("gaps bridged" if gaps else "", loc="right")
+        ax.grid(color="0.9", lw=0.5)
+    else:
+        style.say_inside(ax, "too small or too flat" if bridged else "too few measured points")
         ax.set_xticks([])
         ax.set_yticks([])
+    ax.set_xlabel(f"Wavevector [rad/{symbol}]")
+    ax.set_ylabel(f"Power spectral density\n[{symbol}⁴]")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.units import unit_for
-from roughvisc.variables import NOT_CONVERGED
+from roughvisc.variables import NOT_CONVERGED, VARIABLES
 from roughvisc.variables.axes import AXES, Axis, axis_of
 from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
@@ -36,10 +36,10 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "rows": axis.rows.capitalize(),
         "telling": _telling(last, axis) if axis.telling else "",
         "telling_label": axis.variables[axis.telling].label.lower() if axis.telling else "",
-        "force": _largest(dataset, "force", "N"),
-        "nominal_pressure": _largest(dataset, "nominal_pressure", "Pa"),
-        "approach": _last(last, "approach", "m"),
-        "area": _last(last, "contact_area", "m^2"),
+        "force": _largest(dataset, "force"),
+        "nominal_pressure": _largest(dataset, "nominal_pressure"),
+        "approach": _largest(last, "approach"),
+        "area": _largest(last, "contact_area"),
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
         "stated_error": _worst(dataset, *_stated(dataset, axis)),
         "time_error": _worst(dataset, "time_error"),
@@ -48,7 +48,7 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "status": f"{bad} of {len(status)} {axis.rows} not converged" if bad else "converged" if len(status) else "",
         "bad": bool(bad),
         "convolutions": f"{int(dataset['convolutions'].sum())}" if "convolutions" in dataset else "",
-        "wall_time": _largest(dataset, "wall_time", "s"),
+        "wall_time": _largest(dataset, "wall_time"),
         "surface": json.dumps(case.get("surface", {})) + str(dataset.attrs.get("surface_sha256", number)),
         "view": None,
     }
@@ -68,15 +68,12 @@ def _telling(row: xr.Dataset, axis: Axis) -> str:
     return f"{text} at {axis.place(float(row[axis.name]), 3).partition(' = ')[2]}"
 
 
-def _largest(dataset: xr.Dataset, name: str, si: str) -> str:
+def _largest(dataset: xr.Dataset, name: str) -> str:
+    """The largest value of a variable, or that of the one row given."""
     if name not in dataset:
         return ""
     value = float(dataset[name].max())
-    return unit_for([value], si).text(value)
-
-
-def _last(last: xr.Dataset, name: str, si: str) -> str:
-    return unit_for([float(last[name])], si).text(float(last[name])) if name in last else ""
+    return unit_for([value], VARIABLES[name].units).text(value)
 
 
 def _worst(dataset: xr.Dataset, *names: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,13 @@ from PIL import Image
 
 from roughvisc.observables import contact, history
 from roughvisc.topography.grid import spacing
-from roughvisc.units import Unit, unit_for
+from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import in_blocks, present, stride, touching
-from roughvisc.views.figures.fields import colour_map, joint_scale, measured_part, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import Scale, colour_map, joint_scale, measured_part, plane_ratio, plane_unit
 from roughvisc.views.figures.rows import RowAxis, at_rows, fullest_frame, rows_of, spread_frames
 from roughvisc.views.figures.sections import cut_position, deformed_surface
 
@@ -40,17 +39,6 @@ _FAINTEST = 1e-5
 _ERROR_CHART, _DOTS = "Relative error", 60
 _CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
 _SECTION = (1000.0, 240.0)
-
-
-@dataclass(frozen=True)
-class _Scale:
-    """Colours and unit of one field, the same for all frames of a case."""
-
-    name: str
-    unit: Unit
-    low: float
-    high: float
-    beyond: bool
 
 
 def data_uri(picture: bytes, kind: str = "image/png") -> str:
@@ -134,19 +122,22 @@ def frames_of(dataset: xr.Dataset, budget: int) -> dict[str, Any]:
 # -------------------------------------------------------------------------------------------------------- maps
 
 
-def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> _Scale:
-    scale = joint_scale(present(dataset, name, frame) for frame in chosen)
-    unit = unit_for([scale.low, scale.high], VARIABLES[name].units)
-    high = scale.high if scale.high > scale.low else scale.low + 1.0
-    return _Scale(name, unit, scale.low, high, scale.highest > scale.high)
+def _scale(dataset: xr.Dataset, name: str, chosen: list[int]) -> Scale:
+    """Colours of one field, the same for all frames of a case."""
+    return joint_scale(present(dataset, name, frame) for frame in chosen)
 
 
-def _scale_text(scale: _Scale) -> dict[str, str]:
+def _span(scale: Scale) -> float:
+    return scale.high - scale.low if scale.high > scale.low else 1.0
+
+
+def _scale_text(scale: Scale) -> dict[str, str]:
+    unit = unit_for([scale.low, scale.high], VARIABLES[scale.name].units)
     return {
         "name": scale.name,
-        "label": scale.unit.label(VARIABLES[scale.name].label),
-        "low": f"{float(scale.unit(scale.low)):.3g}",
-        "high": f"{float(scale.unit(scale.high)):.3g}" + (" and more" if scale.beyond else ""),
+        "label": unit.label(VARIABLES[scale.name].label),
+        "low": f"{float(unit(scale.low)):.3g}",
+        "high": f"{float(unit(scale.low + _span(scale))):.3g}" + (" and more" if scale.highest > scale.high else ""),
     }
 
 
@@ -156,14 +147,14 @@ def _extent(dataset: xr.Dataset) -> str:
     return " × ".join(f"{float(unit(side)):.4g}" for side in sides) + f" {unit.symbol}"
 
 
-def _map(dataset: xr.Dataset, scale: _Scale, frame: int, block: int) -> str:
+def _map(dataset: xr.Dataset, scale: Scale, frame: int, block: int) -> str:
     """One map, x to the right and y upwards: contact has its colour, and on a map of pressure no contact."""
     field = present(dataset, scale.name, frame)
     spots = touching(dataset, frame) if {"pressure", "gap"} & set(dataset) else field < -np.inf
     extremes = stride(dataset) > 1  # what was coarsened for its extremes keeps them
     values = in_blocks(field.transpose("y", "x").values, block, scale.name if extremes else "")
     share = in_blocks(spots.transpose("y", "x").values.astype(float), block, "contact" if extremes else "")
-    level = np.nan_to_num((values - scale.low) / (scale.high - scale.low))
+    level = np.nan_to_num((values - scale.low) / _span(scale))
     index = 2 + np.clip((level * _LEVELS).astype(int), 0, _LEVELS - 1)
     index[share == 0 if scale.name == "pressure" else share > 0.5] = _MARKED
     index[np.isnan(values)] = _ABSENT

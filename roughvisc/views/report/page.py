@@ -36,15 +36,7 @@ from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
-from roughvisc.views.sweep_figures.case_text import (
-    case_words,
-    friction_words,
-    material_words,
-    names_of,
-    program_words,
-    study_text,
-    table_words,
-)
+from roughvisc.views.sweep_figures import case_text
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 #: Size that all maps may have together. [bytes]
@@ -57,6 +49,19 @@ _PICTURED = 60
 _DRAWN = 3
 #: Surfaces that are described.
 _SURFACES = 4
+#: Attributes that state how a result was computed, and whence its surface came.
+_SETTINGS = (
+    "source",
+    "direction",
+    "boundary",
+    "tolerance",
+    "method",
+    "memory",
+    "series_error",
+    "transforms",
+    "case_key",
+)
+_ORIGIN = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
 #: Attributes in which a result speaks of its limits.
 _NOTES = (
     "model_note",
@@ -73,7 +78,6 @@ _NOTES = (
 )
 #: Headings, rows and notes of a table.
 Rows = tuple[list[str], list[list[str]], list[str]]
-_NO_ROWS: Rows = ([], [], [])
 #: Parameters shown, with the name of each.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -99,42 +103,36 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     InputError
         If there is no result, or no `path` where Datasets are given.
     """
-    if isinstance(results, xr.Dataset):
-        results = [results]
-    named = isinstance(results, str | Path)
-    if named:
+    failures: list[dict[str, str]] = []
+    swept: list[dict[str, str]] = []
+    drawn: Rows = ([], [], [])
+    if isinstance(results, str | Path):
         source = Path(results)
-        sources: list[Any] = _files(source)
+        in_folder = source.is_dir()
+        sources: list[Any] = _files(source) if in_folder else [source]
         for one in sources:
             verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
-        failures = _failures(source) if source.is_dir() else []
-        swept = _swept(source) if len(sources) > 1 else []
-        drawn = realisation_rows(realisations_table(index_of(source))) if source.is_dir() else _NO_ROWS
-        out = Path(path) if path else source / "report.html" if source.is_dir() else _beside(source)
+        if in_folder:
+            failures, drawn = _failures(source), realisation_rows(realisations_table(index_of(source)))
+            swept = _swept(source) if len(sources) > 1 else []
+        path = path or (source / "report.html" if in_folder else source.with_name(f"{source.stem}-report.html"))
     else:
-        sources, failures, swept, drawn = list(results), [], [], _NO_ROWS
-        if path is None:
-            raise InputError("path is None: expected the name of the page, where Datasets are given")
-        out = Path(path)
+        sources = [results] if isinstance(results, xr.Dataset) else list(results)
+    if path is None:
+        raise InputError("path is None: expected the name of the page, where Datasets are given")
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
     page = _page(sources, failures, swept, drawn)
-    with atomic_write(out) as temporary:
+    with atomic_write(Path(path)) as temporary:
         temporary.write_text(page, encoding="utf-8")
-    return out
+    return Path(path)
 
 
-def _files(source: Path) -> list[Path]:
-    if not source.is_dir():
-        return [source]
-    found = result_files(source)
-    if not found and not list(source.glob("*.failed.json")):
-        raise no_results(source)
+def _files(folder: Path) -> list[Path]:
+    found = result_files(folder)
+    if not found and not list(folder.glob("*.failed.json")):
+        raise no_results(folder)
     return found
-
-
-def _beside(source: Path) -> Path:
-    return source.with_name(f"{source.stem}-report.html")
 
 
 def _failures(folder: Path) -> list[dict[str, str]]:
@@ -144,7 +142,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
         try:
             record = json.loads(path.read_text())
             case = record.get("case", {})
-            title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
+            title = ": ".join(filter(None, (case.get("title", ""), case_text.case_words(case))))
             found.append({"key": path.name.partition(".")[0], "title": title, "message": record["message"]})
         except (OSError, ValueError, KeyError, AttributeError):
             found.append({"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"})
@@ -172,7 +170,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
     pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
     budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
-    rows, views, figures, surfaces, studies, everything = [], [], [], {}, [], {}
+    rows, views, figures, surfaces, studies, histories = [], [], [], {}, [], {}
     names: set[str] = set()
     for number, source in enumerate(sources):
         with _opened(source) as dataset:
@@ -182,7 +180,8 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
                 row["name"] += f" ({row['key'] or number + 1})"
             names.add(row["name"])
             if "time" in dataset.dims:
-                everything[row["name"]] = _histories(dataset)
+                over = [name for name, one in dataset.data_vars.items() if one.dims in (("time",), ("step",))]
+                histories[row["name"]] = dataset[over].load()
             if number not in pictured:
                 continue
             row["view"] = len(views)
@@ -194,8 +193,9 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
             what = row["surface"]
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
-    if len(everything) > 1 and not drawn[1]:  # realisations of one case are drawn as one
-        figures = [_overview(everything), *figures]
+    if len(histories) > 1 and not drawn[1]:  # realisations of one case are drawn as one
+        overview = figure_uri(area_against_load(histories))
+        figures = [{"title": "Contact area against force, one line per case", "src": overview}, *figures]
     figures = [*swept, *figures] if len(rows) > 1 else figures
     environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
     environment.lstrip_blocks = True
@@ -204,7 +204,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         version=metadata.version("roughvisc"),
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         rows=rows,
-        varied=names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
+        varied=case_text.names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
         realisations=dict(zip(("headings", "rows", "notes"), drawn, strict=True)),
         views=views,
@@ -234,18 +234,6 @@ def _common_title(rows: list[dict[str, Any]]) -> str:
     return titles.pop() if len(titles) == 1 else f"{len(rows)} results" if rows else "No result"
 
 
-def _histories(dataset: xr.Dataset) -> xr.Dataset:
-    """What the figure of all cases needs, in memory."""
-    return dataset[[name for name in dataset.data_vars if dataset[name].dims in (("time",), ("step",))]].load()
-
-
-def _overview(cases: dict[str, xr.Dataset]) -> dict[str, str]:
-    return {
-        "title": "Contact area against force, one line per case",
-        "src": figure_uri(area_against_load(cases)),
-    }
-
-
 def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
     """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
     of = f": {name}" if name else ""
@@ -258,31 +246,22 @@ def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
 def _study(dataset: xr.Dataset) -> dict[str, Any]:
     """What was run and whence it came, for one case."""
     case = json.loads(dataset.attrs.get("case", "{}"))
-    told = (
-        "source",
-        "direction",
-        "boundary",
-        "tolerance",
-        "method",
-        "memory",
-        "series_error",
-        "transforms",
-        "case_key",
-    )
-    files = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
+    others = [name for name in EXPERIMENTS if name in case and name != "friction"]
+
+    def told(names: Sequence[str]) -> list[list[str]]:
+        return [[name.replace("_", " "), str(dataset.attrs[name])] for name in names if name in dataset.attrs]
+
     return {
-        "material": material_words(case["material"]) if "material" in case else "",
-        "program": program_words(case["program"]) if "program" in case else [],
-        "friction": friction_words(case["friction"]) if "friction" in case else "",
-        "others": [
-            [name, table_words(name, case[name])] for name in EXPERIMENTS if name in case and name != "friction"
-        ],
-        "settings": [[key.replace("_", " "), str(dataset.attrs[key])] for key in told if key in dataset.attrs],
-        "origin": [[key.replace("_", " "), str(dataset.attrs[key])] for key in files if key in dataset.attrs],
-        "notes": [str(dataset.attrs[key]) for key in _NOTES if key in dataset.attrs],
+        "material": case_text.material_words(case["material"]) if "material" in case else "",
+        "program": case_text.program_words(case["program"]) if "program" in case else [],
+        "friction": case_text.friction_words(case["friction"]) if "friction" in case else "",
+        "others": [[name, case_text.table_words(name, case[name])] for name in others],
+        "settings": told(_SETTINGS),
+        "origin": told(_ORIGIN),
+        "notes": [note for _, note in told(_NOTES)],
         "audit": _audit(dataset),
         "history": str(dataset.attrs.get("history", "")).splitlines(),
-        "toml": study_text(case) if case else "",
+        "toml": case_text.study_text(case) if case else "",
     }
 
 
