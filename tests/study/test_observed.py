@@ -50,16 +50,16 @@ def study(tmp_path):
 @pytest.fixture
 def counted(monkeypatch):
     """Names of the observables that were derived."""
-    from roughvisc.observables import tables
+    from roughvisc.observables import OBSERVABLES
 
     derived = []
-    plain = tables.OBSERVABLES["leakage"]
+    plain = OBSERVABLES["leakage"]
 
     def noted(*dataset, **settings):
         derived.append(settings)
         return plain(*dataset, **settings)
 
-    monkeypatch.setitem(tables.OBSERVABLES, "leakage", noted)
+    monkeypatch.setitem(OBSERVABLES, "leakage", noted)
     return derived
 
 

@@ -240,14 +240,14 @@ def _end(dataset: xr.Dataset) -> str:
     return f"end: {unit_for([work], 'J').text(work)} of work done"
 
 
-def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray, count: int = 5) -> None:
-    """Arrows in the direction of time, at even distances along a path."""
+def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Five arrows in the direction of time, at even distances along a path."""
     width, height = (np.ptp(x) or 1.0), (np.ptp(y) or 1.0)
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
     if length[-1] == 0:
         return
     look = {"arrowstyle": "-|>", "color": style.BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
-    for place in (np.arange(count) + 0.5) / count * length[-1]:
+    for place in (np.arange(5) + 0.5) / 5 * length[-1]:
         before = int(np.searchsorted(length, place)) - 1
         tip = (np.interp(place, length, x), np.interp(place, length, y))
         ax.annotate("", tip, (x[before], y[before]), arrowprops=look)

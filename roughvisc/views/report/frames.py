@@ -41,23 +41,19 @@ _CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
 _SECTION = (1000.0, 240.0)
 
 
-def data_uri(picture: bytes, kind: str = "image/png") -> str:
-    """Bytes as an address that holds them."""
-    return f"data:{kind};base64,{base64.b64encode(picture).decode()}"
-
-
-def figure_uri(figure: Figure, dpi: float = 100.0) -> str:
-    """A matplotlib figure as PNG, without transparency."""
+def figure_uri(figure: Figure) -> str:
+    """A matplotlib figure as the address of a PNG, without transparency."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=dpi)
+    figure.savefig(stream, format="png", dpi=100)
     with Image.open(stream) as picture:
         return _png(picture.convert("RGB"))
 
 
 def _png(picture: Image.Image) -> str:
+    """A picture as an address that holds it."""
     stream = io.BytesIO()
     picture.save(stream, format="PNG", optimize=True)
-    return data_uri(stream.getvalue())
+    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
 def colour_bar(name: str) -> str:
