@@ -35,8 +35,8 @@ _ABSENT, _MARKED = 0, 1
 _ERRORS = {"stated_error": "stated", "time_error": "time steps"}
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
-#: The chart of errors, and kept times up to which they are marked in it.
-_ERROR_CHART, _DOTS = "Relative error", 60
+#: Kept times up to which errors are marked.
+_DOTS = 60
 _CHART = (280.0, 130.0)  # of the plotting area, in the units of the page
 _SECTION = (1000.0, 240.0)
 
@@ -253,15 +253,16 @@ def _charts(dataset: xr.Dataset, chosen: list[int]) -> list[dict[str, Any]]:
             values = steps[name].values.astype(float)
             unit = unit_for(values, VARIABLES[name].units)
             x = across(places_of_steps)
-            charts.append(along | _chart(x, unit.label(label), {label: unit(values)}, places.tolist()))
+            charts.append(along | _chart(x, unit.label(label), {label: unit(values)}, places.tolist(), False))
     errors = {
         label: dataset[name].values.astype(float)
         for name, label in _errors(over).items()
         if name in dataset and np.nanmax(dataset[name].values, initial=0.0) > 0
     }
     if errors:
-        x, tolerance = across(kept), dataset.attrs.get("tolerance")
-        chart = _chart(x, _ERROR_CHART, errors, chosen, tolerance)
+        faintest = _FAINTEST * np.nanmax(list(errors.values()))
+        shown = {label: np.where(values >= faintest, values, np.nan) for label, values in errors.items()}
+        chart = _chart(across(kept), "Relative error", shown, chosen, True, dataset.attrs.get("tolerance"))
         charts.append(chart | along | ({"time": axis.unit.label("Kept time")} if over == "time" else {}))
     return charts
 
@@ -272,15 +273,16 @@ def _errors(over: str) -> dict[str, str]:
 
 
 def _chart(
-    x: np.ndarray, label: str, lines: dict[str, np.ndarray], chosen: list[int], tolerance=None
+    x: np.ndarray,
+    label: str,
+    lines: dict[str, np.ndarray],
+    chosen: list[int],
+    logarithmic: bool,
+    tolerance: float | None = None,
 ) -> dict[str, Any]:
-    logarithmic = label == _ERROR_CHART
+    """A chart of lines, and where each frame lies on the first; a logarithmic one of few rows is dotted too."""
     dotted = logarithmic and len(x) <= _DOTS
     stacked = np.concatenate(list(lines.values()))
-    if logarithmic:
-        faintest = _FAINTEST * np.nanmax(stacked)
-        lines = {name: np.where(values >= faintest, values, np.nan) for name, values in lines.items()}
-        stacked = np.concatenate(list(lines.values()))
     stacked = stacked[np.isfinite(stacked) & ((stacked > 0) | (not logarithmic))]
     if tolerance is not None:
         stacked = np.append(stacked, float(tolerance))

@@ -212,25 +212,13 @@ def cases_of(results: Any) -> Cases:
         of_rows = [("step",), *((axis,) for axis in AXES)]
         found = [whole_of(node.to_dataset()) for node in results.children.values()]
         members = [one[[name for name in one.data_vars if one[name].dims in of_rows]].load() for one in found]
-        scalars = [str(name) for member in members for name in member.coords if not member[name].dims]
-        names = dict.fromkeys(name for name in scalars if name not in _NO_PARAMETERS)
-        columns = [[member[name] for member in members if name in member.coords] for name in names]
-        of_all = [column for column in columns if len(column) == len(members)]
-        parameters = {_key(column[0]): (np.array([one.item() for one in column]), column[0]) for column in of_all}
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
         results = whole_of(results)
         over = [dim for dim in ("case", REALISATION) if dim in results.dims]
         held = [name for name in results.data_vars if set(results[name].dims) <= {*over, "step", *AXES}]
         table = results[held].load()
         keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
-        places = [dict(zip(over, place, strict=True)) for place in np.argwhere(keys != "")]
-        members = [table.isel(place) for place in places]
-        on_case = [one for one in results.coords.values() if set(one.dims) <= {*over} and one.dims]
-        parameters = {
-            _key(one): (np.array([one[{d: p[d] for d in one.dims}].item() for p in places]), one)
-            for one in on_case
-            if one.name not in _NO_PARAMETERS
-        }
+        members = [table.isel(dict(zip(over, place, strict=True))) for place in np.argwhere(keys != "")]
     else:
         raise InputError(
             "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
@@ -239,6 +227,12 @@ def cases_of(results: Any) -> Cases:
         expect_current_names(member)
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
+    scalars = [one for name, one in members[0].coords.items() if not one.dims and name not in _NO_PARAMETERS]
+    parameters = {
+        _key(one): (np.array([member[one.name].item() for member in members]), one)
+        for one in scalars
+        if all(one.name in member.coords for member in members)
+    }
     # what is infinite, the conductance of full contact, has no place on an axis
     members = [
         one.assign({name: one[name].where(np.isfinite(one[name])) for name in CONDUCTANCES if name in one})
@@ -252,14 +246,13 @@ def cases_of(results: Any) -> Cases:
     groups: dict[Any, list[int]] = {}
     for place, number in enumerate(numbers):
         groups.setdefault(of_case[place] if np.isfinite(number) else place, []).append(place)
-    bands: list[Band | None] = [None] * len(groups)
-    together = []
-    for group, mine in enumerate(groups.values()):
-        one = members[mine[0]]
-        if np.isfinite(numbers[mine[0]]):
-            one, bands[group] = pooled([members[place] for place in mine], [int(numbers[place]) for place in mine])
-        together.append(one)
     first = [mine[0] for mine in groups.values()]
+    together = [members[place] for place in first]
+    bands: list[Band | None] = [None] * len(groups)
+    for group, mine in enumerate(groups.values()):
+        if np.isfinite(numbers[mine[0]]):
+            drawn = [members[place] for place in mine], [int(numbers[place]) for place in mine]
+            together[group], bands[group] = pooled(*drawn)
     varied = [
         Parameter(key, _numbers(values[first]), str(source.attrs.get("units") or unit_of(key)), "")
         for key, (values, source) in settings.items()
