@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -157,12 +157,12 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
     for rows in dict.fromkeys(entry.along for entry in entries if entry):
         mine = [entry if entry and entry.along == rows else None for entry in entries]
         headings = {name: heading(name, one.units) for name, one in AXES[rows].variables.items()}
-        for name in AXES[rows].in_table("last"):
-            column = columns.setdefault(headings[name], [np.nan] * len(keys))
-            column[:] = _filled(column, mine, name, _summary_row)
-        for name in AXES[rows].in_table("largest"):
-            column = columns.setdefault(f"largest {headings[name]}", [np.nan] * len(keys))
-            column[:] = _filled(column, mine, name, _largest)
+        for which, before, take in (("last", "", _summary_row), ("largest", "largest ", _largest)):
+            for name in AXES[rows].in_table(which):
+                column = columns.setdefault(f"{before}{headings[name]}", [np.nan] * len(keys))
+                for place, entry in enumerate(mine):
+                    if entry and len(entry.histories.get(name, ())):
+                        column[place] = take(entry, name)
     table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
     records = [failures.get(key) or {} for key in keys]
     messages = [held.get(key, "") if entry is None else "" for key, entry in zip(keys, entries, strict=True)]
@@ -202,16 +202,6 @@ def _as_written(key: str, values: list[float], si: str, stated: Sequence[Mapping
         for text, value in zip(texts, values, strict=True)
     ]
     return unit, numbers
-
-
-def _filled(
-    column: list[float], entries: Sequence[Entry | None], name: str, take: Callable[[Entry, str], float]
-) -> list[float]:
-    """A column with a number from a history of each of some cases; as it was where there is none."""
-    return [
-        take(entry, name) if entry and len(entry.histories.get(name, ())) else before
-        for before, entry in zip(column, entries, strict=True)
-    ]
 
 
 def _summary_row(entry: Entry, name: str) -> float:

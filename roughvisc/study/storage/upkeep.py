@@ -66,17 +66,14 @@ def _key_today(entry: Entry) -> str:
         return "" if "numerics_revision" in entry.attributes else entry.key
 
 
-def checkpoints(folder: Path) -> dict[Path, int]:
-    """Folders of unfinished runs whose checkpoints nothing in this version goes on from, and the numerics of each."""
-    today = NUMERICS_REVISION, RESULT_FORMAT
+def checkpoints(folder: Path) -> dict[Path, tuple[int, int]]:
+    """Folders of unfinished runs whose checkpoints nothing in this version goes on from: their numerics and format."""
     found = {place: checkpoint_version(place) for place in sorted(folder.glob(".*.unfinished"))}
-    return {place: version[0] for place, version in found.items() if version is not None and version != today}
+    return {place: version for place, version in found.items() if version is not None and version != _today()}
 
 
-def is_later(place: Path) -> bool:
-    """Whether the checkpoint of an unfinished run is of a later version than this one, which will go on from it."""
-    version = checkpoint_version(place)
-    return version is not None and version > (NUMERICS_REVISION, RESULT_FORMAT)
+def _today() -> tuple[int, int]:
+    return NUMERICS_REVISION, RESULT_FORMAT
 
 
 def upgrade_note(folder: Path, cases: Sequence[Case], index: Index | None = None) -> str:
@@ -124,7 +121,7 @@ def upgrade_note(folder: Path, cases: Sequence[Case], index: Index | None = None
         )
     if left:
         runs = "1 unfinished run" if len(left) == 1 else f"{len(left)} unfinished runs"
-        revisions = ", ".join(map(str, sorted(set(left.values()))))
+        revisions = ", ".join(map(str, sorted({revision for revision, _ in left.values()})))
         told.append(f"the checkpoints of {runs} are of numerics {revisions}: nothing goes on from them here")
     return f"{folder}: {'; '.join(told)} (roughvisc clean {folder} says more)" if told else ""
 
@@ -246,7 +243,8 @@ def clean_folder(
             others.append(path)
     if everything:
         others += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
-    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything, outdated)]
+    former = [place for place, version in checkpoints(folder).items() if version < _today()] if outdated else []
+    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything, former)]
     removed += [path for path in others if _removed(path)]
     if superseded:
         entries = index_of(folder, warn=False).entries
@@ -278,9 +276,10 @@ def kept_of_other_versions(folder: Path) -> list[str]:
             size = f"{sum(entry.stamp[0] for entry in found) / 1e6:.3g} MB"
             results = "1 result" if len(found) == 1 else f"{len(found)} results"
             told.append(f"{results} ({counted_versions(found)}), {size}: {what}")
-    later = [place for place in checkpoints(folder) if is_later(place)]
     return told + [
-        f"{place.name}: a checkpoint of a later version (numerics {checkpoints(folder)[place]})" for place in later
+        f"{place.name}: a checkpoint of a later version (numerics {version[0]})"
+        for place, version in checkpoints(folder).items()
+        if version > _today()
     ]
 
 
@@ -291,12 +290,11 @@ def _is_abandoned(path: Path) -> bool:
         return False
 
 
-def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdated: bool) -> list[Path]:
-    """Remove what is of no use of one case, while its lock is held."""
+def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdated: list[Path]) -> list[Path]:
+    """Remove what is of no use of one case, while its lock is held; with it checkpoints that are outdated."""
     lock, result = lock_path(folder, key), result_path(folder, key)
     if lock.is_symlink():  # nobody's lock
         return [path for path in [lock] if _removed(path)]
-    former = [path for path in checkpoints(folder) if not is_later(path)] if outdated else []
     finished = everything or (result.exists() and not checksum_error(result))
     needed = [
         path
@@ -305,7 +303,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdat
         and not path.is_symlink()
         and any(path.glob("checkpoint.*"))
         and not finished
-        and not (outdated and path in former)
+        and path not in outdated
     ]
     if needed == paths:
         return []
