@@ -285,16 +285,15 @@ def read_cases(path: str | Path) -> list[Case]:
         raise InputError(f"{path}: does not exist: expected a study file (TOML)")
     data = read_toml(path, "valid TOML")
 
-    def refusal(key: str, found: str) -> InputError:
-        return InputError(line(path, key, found))
-
-    swept = with_files(data.pop("sweep", {}), path.parent, refusal)
-    changes = with_realisations(expand(swept, refusal), data, path.parent, refusal)
-    for key in dict.fromkeys(key for change, _ in changes for key in change):
-        table = key.partition(".")[0]
-        if table in _NO_RESULT:
-            found = f"cannot be varied: what is {_NO_RESULT[table]} changes no result: expected one value, in [{table}]"
-            raise refusal(f"sweep: {key}", found)
+    try:
+        changes = with_realisations(expand(with_files(data.pop("sweep", {}), path.parent)), data, path.parent)
+        for key in dict.fromkeys(key for change, _ in changes for key in change):
+            table = key.partition(".")[0]
+            if table in _NO_RESULT:
+                found = f"what is {_NO_RESULT[table]} changes no result: expected one value, in [{table}]"
+                raise InputError(f"sweep: {key}: cannot be varied: {found}")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
     for number, (change, drawn) in enumerate(changes):

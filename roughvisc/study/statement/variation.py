@@ -6,7 +6,7 @@ import copy
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from glob import glob
 from pathlib import Path
@@ -123,13 +123,11 @@ def _recipe_of_card(file: Any, folder: Path | None) -> Any:
     return read_toml(path, "a surface card in TOML").get("generate") if is_card(path, None) and path.is_file() else None
 
 
-Refusal = Callable[[str, str], InputError]
-
 #: More cases are taken for a slip: a sweep of them would not end.
 MOST_CASES = 100_000
 
 
-def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
+def expand(sweep: Any) -> list[dict[str, Any]]:
     """Changes that make each case of a sweep: dotted key -> value.
 
     Parameters
@@ -138,8 +136,6 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
         ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
         table. A value that is no list holds for its whole table; ``realisations`` is a number, see
         :func:`with_realisations`.
-    refusal : callable
-        Makes the error to raise from a dotted key and what is wrong with it.
 
     Returns
     -------
@@ -148,9 +144,9 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
 
     Examples
     --------
-    >>> expand({"a": [1, 2], "b": [3, 4]}, ValueError)
+    >>> expand({"a": [1, 2], "b": [3, 4]})
     [{'a': 1, 'b': 3}, {'a': 1, 'b': 4}, {'a': 2, 'b': 3}, {'a': 2, 'b': 4}]
-    >>> expand([{"a": [1, 2], "b": [3, 4]}, {"a": 5}], ValueError)
+    >>> expand([{"a": [1, 2], "b": [3, 4]}, {"a": 5}])
     [{'a': 1, 'b': 3}, {'a': 2, 'b': 4}, {'a': 5}]
     """
     if isinstance(sweep, Mapping):
@@ -159,19 +155,19 @@ def expand(sweep: Any, refusal: Refusal) -> list[dict[str, Any]]:
             keys[REALISATIONS] = [keys[REALISATIONS]]
         for key, values in keys.items():
             if not isinstance(values, list) or not values:
-                raise refusal(f"sweep.{key}", f"found {shown(values)}: expected a list of values")
+                raise InputError(f"sweep.{key}: found {shown(values)}: expected a list of values")
         count = math.prod(len(values) for values in keys.values())
         if count > MOST_CASES:
             lengths = " x ".join(str(len(values)) for values in keys.values())
-            raise refusal("sweep", f"found {lengths} = {count} cases: expected at most {MOST_CASES}")
+            raise InputError(f"sweep: found {lengths} = {count} cases: expected at most {MOST_CASES}")
         return [dict(zip(keys, chosen, strict=True)) for chosen in itertools.product(*keys.values())]
     if not isinstance(sweep, list) or not all(isinstance(table, Mapping) and table for table in sweep):
-        raise refusal("sweep", f"found {shown(sweep)}: expected a table of lists, or [[sweep]] tables")
-    return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)), refusal)]
+        raise InputError(f"sweep: found {shown(sweep)}: expected a table of lists, or [[sweep]] tables")
+    return [change for number, table in enumerate(sweep) for change in _zipped(number, dict(_flat(table)))]
 
 
 def with_realisations(
-    changes: list[dict[str, Any]], data: Mapping[str, Any], folder: Path, refusal: Refusal
+    changes: list[dict[str, Any]], data: Mapping[str, Any], folder: Path
 ) -> list[tuple[dict[str, Any], int | None]]:
     """Changes that make each case of a sweep, those with a number of realisations once for each of them.
 
@@ -183,8 +179,6 @@ def with_realisations(
         The study without its sweep.
     folder : Path
         That files are relative to.
-    refusal : callable
-        Makes the error to raise from a dotted key and what is wrong with it.
 
     Returns
     -------
@@ -205,9 +199,10 @@ def with_realisations(
             for number in numbers(surface, change[REALISATIONS], folder):
                 found.append((rest | realisation(surface, number), number))
         except InputError as error:
-            raise refusal(f"sweep.{REALISATIONS}", str(error)) from error
+            raise InputError(f"sweep.{REALISATIONS}: {error}") from error
         if len(found) > MOST_CASES:
-            raise refusal("sweep", f"found {len(found)} cases or more with realisations: expected at most {MOST_CASES}")
+            told = f"found {len(found)} cases or more with realisations"
+            raise InputError(f"sweep: {told}: expected at most {MOST_CASES}")
     return found
 
 
@@ -221,14 +216,14 @@ def _surface(data: Mapping[str, Any], change: Mapping[str, Any]) -> Mapping[str,
     return surface if isinstance(surface, Mapping) and isinstance(surface.get("second"), Mapping | None) else {}
 
 
-def _zipped(number: int, table: Mapping[str, Any], refusal: Refusal) -> list[dict[str, Any]]:
+def _zipped(number: int, table: Mapping[str, Any]) -> list[dict[str, Any]]:
     lengths = {key: len(values) for key, values in table.items() if isinstance(values, list)}
     if len(set(lengths.values())) > 1 or 0 in lengths.values():
         found = ", ".join(f"{length} for {key}" for key, length in lengths.items())
-        raise refusal(f"sweep.{number}", f"found {found}: expected lists of one length, at least 1")
+        raise InputError(f"sweep.{number}: found {found}: expected lists of one length, at least 1")
     runs = next(iter(lengths.values()), 1)
     if runs > MOST_CASES:
-        raise refusal(f"sweep.{number}", f"found {runs} cases: expected at most {MOST_CASES}")
+        raise InputError(f"sweep.{number}: found {runs} cases: expected at most {MOST_CASES}")
     return [{key: v[run] if isinstance(v, list) else v for key, v in table.items()} for run in range(runs)]
 
 
@@ -241,7 +236,7 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
             yield f"{above}{key}", value
 
 
-def with_files(sweep: Any, folder: Path, refusal: Refusal) -> Any:
+def with_files(sweep: Any, folder: Path) -> Any:
     """A sweep in which patterns of files stand for the files that match them, sorted by name.
 
     Parameters
@@ -251,20 +246,17 @@ def with_files(sweep: Any, folder: Path, refusal: Refusal) -> Any:
         ``"scans/*.sur"``, alone or in its list.
     folder : Path
         That the patterns are relative to.
-    refusal : callable
-        Makes the error to raise from a dotted key and what is wrong with it.
     """
     if isinstance(sweep, list):
-        return [with_files(table, folder, refusal) for table in sweep]
+        return [with_files(table, folder) for table in sweep]
     if not isinstance(sweep, Mapping):
         return sweep
     return {
-        key: _matching(key, value, folder, refusal) if key.rpartition(".")[2] == "file" else value
-        for key, value in _flat(sweep)
+        key: _matching(key, value, folder) if key.rpartition(".")[2] == "file" else value for key, value in _flat(sweep)
     }
 
 
-def _matching(key: str, value: Any, folder: Path, refusal: Refusal) -> Any:
+def _matching(key: str, value: Any, folder: Path) -> Any:
     """The value, with the files in place of each pattern; a file that is there by that very name is no pattern."""
     stated = value if isinstance(value, list) else [value]
     found: list[Any] = []
@@ -276,7 +268,7 @@ def _matching(key: str, value: Any, folder: Path, refusal: Refusal) -> Any:
         matches = sorted(name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file())
         if not matches:
             where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
-            raise refusal(f"sweep.{key}", f"found {one!r}, which matches no file{where}: expected one at least")
+            raise InputError(f"sweep.{key}: found {one!r}, which matches no file{where}: expected one at least")
         found += matches
     return value if found == stated else found
 

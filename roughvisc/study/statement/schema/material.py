@@ -6,16 +6,12 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import reduce
-from operator import or_
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
-    Field,
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
-    WrapValidator,
     create_model,
     model_validator,
 )
@@ -41,6 +37,7 @@ from roughvisc.study.statement.schema.section import (
     nearest,
     nullable,
     of_file,
+    one_of,
     refuse,
     shown,
     validate,
@@ -398,13 +395,10 @@ def _with_columns(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
     return kept | {key: read[one.name].tolist() for key, one in columns.items() if one.name in read}
 
 
-def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, ValidationInfo], Any]:
-    def pick(data: Any, _: Any, info: ValidationInfo) -> Any:
-        """The table as the class of the model that it names."""
-        if isinstance(data, MaterialSection):
-            return data
-        if not isinstance(data, dict):
-            raise InputError(f"found {shown(data)}: expected a table with a model")
+def _by_model(sections: dict[str, type[MaterialSection]]) -> Callable[[dict[str, Any], ValidationInfo], Any]:
+    """What makes a table the class of the model that it names."""
+
+    def make(data: dict[str, Any], info: ValidationInfo) -> MaterialSection:
         if "model" not in data:
             raise refuse("model", f"missing: expected one of {', '.join(sections)}")
         name = data["model"]
@@ -419,32 +413,18 @@ def _picker(sections: dict[str, type[MaterialSection]]) -> Callable[[Any, Any, V
             columns = {key: column.name for key, column in COLUMNS[name].items()}
             raise of_file(located(data["file"], info), columns, error, "file") from None
 
-    return pick
+    return make
 
 
-def _pick_below(data: Any, check: Any, info: ValidationInfo) -> Any:
-    """What a layer lies on: any model but a pair, whatever it lies on itself."""
-    return _picker({name: one for name, one in SECTIONS.items() if name != "pair"})(data, check, info)
-
-
+_TABLE = "a table with a model"
+#: what a layer may lie on, and one of two bodies: any model but a pair
+_SINGLE: dict[str, type[MaterialSection]] = {}
 _BELOW = Annotated[
-    MaterialSection,
-    WrapValidator(_pick_below),
+    one_of(MaterialSection, [MaterialSection], _by_model(_SINGLE), _TABLE, f"{_TABLE}, as [material] itself"),
     WithJsonSchema({"type": "object"}),
-    Field(description="a table with a model, as [material] itself"),
 ]
-
-SECTIONS = {name: _section(name) for name in MODELS}
-
-#: one of two bodies: any model but a pair
-_BODY = Annotated[
-    reduce(or_, SECTIONS.values()), WrapValidator(_picker(dict(SECTIONS))), Field(description="a table with a model")
-]
+_SINGLE.update({name: _section(name) for name in MODELS})
+_BODY = one_of(MaterialSection, _SINGLE.values(), _by_model(_SINGLE), _TABLE, _TABLE)
 MODELS["pair"] = (materials.pair, {"a": _BODY, "b": _BODY})
-SECTIONS["pair"] = _section("pair")
-
-AnyMaterial = Annotated[
-    reduce(or_, SECTIONS.values()),
-    WrapValidator(_picker(SECTIONS)),
-    Field(description="a [material] table with a model"),
-]
+SECTIONS = {**_SINGLE, "pair": _section("pair")}
+AnyMaterial = one_of(MaterialSection, SECTIONS.values(), _by_model(SECTIONS), _TABLE, "a [material] table with a model")

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import reduce
-from operator import or_
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import (
-    Field,
     ValidationError,
     ValidationInfo,
     WithJsonSchema,
@@ -32,6 +29,7 @@ from roughvisc.study.statement.schema.section import (
     located,
     measured,
     of_file,
+    one_of,
     shown,
 )
 from roughvisc.tables import Wanted, read_table
@@ -249,12 +247,8 @@ KINDS: dict[str, dict[str, type[SegmentSection]]] = {
 SECTIONS = tuple(section for kind in KINDS.values() for section in kind.values())
 
 
-def _pick(data: Any, _: Any, info: Any) -> Any:
+def _segment(data: dict[str, Any], info: ValidationInfo) -> SegmentSection:
     """The table as the class of the segment that it is."""
-    if isinstance(data, SegmentSection):
-        return data
-    if not isinstance(data, dict):
-        raise InputError(f"found {shown(data)}: expected a table")
     kinds = [key for key in KINDS if key in data]
     if len(kinds) != 1:
         hints = [close(key, KINDS) for key in data if key not in (*KINDS, "over", "control", "speed", "direction")]
@@ -270,4 +264,4 @@ def _pick(data: Any, _: Any, info: Any) -> Any:
     )
 
 
-AnySegment = Annotated[reduce(or_, SECTIONS), WrapValidator(_pick), Field(description="a [[program]] table")]
+AnySegment = one_of(SegmentSection, SECTIONS, _segment, "a table", "a [[program]] table")

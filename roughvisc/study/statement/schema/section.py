@@ -8,6 +8,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -198,6 +200,37 @@ class Section(BaseModel):
             raise ValidationError.from_exception_data(
                 cls.__name__, [_problem(_sentence(cls, e), e["loc"], e["input"]) for e in error.errors()]
             ) from None
+
+
+def one_of(
+    base: type[Section],
+    sections: Iterable[type[Section]],
+    make: Callable[[Any, ValidationInfo], Any],
+    table: str,
+    wanted: str,
+) -> Any:
+    """Kind: one of several tables, told by what they hold.
+
+    Parameters
+    ----------
+    base : type of Section
+        What the tables have in common: one that is made already stays.
+    sections : iterable of type of Section
+        The tables.
+    make : callable
+        Makes one of a dict.
+    table, wanted : str
+        What is expected in place of something that is no table, and of the key.
+    """
+
+    def check(data: Any, _: Any, info: ValidationInfo) -> Any:
+        if isinstance(data, base):
+            return data
+        if not isinstance(data, dict):
+            raise InputError(f"found {shown(data)}: expected {table}")
+        return make(data, info)
+
+    return Annotated[reduce(or_, sections), WrapValidator(check), Field(description=wanted)]
 
 
 def _problem(sentence: str, loc: tuple[int | str, ...], found: Any = None) -> InitErrorDetails:

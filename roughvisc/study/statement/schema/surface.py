@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import reduce
-from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WrapValidator, create_model
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, create_model
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import Boundary
@@ -24,6 +22,7 @@ from roughvisc.study.statement.schema.section import (
     measured,
     nearest,
     nullable,
+    one_of,
     paired,
     refuse,
     shown,
@@ -259,14 +258,10 @@ def _made(recipe: type[FromRecipe], prefix: str = "") -> dict[str, Any]:
     }
 
 
-def _picker(whole: type[Section], of_file: type[FromFile], made: dict[str, Any]) -> Any:
-    """A table as the class of what it is; ``whole`` is the class that all of them share."""
+def _face(base: type[Section], of_file: type[FromFile], made: dict[str, Any], name: str) -> Any:
+    """Kind: a table with a file or with a recipe, as the class of what it is."""
 
-    def pick(data: Any, _: Any, info: Any) -> Any:
-        if isinstance(data, whole):
-            return data
-        if not isinstance(data, dict):
-            raise InputError(f"found {shown(data)}: expected a table with a file, or with generate")
+    def make(data: dict[str, Any], info: ValidationInfo) -> Any:
         if ("file" in data) == ("generate" in data):
             hints = [close(key, ("file", "generate")) for key in data if key not in ("file", "generate")]
             raise InputError(f"found {shown(data)}: expected either file or generate{next(filter(None, hints), '')}")
@@ -277,7 +272,8 @@ def _picker(whole: type[Section], of_file: type[FromFile], made: dict[str, Any])
             raise refuse("generate", f"found {shown(recipe)}, which is no known recipe{nearest(recipe, made)}")
         return made[recipe].model_validate(data, context=info.context)
 
-    return WrapValidator(pick)
+    wanted = "with a file, or with generate"
+    return one_of(base, (of_file, *made.values()), make, f"a table {wanted}", f"a [{name}] table {wanted}")
 
 
 class SecondFile(FromFile, SecondFace):
@@ -289,12 +285,7 @@ class SecondRecipe(FromRecipe, SecondFace):
 
 
 SECOND = _made(SecondRecipe, "second_")
-_SECOND_WANTED = "a [surface.second] table with a file, or with generate"
-AnySecond = Annotated[
-    reduce(or_, (SecondFile, *SECOND.values())),
-    _picker(SecondFace, SecondFile, SECOND),
-    Field(description=_SECOND_WANTED),
-]
+AnySecond = _face(SecondFace, SecondFile, SECOND, "surface.second")
 
 
 class SurfaceSection(Conditioned, Raw):
@@ -327,8 +318,4 @@ class RecipeSurface(FromRecipe, SurfaceSection):
 
 
 GENERATED = _made(RecipeSurface)
-AnySurface = Annotated[
-    reduce(or_, (FileSurface, *GENERATED.values())),
-    _picker(SurfaceSection, FileSurface, GENERATED),
-    Field(description="a [surface] table with a file, or with generate"),
-]
+AnySurface = _face(SurfaceSection, FileSurface, GENERATED, "surface")
