@@ -461,12 +461,12 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
     return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
 
 
-def said(value: float, unit: str, digits: int = 6) -> str:
-    """One value in SI as read in running text, to so many digits.
+def said(value: float, unit: str) -> str:
+    """One value in SI as read in running text, to six digits.
 
     Examples
     --------
     >>> said(1e5, "Pa s"), said(0.05, "s"), said(2.0, "N")
     ('100 kPa s', '50 ms', '2 N')
     """
-    return unit_for([value], unit).text(value, digits)
+    return unit_for([value], unit).text(value, 6)

@@ -28,7 +28,7 @@ from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.files import is_writable, partial_files, require_writable, warn_once
+from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable, warn_once
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import open_result, quarantine, result_path, write_result
@@ -79,8 +79,7 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
         folder = study_folder(case.origin)
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
-    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not there.is_dir():
+    if not (there := existing_part(folder)).is_dir():
         raise InputError(f"{there}: is a file: expected a folder for the results")
     if to_write:
         require_writable(folder)

@@ -64,7 +64,7 @@ def open_unlinked(path: str | Path, flags: int, expected: str) -> int:
 
 def is_writable(folder: Path) -> bool:
     """Whether files can be made in a folder, which need not exist yet."""
-    return os.access(_nearest(folder), os.W_OK)
+    return os.access(existing_part(folder), os.W_OK)
 
 
 def require_writable(folder: Path, why: str = "") -> None:
@@ -77,10 +77,10 @@ def require_writable(folder: Path, why: str = "") -> None:
     """
     if not is_writable(folder):
         needed = f", {why}" if why else ""
-        raise FolderError(f"{_nearest(folder)}: is not writable: expected a folder with write permission{needed}")
+        raise FolderError(f"{existing_part(folder)}: is not writable: expected a folder with write permission{needed}")
 
 
-def _nearest(folder: Path) -> Path:
+def existing_part(folder: Path) -> Path:
     """A folder, or what is there of the folders above it."""
     return next(place for place in (folder, *folder.absolute().parents) if place.exists())
 
