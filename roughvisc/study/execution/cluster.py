@@ -24,6 +24,28 @@ from roughvisc.topography.grid import nominal_area
 if TYPE_CHECKING:
     from distributed import Client
 
+#: What a worker imports anyway, xarray's look for other kinds of arrays included.
+_PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
+#: What a process executes to say which version of roughvisc it has: a text, as it may have no such function.
+SOURCE = """
+def version():
+    try:
+        from roughvisc.study.statement.identity import program_version
+        return program_version()
+    except ImportError:
+        pass
+    try:
+        return "roughvisc " + __import__("roughvisc").__version__
+    except ImportError:
+        return "no roughvisc"
+"""
+#: The version of a process, for :func:`eval` with the name ``source``.
+VERSION = "exec(source, names := {}) or names['version']()"
+#: Signals that the process of a sweep answers for its workers too.
+_OURS = (signal.SIGINT, signal.SIGTERM)
+#: A file that is smaller holds no surface of :data:`WORTH_ASKING` cells. [byte]
+_SMALL_FILE = WORTH_ASKING
+
 
 def refuse_unguarded_script() -> None:
     """Refuse to start processes for a script's line that each of them would run again.
@@ -63,27 +85,6 @@ def _guarded(path: Path, line: int) -> bool:
         and node.lineno <= line <= (node.end_lineno or line)
         for node in ast.walk(tree)
     )
-
-
-#: What a worker imports anyway, xarray's look for other kinds of arrays included.
-_PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
-#: What a process executes to say which version of roughvisc it has: a text, as it may have no such function.
-SOURCE = """
-def version():
-    try:
-        from roughvisc.study.statement.identity import program_version
-        return program_version()
-    except ImportError:
-        pass
-    try:
-        return "roughvisc " + __import__("roughvisc").__version__
-    except ImportError:
-        return "no roughvisc"
-"""
-#: The version of a process, for :func:`eval` with the name ``source``.
-VERSION = "exec(source, names := {}) or names['version']()"
-#: Signals that the process of a sweep answers for its workers too.
-_OURS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
@@ -218,10 +219,6 @@ def _leave_interrupts_to_the_sweep() -> None:
     """A terminal's Ctrl-C, a batch system's SIGTERM reach all processes: the sweep's own tells the workers to stop."""
     for number in _OURS:
         signal.signal(number, signal.SIG_IGN)
-
-
-#: A file that is smaller holds no surface of :data:`WORTH_ASKING` cells. [byte]
-_SMALL_FILE = WORTH_ASKING
 
 
 def processes_that_fit(sizes: Iterable[float], most: int, free: float) -> int:

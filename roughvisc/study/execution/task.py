@@ -36,30 +36,6 @@ if TYPE_CHECKING:
     from distributed import Worker
 
 
-_LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
-
-
-def is_leaving(worker: Worker) -> bool:
-    """Whether a worker was told to leave: by a signal, or since its lifetime is over."""
-    return worker.status in _LEAVING
-
-
-def close_on_sigterm(worker: Worker) -> None:
-    """Have a worker close in order at SIGTERM; called by its task, from whatever thread.
-
-    Batch systems send SIGTERM to every process of a job. Dask's nanny knows what to do; its worker would end there and
-    then. No plugin of the cluster: a worker without roughvisc could not load it.
-    """
-    worker.loop.add_callback(_take_signals, worker)
-
-
-def _take_signals(worker: Worker) -> None:
-    if threading.current_thread() is not threading.main_thread():  # a thread of the user's own process
-        return
-    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:  # else the process of the sweep answers for it
-        signal.signal(signal.SIGTERM, lambda *_: worker.loop.add_callback(worker.close, nanny=False, reason="SIGTERM"))
-
-
 log = logging.getLogger("roughvisc")
 Progress = Callable[[float, float], None]
 #: How a case ended. ``hindered``: something outside the case was in the way (a full disk, too little memory, a process
@@ -76,6 +52,26 @@ _REPORT_EVERY = 0.5
 _stopped: set[str] = set()
 #: netCDF-4 does not stand two threads, so a process brings one case at a time whatever its number of threads.
 _one_at_a_time = threading.Lock()
+#: States of a worker that was told to leave: by a signal, or since its lifetime is over.
+_LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
+#: Folder of the copies, in that of the results.
+INPUTS = "inputs"
+
+
+def close_on_sigterm(worker: Worker) -> None:
+    """Have a worker close in order at SIGTERM; called by its task, from whatever thread.
+
+    Batch systems send SIGTERM to every process of a job. Dask's nanny knows what to do; its worker would end there and
+    then. No plugin of the cluster: a worker without roughvisc could not load it.
+    """
+    worker.loop.add_callback(_take_signals, worker)
+
+
+def _take_signals(worker: Worker) -> None:
+    if threading.current_thread() is not threading.main_thread():  # a thread of the user's own process
+        return
+    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:  # else the process of the sweep answers for it
+        signal.signal(signal.SIGTERM, lambda *_: worker.loop.add_callback(worker.close, nanny=False, reason="SIGTERM"))
 
 
 class Report(TypedDict):
@@ -211,7 +207,7 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
             worker.log_event(sweep, event)
 
     def stop() -> bool:
-        return sweep in _stopped or is_leaving(worker)
+        return sweep in _stopped or worker.status in _LEAVING
 
     with _one_at_a_time:
         if stop():
@@ -240,10 +236,6 @@ def stop_sweep(sweep: str) -> None:
     _stopped.add(sweep)
 
 
-#: Folder of the copies, in that of the results.
-INPUTS = "inputs"
-
-
 def serialize_with_inputs(case: Case, folder: Path) -> str:
     """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.
 
@@ -255,10 +247,7 @@ def serialize_with_inputs(case: Case, folder: Path) -> str:
         Where the copies go, each in a folder of its own named by its content; made if need be.
     """
     stated = json.loads(case.to_json())
-    for table in ("surface", "material"):
-        if table in stated:
-            stated[table] = _moved(stated[table], folder)
-    return json.dumps(stated)
+    return json.dumps(stated | {table: _moved(stated[table], folder) for table in ("surface", "material")})
 
 
 def _moved(stated: Any, folder: Path) -> Any:

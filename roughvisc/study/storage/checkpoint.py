@@ -31,9 +31,16 @@ from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_i
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.recorder import Checkpoint, Frame
 from roughvisc.study.statement.identity import NUMERICS_REVISION
-from roughvisc.study.storage.files import atomic_write, open_unlinked, refuse_link
+from roughvisc.study.storage.files import (
+    atomic_write,
+    open_unlinked,
+    pack_with_checksum,
+    refuse_link,
+    unpack_with_checksum,
+)
 from roughvisc.variables import RESULT_FORMAT
 
+log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
 
 # Not NumPy's .npz, though it has checksums too: measured, a row took 1.3 to 3 times as long to write and 1.5 to 6 times
@@ -45,6 +52,10 @@ _KINDS = "fiubc"
 _SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
 #: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
 _WAITING = 8 << 20
+#: Raised by whoever changes what a checkpoint holds of a state.
+_LAYOUT = 2
+#: Writing checkpoints may take this part of the time.
+_SHARE = 0.05
 
 
 class Damaged(Exception):
@@ -59,9 +70,9 @@ def write_record(stream: IO[bytes], plain: Any, arrays: Mapping[str, Array]) -> 
     payload = {name: _packed(array) for name, array in arrays.items()}
     listed = [[name, a.dtype.str, a.shape, len(payload[name]), zlib.crc32(payload[name])] for name, a in arrays.items()]
     text = json.dumps([plain, listed]).encode()  # the shortest text that gives a float back exactly
-    head = _HEAD.pack(_MARK, len(text), zlib.crc32(text), 0)[:-4]
+    head = pack_with_checksum(_HEAD, _MARK, len(text), zlib.crc32(text))
     written = 0
-    for part in (head + zlib.crc32(head).to_bytes(4, "little") + text, *payload.values()):
+    for part in (head + text, *payload.values()):
         left = memoryview(part)
         while len(left):
             left = left[stream.write(left) :]
@@ -87,8 +98,8 @@ def read_record(stream: IO[bytes], only: Collection[str] | None = None) -> tuple
     head = stream.read(_HEAD.size)
     if len(head) < _HEAD.size:
         raise Damaged("no record begins here")
-    mark, length, checksum, own = _HEAD.unpack(head)
-    if mark != _MARK or zlib.crc32(head[:-4]) != own:
+    mark, length, checksum = unpack_with_checksum(_HEAD, head) or (b"", 0, 0)
+    if mark != _MARK:
         raise Damaged("a record's head is damaged")
     text = stream.read(length)
     if len(text) < length or zlib.crc32(text) != checksum:
@@ -232,14 +243,6 @@ class _Frames(BackendArray):
         for place, row in zip(read, rows, strict=True):
             self._frame(int(row), place)
         return read[(slice(None), *key[1:])]
-
-
-log = logging.getLogger("roughvisc")
-
-#: Raised by whoever changes what a checkpoint holds of a state.
-_LAYOUT = 2
-#: Writing checkpoints may take this part of the time.
-_SHARE = 0.05
 
 
 def save_checkpoint(path: Path, reached: Checkpoint, key: str) -> None:

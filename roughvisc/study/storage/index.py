@@ -152,11 +152,10 @@ def read_entry(path: Path) -> Entry:
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
     try:
-        histories = {
-            name: v for name, v in current_histories(stored, attributes).items() if name in _names_of_histories()
-        }
+        current, known = current_histories(stored, attributes), _names_of_histories()
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+    histories = {name: values for name, values in current.items() if name in known}
     along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]
     if absent or not is_json_table(attributes.get("case")):
@@ -168,13 +167,12 @@ def read_entry(path: Path) -> Entry:
 
 def _histories(file: Any) -> dict[str, NDArray[Any]]:
     """Histories of a result by their names in the package; in files of former versions they are all at the root."""
-    found = {
-        name: file[name][:] for name in dict.fromkeys((*_names_of_histories(), *FORMER_NAMES)) if name in file.variables
-    }
+    known = _names_of_histories()
+    found = {name: file[name][:] for name in dict.fromkeys((*known, *FORMER_NAMES)) if name in file.variables}
     for group, members in file.groups.items():
         prefix = of_step("") if group == "steps" else ""
         names = {f"{prefix}{name}": variable for name, variable in members.variables.items()}
-        found |= {name: names[name][:] for name in _names_of_histories() if name in names and name not in found}
+        found |= {name: names[name][:] for name in known if name in names and name not in found}
     return found
 
 
