@@ -20,7 +20,7 @@ from roughvisc.study.execution import run
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.storage import records
+from roughvisc.study.storage import checkpoint
 
 STUDY = """{"title": "overhead", "surface": {"generate": "self_affine", "size": [1e-3, 1e-3], "shape": [64, 64],
 "hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 5e-5, "seed": 1},
@@ -76,7 +76,7 @@ def storing(cells, boundary):
     base = Case.from_json(STUDY)
     solve = {"solve.boundary": boundary, "solve.edge": "accept", "solve.tolerance": 1e-3}
     case = vary(base, {"surface.shape": [cells, cells], "surface.shortcut": 5e-3 / cells, "keep.times": "all"} | solve)
-    places = ((records.RowFile, "append"), (run, "keep"), (run.CheckpointWriter, "save"), (driver, "dataset_of"))
+    places = ((checkpoint.RowFile, "append"), (run, "keep"), (run.CheckpointWriter, "save"), (driver, "dataset_of"))
     inside, found = [], {place: getattr(*place) for place in places}
 
     def timed(function):

@@ -143,7 +143,7 @@ def read_entry(path: Path) -> Entry:
         sealed = verify_checksum(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
-            attributes = attributes_of({name: file.getncattr(name) for name in file.ncattrs()})
+            attributes = attributes_of(file.__dict__)
             stored = _histories(file)
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]

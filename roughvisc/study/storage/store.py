@@ -37,6 +37,19 @@ from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.axes import AXES, axis_of
 
+log = logging.getLogger("roughvisc")
+
+#: What every result says of itself, whatever else it says.
+_NEEDED_ATTRIBUTES = {"Conventions": "CF-1.11", "result_format": RESULT_FORMAT}
+#: Free space below which a write that failed is put down to a full disk. [bytes]
+_NEARLY_FULL = 1 << 20
+#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
+#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
+#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
+#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms, which would slow a run by more than a tenth.
+_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.25, 0.5
+_SMALL = 1 << 16  # compressed in any case [bytes]
+_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
 #: End of the name of the borders of cells in a file; a Dataset has none, its cells are all alike.
 BOUNDS = "_bounds"
 
@@ -78,21 +91,19 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
     variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
     for axis in [name for name, one in variables.items() if one.attrs.get("bounds") == f"{name}{BOUNDS}"]:
         variables.pop(variables[axis].attrs.pop("bounds"), None)
-    attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-    decoded = xr.decode_cf(xr.Dataset(variables, attrs=attributes), decode_timedelta=False)
+    decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
     texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
     return decoded.assign_coords(texts)
 
 
 def _variable(path: str, stored: netCDF4.Variable) -> xr.Variable:
-    attributes = {name: stored.getncattr(name) for name in stored.ncattrs()}
     lazily = stored.dimensions[-2:] == ("x", "y")
     data = indexing.LazilyIndexedArray(_Field(path, stored)) if lazily else np.asarray(stored[...])
     filters = stored.filters() or {}
     encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
-    chunks = stored.chunking()
-    encoding |= {"contiguous": True} if chunks == "contiguous" else {"chunksizes": tuple(chunks or ())}
-    return xr.Variable(stored.dimensions, data, attributes, encoding)
+    chunking = stored.chunking()
+    encoding |= {"contiguous": True} if chunking == "contiguous" else {"chunksizes": tuple(chunking or ())}
+    return xr.Variable(stored.dimensions, data, stored.__dict__, encoding)
 
 
 class _Field(BackendArray):
@@ -107,15 +118,6 @@ class _Field(BackendArray):
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
         return read_variable(self.path, self.name, key)
-
-
-#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
-#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
-#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
-#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms, which would slow a run by more than a tenth.
-_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.25, 0.5
-_SMALL = 1 << 16  # compressed in any case [bytes]
-_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
 
 
 def is_field(variable: xr.Variable) -> bool:
@@ -166,13 +168,6 @@ def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
     if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
         return {}
     return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
-
-
-log = logging.getLogger("roughvisc")
-#: What every result says of itself, whatever else it says.
-_NEEDED_ATTRIBUTES = {"Conventions": "CF-1.11", "result_format": RESULT_FORMAT}
-#: Free space below which a write that failed is put down to a full disk. [bytes]
-_NEARLY_FULL = 1 << 20
 
 
 def result_path(folder: Path, name: str) -> Path:
