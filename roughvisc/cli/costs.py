@@ -87,7 +87,7 @@ def trade(
     from roughvisc.study.trade.floor import with_floors
     from roughvisc.study.trade.reference import further_quantities_of, quantities_of
     from roughvisc.study.trade.trade import trade as measured
-    from roughvisc.views.console.trade_table import trade_table
+    from roughvisc.views.console.accuracy_tables import trade_table
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import trade as figure
 
@@ -202,7 +202,7 @@ def budget(
 def show(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
     """Print the budget of a number, write it, and draw it."""
     from roughvisc.study.storage.store import write_dataset
-    from roughvisc.views.console.budget_table import budget_table
+    from roughvisc.views.console.accuracy_tables import budget_table
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import budget as figure
 

@@ -104,7 +104,7 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.audit.given import from_options, of_study
     from roughvisc.study.storage.store import no_results, result_files, whole_result
-    from roughvisc.views.console.audit_table import audit_table
+    from roughvisc.views.console.accuracy_tables import audit_table
 
     given = from_options(stated).over(of_study(study) if study is not None else {})
     paths = result_files(result) if result.is_dir() else [result]

@@ -411,4 +411,9 @@ def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
     table.add_column(overflow="fold")
     for label, value in rows:
         table.add_row(Text(label), Text(printable(str(value))))  # names in files may look like markup
-    return Group(Text(printable(title or "untitled"), style="bold"), table)
+    return titled(title, table)
+
+
+def titled(title: str | None, *parts: Any) -> Group:
+    """A title above what it is of."""
+    return Group(Text(printable(title or "untitled"), style="bold"), *parts)

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.study.audit.audit import audit
+from roughvisc.study.audit.finding import Finding
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write, verify_checksum
@@ -265,24 +266,12 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _audit(dataset: xr.Dataset) -> list[dict[str, str]]:
+def _audit(dataset: xr.Dataset) -> list[Finding]:
     """Rows of the table of assumptions; none of a Dataset that lacks what an audit starts from."""
     try:
-        found = audit(dataset)
+        return list(audit(dataset))
     except InputError:
         return []
-    return [
-        {
-            "name": one.name,
-            "assumed": one.limit.assumption,
-            "verdict": one.verdict,
-            "number": one.shown,
-            "limits": f"{one.limit.doubtful:g}, {one.limit.broken:g}",
-            "what": one.limit.number,
-            "sentence": one.sentence,
-        }
-        for one in found
-    ]
 
 
 # ----------------------------------------------------------------------------------------------------- surface

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
@@ -65,12 +66,12 @@ class Colouring:
         shown = self.parameter.unit(self.parameter.levels)
         return (LogNorm if even_in_log(shown) else Normalize)(shown[0], shown[-1])
 
-    def handles(self) -> list[Line2D]:
+    def legend(self) -> dict[str, Artist]:
         """Entries of a legend, a level each; none where there are too many."""
         if not self.few:
-            return []
+            return {}
         texts = self.parameter.texts()
-        return [Line2D([], [], color=self.colour(i), lw=1.6, label=text) for i, text in enumerate(texts)]
+        return {text: Line2D([], [], color=self.colour(i), lw=1.6) for i, text in enumerate(texts)}
 
     def draw_bar(self, figure: Figure, axes) -> None:
         """Colour bar, where there are too many levels for a legend."""

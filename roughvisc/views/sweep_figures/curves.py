@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -31,7 +30,7 @@ from roughvisc.views.sweep_figures.cases import (
     without_zeros,
 )
 from roughvisc.views.sweep_figures.colouring import Colouring, readable_ticks
-from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_handles, draw_band
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, Band, band_legend, draw_band
 
 _MOST_PANELS = 9
 
@@ -98,10 +97,9 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
         ax.tick_params(labelbottom=number + columns >= count)
     figure.supxlabel(axis.unit.label(axis.label))
     figure.supylabel(label_of(cases, quantity, unit))
-    handles = colouring.handles() if len(first.levels) > 1 else []
-    named: dict[str, Artist] = {str(handle.get_label()): handle for handle in handles}
+    named = colouring.legend() if len(first.levels) > 1 else {}
     title = first.name if named else ""
-    named |= {str(handle.get_label()): handle for handle in band_handles(cases.bands)}
+    named |= band_legend(cases.bands)
     if dotted:
         named[AXES[cases.axis].rows] = Line2D([], [], color="0.3", ls="", marker="o", ms=3)
     style.legend_above(figure, named, title)
@@ -174,7 +172,6 @@ def _numbered(count: int) -> Parameter:
 # ---------------------------------------------------------------------------------------------------- friction
 
 _FRICTION = ("friction_coefficient", "contact_fraction")
-_OPEN = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4, label="not converged")
 
 
 @style.apply
@@ -210,8 +207,8 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     colouring = Colouring(combined(cases.parameters or [_numbered(len(cases.members))]))
     speeds = np.concatenate([member[over].values for member in cases.members])
     across = unit_for(middle_of_decades(speeds), "m/s")
-    handles: list[Artist] = [*colouring.handles()] if len(colouring.parameter.levels) > 1 else []
-    figure = style.new_figure(6.6, 2.9 + 0.12 * len(handles))
+    named = colouring.legend() if len(colouring.parameter.levels) > 1 else {}
+    figure = style.new_figure(6.6, 2.9 + 0.12 * len(named))
     panels = figure.subplots(1, 2)
     settled = [
         _draw_friction(panels, member, band, over, across, colouring.colour(int(place)))
@@ -224,9 +221,11 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
         ax.set_ylabel(SLIDING[name].label)
         ax.grid(color="0.9", lw=0.5)
     style.letter_panels(list(panels))
-    title = colouring.parameter.name if handles else ""
-    handles += band_handles(cases.bands) + ([] if all(settled) else [_OPEN])
-    style.legend_above(figure, {str(one.get_label()): one for one in handles}, title)
+    title = colouring.parameter.name if named else ""
+    named |= band_legend(cases.bands)
+    if not all(settled):
+        named["not converged"] = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4)
+    style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(panels))
     return figure
 

@@ -79,10 +79,7 @@ def _of_rows(drawn: Sequence[xr.Dataset], rows: str) -> tuple[dict, dict, dict]:
         common = common[(common >= max(one.min() for one in places)) & (common <= min(one.max() for one in places))]
     held = (str(name) for name, one in drawn[0].data_vars.items() if one.dims == (rows,))
     names = [name for name in held if all(name in one for one in drawn)]
-    found = _moments(drawn, names, rows, common, (rows,))
-    for one in found:
-        one[rows] = xr.Variable(rows, common, drawn[0][rows].attrs)
-    return found
+    return _moments(drawn, names, rows, common, rows)
 
 
 def _of_steps(drawn: Sequence[xr.Dataset]) -> tuple[dict, dict, dict]:
@@ -91,28 +88,25 @@ def _of_steps(drawn: Sequence[xr.Dataset]) -> tuple[dict, dict, dict]:
     common = np.unique(np.concatenate([clock[np.isfinite(clock)] for clock in clocks]))
     common = common[np.unique(np.linspace(0, len(common) - 1, _MOST_TIMES).astype(int))] if common.size else common
     names = [name for name in map(of_step, STEPPED) if all(name in one for one in drawn)]
-    found = _moments(drawn, names, _STEP_TIME, common, ("step",))
-    for one in found:
-        one[_STEP_TIME] = xr.Variable("step", common, drawn[0][_STEP_TIME].attrs)
-    return found
+    return _moments(drawn, names, _STEP_TIME, common, "step")
 
 
 def _moments(
-    drawn: Sequence[xr.Dataset], names: Sequence[str], clock: str, common: np.ndarray, dims: tuple[str, ...]
+    drawn: Sequence[xr.Dataset], names: Sequence[str], clock: str, common: np.ndarray, dim: str
 ) -> tuple[dict, dict, dict]:
-    """Mean and band of some histories at common places."""
-    mean, lower, upper = {}, {}, {}
+    """Mean and band of some histories at common places, and these."""
+    mean, lower, upper = ({clock: xr.Variable(dim, common, drawn[0][clock].attrs)} for _ in range(3))
     for name in names:
         attrs = drawn[0][name].attrs
         if "flag_values" in attrs:
             told = np.array([_at(one, name, clock, common, nearest=True) for one in drawn])
             bad = (told == NOT_CONVERGED).any(axis=0)  # the worst that any of them tells
-            mean[name] = xr.Variable(dims, np.where(bad, NOT_CONVERGED, told[0]), attrs)
+            mean[name] = xr.Variable(dim, np.where(bad, NOT_CONVERGED, told[0]), attrs)
             continue
         found = statistics(np.array([_at(one, name, clock, common) for one in drawn], dtype=float))
-        mean[name] = xr.Variable(dims, found["mean"], attrs)
-        lower[name] = xr.Variable(dims, found["patch_lower"], attrs)
-        upper[name] = xr.Variable(dims, found["patch_upper"], attrs)
+        mean[name] = xr.Variable(dim, found["mean"], attrs)
+        lower[name] = xr.Variable(dim, found["patch_lower"], attrs)
+        upper[name] = xr.Variable(dim, found["patch_upper"], attrs)
     return mean, lower, upper
 
 
@@ -138,17 +132,19 @@ def draw_band(ax: Axes, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, col
         ax.vlines(x, lower, upper, color=colour, alpha=0.35, lw=5, zorder=1)
 
 
-def band_handles(bands: Iterable[Band | None]) -> list[Artist]:
+def band_legend(bands: Iterable[Band | None]) -> dict[str, Artist]:
     """Entries of a legend that say what lines and bands are; none without realisations."""
     known = [band for band in bands if band is not None]
     if not known:
-        return []
+        return {}
     counts = sorted({band.count for band in known})
     number = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     surrogates = any(band.itself is not None for band in known)
-    drawn = "Gaussian surrogates" if surrogates else "realisations"
-    found: list[Artist] = [
-        Line2D([], [], color="0.3", lw=1.6, label=f"mean of {number} {drawn}"),
-        Patch(color="0.3", alpha=0.22, lw=0, label="95 % of patches"),
-    ]
-    return found + ([Line2D([], [], color="0.3", **ITSELF_STYLE, label="the scan itself")] if surrogates else [])
+    named: dict[str, Artist] = {}
+    named[f"mean of {number} {'Gaussian surrogates' if surrogates else 'realisations'}"] = Line2D(
+        [], [], color="0.3", lw=1.6
+    )
+    named["95 % of patches"] = Patch(color="0.3", alpha=0.22, lw=0)
+    if surrogates:
+        named["the scan itself"] = Line2D([], [], color="0.3", **ITSELF_STYLE)
+    return named

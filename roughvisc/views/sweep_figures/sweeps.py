@@ -33,7 +33,7 @@ from roughvisc.views.sweep_figures.cases import (
     without_zeros,
 )
 from roughvisc.views.sweep_figures.colouring import Colouring, even_in_log, readable_ticks
-from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, band_handles, draw_band
+from roughvisc.views.sweep_figures.ensembles import ITSELF_STYLE, band_legend, draw_band
 
 #: Parameters with so many values or more make a map by default.
 _MAP_FROM = 4
@@ -241,8 +241,7 @@ def _lines_by_time(drawn: _Drawn, across: Parameter) -> Figure:
     for number, (colour, title) in enumerate(zip(shades, drawn.titles, strict=True)):
         _draw_line(ax, drawn, across, number, slice(None), color=colour, label=title)
     _finish(ax, drawn, across)
-    named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    style.legend_above(figure, named | {str(one.get_label()): one for one in band_handles(drawn.cases.bands)})
+    style.legend_above(figure, style.named_in(ax) | band_legend(drawn.cases.bands))
     return figure
 
 
@@ -250,7 +249,7 @@ def _families(drawn: _Drawn, across: Parameter) -> Figure:
     """Several parameters: a panel for each time, in it a line for each combination of the others."""
     family = combined([one for one in drawn.cases.parameters if one.key != across.key])
     colouring, times = Colouring(family), len(drawn.values)
-    named = colouring.handles()
+    named = colouring.legend()
     figure = style.new_figure(1.2 + 3.0 * times, 3.2 + 0.14 * len(named) / (1 + times))
     axes = figure.subplots(1, times, sharey=True, squeeze=False)[0]
     for number, ax in enumerate(axes):
@@ -261,14 +260,19 @@ def _families(drawn: _Drawn, across: Parameter) -> Figure:
         _finish(ax, drawn, across)
         ax.label_outer(remove_inner_ticks=False)
         ax.set_xlabel(across.label)
-    handles = [*named, *band_handles(drawn.cases.bands), *([_CROSS] if drawn.failed.any() else [])]
-    style.legend_above(figure, {str(one.get_label()): one for one in handles}, family.name if named else "")
+    title = family.name if named else ""
+    named |= band_legend(drawn.cases.bands)
+    if drawn.failed.any():
+        named[_NOT_CONVERGED] = Line2D([], [], **_CROSS)
+    style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(axes))
     style.letter_panels(axes, drawn.titles)
     return figure
 
 
-_CROSS = Line2D([], [], color="k", marker="x", ls="", ms=5, label="not converged")
+#: How a value is marked whose step did not converge.
+_CROSS: dict[str, Any] = {"color": "k", "marker": "x", "ls": "", "ms": 5}
+_NOT_CONVERGED = "not converged"
 
 
 def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: Any, **look) -> None:
@@ -289,7 +293,7 @@ def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: A
         of_itself = ITSELF_STYLE if across.numeric else {"ls": ""}
         ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **of_itself)
     if failed.any():
-        ax.plot(place[failed], shown[failed], "x", color="k", ms=5, mew=1.2, zorder=5, label=_CROSS.get_label())
+        ax.plot(place[failed], shown[failed], **_CROSS, mew=1.2, zorder=5, label=_NOT_CONVERGED)
 
 
 def _finish(ax: Axes, drawn: _Drawn, across: Parameter) -> None:

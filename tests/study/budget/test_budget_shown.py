@@ -9,7 +9,7 @@ from rich.console import Console
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.views.console.budget_table import budget_table
+from roughvisc.views.console.accuracy_tables import budget_table
 
 STUDY = """
 title = "Ball"

@@ -19,7 +19,7 @@ from roughvisc.study.trade import recommend
 from roughvisc.study.trade.apply import apply
 from roughvisc.study.trade.ladder import Setting
 from roughvisc.study.trade.reference import QUANTITIES
-from roughvisc.views.console.trade_table import trade_table
+from roughvisc.views.console.accuracy_tables import trade_table
 from roughvisc.views.figures.trade import _FAMILIES
 
 AREA = "contact_area"

@@ -17,7 +17,7 @@ from roughvisc.study.trade.apply import apply
 from roughvisc.study.trade.bench import NotRun, TimedRuns
 from roughvisc.study.trade.finest import differences
 from roughvisc.study.trade.ladder import Setting, ladder
-from roughvisc.views.console.trade_table import trade_table
+from roughvisc.views.console.accuracy_tables import trade_table
 
 WAVE = """
 [surface]
