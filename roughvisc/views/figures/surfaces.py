@@ -10,16 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.topography import blocks
 from roughvisc.topography.bandwidth import off_plane
-from roughvisc.topography.blocks import (
-    count_of,
-    deviation_of,
-    extremes_of,
-    known_values,
-    mean_of,
-    percentiles_of,
-    row_blocks,
-)
 from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.spectrum import MOST_MISSING, psd, unmeasured
 from roughvisc.units import Unit, unit_for
@@ -54,9 +46,9 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
     tuple of float
         The lowest and the highest height where no point is beyond. [m]
     """
-    lower, median, upper = percentiles_of(values, (25, 50, 75))
+    lower, median, upper = blocks.percentiles_of(values, (25, 50, 75))
     reach = _REACH * (upper - lower) / 1.349  # the quartiles of the normal distribution are 1.349 deviations apart
-    lowest, highest = extremes_of(values)
+    lowest, highest = blocks.extremes_of(values)
     if not reach > 0:
         return lowest, highest
     return max(lowest, float(median - reach)), min(highest, float(median + reach))
@@ -64,8 +56,8 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
 
 def _beyond(values: np.ndarray, low: float, high: float) -> float:
     """Share of the points below and above limits."""
-    blocks = (values[rows] for rows in row_blocks(values.shape))
-    return sum(np.count_nonzero((block < low) | (block > high)) for block in blocks) / values.size
+    parts = (values[rows] for rows in blocks.row_blocks(values.shape))
+    return sum(np.count_nonzero((part < low) | (part > high)) for part in parts) / values.size
 
 
 @style.apply
@@ -90,21 +82,21 @@ def surface(height: xr.DataArray) -> Figure:
     """
     height = _checked(height)
     low, high = robust_limits(height.values)
-    mean = mean_of(height.values)
+    mean = blocks.mean_of(height.values)
     unit, plane = unit_for([high - mean, low - mean], "m"), plane_unit(height)
     figure, panels = _panels(plane_ratio(height))
     on_map = panels["map"]
     image = draw_map(on_map, drawn(height), unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
     beyond = _beyond(height.values, low, high)
-    scale = Scale("height", low, high, *extremes_of(height.values), marked=False)
+    scale = Scale("height", low, high, *blocks.extremes_of(height.values), marked=False)
     levelled = ", levelled" if "levelled: polynomial" in str(height.attrs.get("history", "")) else ""
     colour_bar(figure, [image], scale, unit, VARIABLES["height"].label + levelled, bar_side(height))
     label_plane(on_map, height, plane)
-    missing = (height.size - count_of(height.values)) / height.size
+    missing = (height.size - blocks.count_of(height.values)) / height.size
     notes = [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
     notes += [f"{100 * beyond:.2g} % lie beyond the scale of heights"] if beyond else []
     if (every := stride(height)) > 1:
-        ends = " to ".join(unit.text(one) for one in extremes_of(height.values))
+        ends = " to ".join(unit.text(one) for one in blocks.extremes_of(height.values))
         notes += [f"the map is of means of {every} × {every} points; heights are {ends}"]
     said = "; ".join(notes)
     style.note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
@@ -146,9 +138,9 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
 
 
 def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
-    count = count_of(levelled.values)
+    count = blocks.count_of(levelled.values)
     low, high = (float(unit(limit)) for limit in robust_limits(levelled.values))
-    mean, deviation = float(unit(mean_of(levelled.values))), float(unit(deviation_of(levelled.values)))
+    mean, deviation = float(unit(blocks.mean_of(levelled.values))), float(unit(blocks.deviation_of(levelled.values)))
     bins = int(np.clip(math.sqrt(count) / 1.5, 8, 100))
     if deviation == 0:
         style.say_inside(ax, "flat: one height")
@@ -156,7 +148,7 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
         ax.set_yticks([])
         return
     edges = np.linspace(low, high, bins + 1)
-    found = sum(np.histogram(unit(known), bins, (low, high))[0] for known in known_values(levelled.values))
+    found = sum(np.histogram(unit(known), bins, (low, high))[0] for known in blocks.known_values(levelled.values))
     ax.hist(
         edges[:-1],
         bins=edges,

@@ -140,10 +140,8 @@ def band_legend(bands: Iterable[Band | None]) -> dict[str, Artist]:
     counts = sorted({band.count for band in known})
     number = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     surrogates = any(band.itself is not None for band in known)
-    named: dict[str, Artist] = {}
-    named[f"mean of {number} {'Gaussian surrogates' if surrogates else 'realisations'}"] = Line2D(
-        [], [], color="0.3", lw=1.6
-    )
+    drawn = "Gaussian surrogates" if surrogates else "realisations"
+    named: dict[str, Artist] = {f"mean of {number} {drawn}": Line2D([], [], color="0.3", lw=1.6)}
     named["95 % of patches"] = Patch(color="0.3", alpha=0.22, lw=0)
     if surrogates:
         named["the scan itself"] = Line2D([], [], color="0.3", **ITSELF_STYLE)

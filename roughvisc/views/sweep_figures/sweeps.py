@@ -263,7 +263,7 @@ def _families(drawn: _Drawn, across: Parameter) -> Figure:
     title = family.name if named else ""
     named |= band_legend(drawn.cases.bands)
     if drawn.failed.any():
-        named[_NOT_CONVERGED] = Line2D([], [], **_CROSS)
+        named["not converged"] = Line2D([], [], **_CROSS)
     style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(axes))
     style.letter_panels(axes, drawn.titles)
@@ -272,7 +272,6 @@ def _families(drawn: _Drawn, across: Parameter) -> Figure:
 
 #: How a value is marked whose step did not converge.
 _CROSS: dict[str, Any] = {"color": "k", "marker": "x", "ls": "", "ms": 5}
-_NOT_CONVERGED = "not converged"
 
 
 def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: Any, **look) -> None:
@@ -293,7 +292,7 @@ def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: A
         of_itself = ITSELF_STYLE if across.numeric else {"ls": ""}
         ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **of_itself)
     if failed.any():
-        ax.plot(place[failed], shown[failed], **_CROSS, mew=1.2, zorder=5, label=_NOT_CONVERGED)
+        ax.plot(place[failed], shown[failed], **_CROSS, mew=1.2, zorder=5, label="not converged")
 
 
 def _finish(ax: Axes, drawn: _Drawn, across: Parameter) -> None:
