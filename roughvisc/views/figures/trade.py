@@ -170,7 +170,7 @@ def _place(ax: Axes, dataset: xr.Dataset, settings: np.ndarray, points: np.ndarr
     for i, at in zip(settings, points, strict=True):
         row = dataset.isel(setting=i)
         colour = 0.65 * np.array(to_rgb(_FAMILIES[str(row["family"].values)][1]))
-        label = ax.annotate(_brief(row), at, textcoords="offset points", fontsize=6, color=colour, zorder=4)
+        label = ax.annotate(_brief(row), at, (0, 0), textcoords="offset points", fontsize=6, color=colour, zorder=4)
         boxes, covered = [], []
         for offset, across, up in _PLACES:
             label.set(position=offset, ha=across, va=up)
