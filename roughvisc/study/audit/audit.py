@@ -15,9 +15,8 @@ from roughvisc.notebook import table
 from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface
 from roughvisc.study.audit.evidence import Evidence, of_case, of_result
-from roughvisc.study.audit.finding import Finding
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import BROKEN, DOUBTFUL
+from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, Finding
 from roughvisc.study.statement.case import Case
 
 #: In the order of the table of limits.

@@ -19,9 +19,8 @@ from roughvisc.mechanics.closed_forms.validity import (
     radiation_lag,
 )
 from roughvisc.study.audit.evidence import Evidence
-from roughvisc.study.audit.finding import Finding, as_text, percent, unknown
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import LIMITS
+from roughvisc.study.audit.limits import LIMITS, Finding, as_text, percent, unknown
 
 #: Poisson's ratio by which the shear modulus behind a contact modulus is the least.
 _SOFTEST = 0.5

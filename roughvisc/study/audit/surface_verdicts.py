@@ -13,9 +13,8 @@ from roughvisc.mechanics.closed_forms.adhesion import (
     tabor_parameter,
 )
 from roughvisc.study.audit.evidence import Evidence
-from roughvisc.study.audit.finding import Finding, as_text, percent, unknown
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STATED, STIFF
+from roughvisc.study.audit.limits import ATTRACTION_RANGE, LIMITS, STATED, STIFF, Finding, as_text, percent, unknown
 
 #: Contact fraction from which on spots have grown together.
 _MERGED = 0.5

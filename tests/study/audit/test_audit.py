@@ -12,8 +12,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc import closed_forms as cf
 from roughvisc.errors import InputError
-from roughvisc.study.audit.finding import Finding
-from roughvisc.study.audit.limits import LIMITS, STATED, VERDICTS
+from roughvisc.study.audit.limits import LIMITS, STATED, VERDICTS, Finding
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result
