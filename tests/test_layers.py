@@ -62,7 +62,7 @@ ALLOWED = {
     "study.observed": {*_LABELS, "study.statement", "study.storage", "study.execution", "observables"},
     "study.audit": _AUDIT,
     "study.cost": _COST,
-    "study.quantities": {"errors", "variables", "observables"},
+    "study.quantities": {"errors", "variables", "observables", "study.statement"},
     "study.trade": {*_TRADE, "study.quantities"},
     "study.budget": {*_TRADE, "study.quantities", "study.trade", "study.ensembles", "observables"},
     "study.validation": {*_SOLVE, "solve", "mechanics.closed_forms"},

@@ -84,8 +84,7 @@ def trade(
     from roughvisc.study.trade import files as trade_file
     from roughvisc.study.trade import recommend
     from roughvisc.study.trade.apply import apply
-    from roughvisc.study.trade.floor import with_floors
-    from roughvisc.study.trade.reference import further_quantities_of, quantities_of
+    from roughvisc.study.trade.bench import further_quantities_of, quantities_of
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.accuracy_tables import trade_table
     from roughvisc.views.figures.files import write_figure
@@ -105,7 +104,7 @@ def trade(
     if floor:
         for name, one in budgets(case, names, out=beside, progress=not quiet).items():
             write_dataset(one, beside / f"budget-{name}.nc")
-    dataset = with_floors(dataset, trade_file.budgets_in(beside, names, case))
+    dataset = recommend.with_floors(dataset, trade_file.budgets_in(beside, names, case))
     console.print(trade_table(dataset))
     say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
     first = list(
@@ -180,17 +179,18 @@ def budget(
     case, folder = case_of(open_result(study) if study.suffix == ".nc" else study, out)
     axis = case.experiment().axis
     unit = AXES[axis].variables[axis].units
-    errors = (("--modulus-error", modulus_error), ("--time-scale-error", time_scale_error))
-    modulus, time_scale = (None if text is None else part_of_one(text, name) for name, text in errors)
+    known = {
+        "modulus_error": None if modulus_error is None else part_of_one(modulus_error, "--modulus-error"),
+        "time_scale_error": None if time_scale_error is None else part_of_one(time_scale_error, "--time-scale-error"),
+        "cutoff": cutoff,
+        "population": None if ensemble is None else "ensemble" if ensemble else "patch",
+    }
     found = budgets(
         case,
         list(quantities) or ["contact_area"],
         at=[stated_quantity(one, unit, "--at") for one in places] or None,
         sharp=sharp,
-        modulus_error=modulus,
-        time_scale_error=time_scale,
-        cutoff=cutoff,
-        population=None if ensemble is None else "ensemble" if ensemble else "patch",
+        known=known,
         out=folder,
         workers=workers,
         progress=not quiet,

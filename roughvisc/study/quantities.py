@@ -14,6 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.observables.conductance import conductance
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
+from roughvisc.study.statement.case import Case
 from roughvisc.variables.axes import AXES
 from roughvisc.variables.grid_errors import GRID_ERROR
 
@@ -32,8 +33,8 @@ class Observable:
     ----------
     name, units : str
         As in a result.
-    derive : callable
-        Gives it over the axis, from a result and the arguments of its observable.
+    derive : callable, optional
+        Gives it over the axis, from a result and the arguments of its observable. Default: the result holds it.
     fields : tuple of str
         Fields that it is derived from.
     grid_factor : float
@@ -52,13 +53,20 @@ class Observable:
 
     name: str
     units: str
-    derive: Callable[[xr.Dataset, Observe], xr.DataArray]
+    derive: Callable[[xr.Dataset, Observe], xr.DataArray] | None = None
     fields: tuple[str, ...] = ()
     grid_factor: float = 1.5
     octave_factor: float = 1.1
     of_longest_waves: bool = False
     octave: str = ""
     stated: Callable[[xr.Dataset, Array], Any] | None = None
+
+    def of(self, result: xr.Dataset, case: Case) -> Array:
+        """Its values in a whole result of a case, over the axis, observed as the study says."""
+        observe = case.settings.observe
+        if self.derive is None:
+            return np.asarray(result[self.name].values, dtype=float)
+        return np.asarray(self.derive(result, {} if observe is None else observe.stated()).values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
         """What steps and solver leave of its logarithm, as the rows of a result state it. [-]"""
@@ -73,11 +81,9 @@ class Observable:
         variable = GRID_ERROR.get(_ERROR_OF.get(self.name, self.name), "")
         if variable not in result:
             return None
-        error, values = result[variable].values, np.abs(result[self.name].values)
-        if axis != "speed":  # relative to the largest of a history, at a speed to the value there
-            error = error * np.fmax.reduce(values, initial=0.0)
-        else:
-            error = error * values
+        values = np.abs(result[self.name].values)
+        of = values if axis == "speed" else np.fmax.reduce(values, initial=0.0)  # of a history it is over the largest
+        error = result[variable].values * of
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.log1p(error / values), dtype=float)
 
@@ -87,14 +93,6 @@ class Observable:
             return None
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(-np.log1p(-result[self.octave].values), dtype=float)
-
-    def of(self, result: xr.Dataset, observe: Observe) -> Array:
-        """Its values in a whole result, over the axis."""
-        return np.asarray(self.derive(result, observe).values, dtype=float)
-
-
-def _stored(name: str) -> Callable[[xr.Dataset, Observe], xr.DataArray]:
-    return lambda result, observe: result[name]
 
 
 def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
@@ -115,13 +113,8 @@ def _stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     return incremental_stiffness(result)["incremental_stiffness"]
 
 
-def _of_approach(result: xr.Dataset, values: Array) -> Any:
-    """The mean gap of a periodic surface is off by as much as the approach."""
-    return result["approach_error"].values if "approach_error" in result else None
-
-
-def _of_force(result: xr.Dataset, values: Array) -> Any:
-    return result["force_error"].values if "force_error" in result else None
+def _variable(name: str) -> Callable[[xr.Dataset, Array], Any]:
+    return lambda result, values: result[name].values if name in result else None
 
 
 def _of_area(result: xr.Dataset, values: Array) -> Any:
@@ -140,50 +133,49 @@ def _of_gap(result: xr.Dataset, values: Array) -> Any:
     return np.abs(values) * np.divide(6 * result["approach_error"].values, gap, out=np.zeros_like(gap), where=gap > 0)
 
 
+_OF_APPROACH = _variable("approach_error")  # by which the mean gap of a periodic surface is off too
+_CONDUCTED: dict[str, Any] = {"fields": ("pressure",), "grid_factor": 2.5, "octave_factor": 2.5, "stated": _of_area}
 #: name -> quantity
 QUANTITIES = {
     one.name: one
     for one in (
-        Observable(
-            "contact_area",
-            "m^2",
-            _stored("contact_area"),
-            octave_factor=1.6,
-            octave="last_octave_area",
-            stated=_of_area,
-        ),
-        Observable("mean_gap", "m", _stored("mean_gap"), grid_factor=1.0, of_longest_waves=True, stated=_of_approach),
-        Observable("approach", "m", _stored("approach"), of_longest_waves=True, stated=_of_approach),
-        Observable("force", "N", _stored("force"), stated=_of_force),
-        Observable(
-            "friction_coefficient",
-            "1",
-            _stored("friction_coefficient"),
-            grid_factor=1.0,
-            octave_factor=1.8,
-            octave="last_octave_friction",
-        ),
+        Observable("contact_area", "m^2", octave_factor=1.6, octave="last_octave_area", stated=_of_area),
+        Observable("mean_gap", "m", grid_factor=1.0, of_longest_waves=True, stated=_OF_APPROACH),
+        Observable("approach", "m", of_longest_waves=True, stated=_OF_APPROACH),
+        Observable("force", "N", stated=_variable("force_error")),
+        Observable("friction_coefficient", "1", grid_factor=1.0, octave_factor=1.8, octave="last_octave_friction"),
         Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), of_longest_waves=True, stated=_of_gap),
-        Observable("thermal_conductance", "W/K", _thermal, ("pressure",), 2.5, 2.5, stated=_of_area),
-        Observable("incremental_stiffness", "N/m", _stiffness, ("pressure",), 2.5, 2.5, stated=_of_area),
+        Observable("thermal_conductance", "W/K", _thermal, **_CONDUCTED),
+        Observable("incremental_stiffness", "N/m", _stiffness, **_CONDUCTED),
     )
 }
 
 
-def known_quantity(name: Any, axis: str, slides: bool) -> Observable:
-    """A quantity by its name, where results over an axis have it.
+def _is_over(name: str, axis: str) -> bool:
+    return bool(QUANTITIES[name].fields) or name in AXES[axis].variables
+
+
+def observables_of(case: Case) -> list[str]:
+    """Names of the quantities that the results of a case have."""
+    experiment = case.experiment()
+    slides = experiment.largest_speed > 0
+    return [one for one in QUANTITIES if _is_over(one, experiment.axis) and (slides or one != "friction_coefficient")]
+
+
+def known_quantity(name: Any, case: Case) -> Observable:
+    """A quantity by its name, where the results of a case have it.
 
     Raises
     ------
     InputError
         If there is none of that name, or the results do not hold it.
     """
+    axis = case.experiment().axis
     if name not in QUANTITIES:
         raise InputError(f"quantity is {name!r}: expected one of {', '.join(QUANTITIES)}")
-    if name == "friction_coefficient" and not slides:
+    if name == "friction_coefficient" and name not in observables_of(case):
         raise InputError("quantity is 'friction_coefficient': expected a study in which the surface slides")
-    derived = QUANTITIES[name].fields
-    if not derived and name not in AXES[axis].variables:
-        has = ", ".join(one for one in QUANTITIES if QUANTITIES[one].fields or one in AXES[axis].variables)
+    if not _is_over(name, axis):
+        has = ", ".join(one for one in QUANTITIES if _is_over(one, axis))
         raise InputError(f"quantity is {name!r}: results over {axis} have none: expected one of {has}")
     return QUANTITIES[name]

@@ -100,7 +100,7 @@ def numbers(text, names, folder):
     path.write_text(text)
     case = rv.vary(rv.read_study(path), {"keep.fields": ["pressure", "gap"]})
     result = whole_of(rv.run(case, out=Path(folder) / "runs", progress=False)).load()
-    return {name: QUANTITIES[name].of(result, {}) for name in names}
+    return {name: QUANTITIES[name].of(result, case) for name in names}
 
 
 def scene(family, load, material, number, friction, start, cells):

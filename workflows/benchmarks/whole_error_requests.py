@@ -17,7 +17,6 @@ import argparse
 import json
 import math
 import tempfile
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +25,9 @@ from whole_error import FAMILIES, study
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.budget.target import Bench, choose, first_grids, grids_of, wanting
+from roughvisc.study.budget.grids import first_grids, grids_of
+from roughvisc.study.budget.solves import Bench
+from roughvisc.study.budget.target import choose, wanting
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import compute
 from roughvisc.study.quantities import QUANTITIES
@@ -83,7 +84,7 @@ def scene(family, load, seed, friction):
 def number_of(case, name):
     """A quantity of a case, and the wall time of its solve. [s]"""
     result = compute(case, progress=False)
-    return float(QUANTITIES[name].of(result, {})[-1]), float(result["wall_time"].values[-1])
+    return float(QUANTITIES[name].of(result, case)[-1]), float(result["wall_time"].values[-1])
 
 
 @cache
@@ -113,9 +114,10 @@ def others(family, load, seed, friction):
     fine = grids_of(scene(family, load, seed, friction), [QUANTITIES[name] for name in names], 3e-3).case(-1)
     found = {name: [] for name in names}
     for n in range(PATCHES):
-        result = compute(rv.vary(fine, {"surface.seed": 900_000 + n}), progress=False)
+        other = rv.vary(fine, {"surface.seed": 900_000 + n})
+        result = compute(other, progress=False)
         for name in names:
-            found[name].append(math.log(QUANTITIES[name].of(result, {})[-1]))
+            found[name].append(math.log(QUANTITIES[name].of(result, other)[-1]))
     return found
 
 
@@ -136,18 +138,16 @@ def request(population, family, load, seed, name, target):
         try:
             choice = choose(case, Path(folder), watch=Monitor, tell=spent.append)
         except InputError as error:
-            _, around = first_grids(case, bench, {name: target}, math.inf)
-            parts = bench.solve(around.changed_cases())
-            cost = around.spent + sum(one.seconds for one in parts.values())
+            around = first_grids(case, bench, {name: target}, math.inf).with_changed_cases()
             off = abs(true - math.log(around.solves[around.level].values[name][-1]))
-            within = off <= replace(around, parts=parts).error(QUANTITIES[name])
-            right = "whatever the grid" in str(error) and within
-            return {"outcome": "refused rightly" if right else "refused", "why": str(error), "cost": cost / naive}
+            right = "whatever the grid" in str(error) and off <= around.error(QUANTITIES[name])
+            outcome, cost = "refused rightly" if right else "refused", around.spent / naive
+            return {"outcome": outcome, "why": str(error), "cost": cost}
         budget = choice.budgets[name]
         off = abs(true - math.log(float(budget["value"][-1])))
         cost = float(budget["cost"].sum()) + (float(budget["case_cost"]) if population == "patch" else 0.0)
         met = off <= math.hypot(math.log1p(target), own_error)
-        cells = rv.open_result(choice.path).sizes["x"]
+        cells = choice.case.height().sizes["x"]
     return {"outcome": "met" if met else "missed", "off": off, "cells": cells, "cost": cost / naive}
 
 

@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from roughvisc.errors import InputError, RoughviscError
-from roughvisc.study.budget.own_statistics import own_statistics
-from roughvisc.study.budget.sources import SOURCES, Asked, Found, Population
-from roughvisc.study.budget.stated import stated_by
-from roughvisc.study.budget.variants import Variants, check_share, with_rows
-from roughvisc.study.execution.monitor import Monitor, watcher
+from roughvisc.errors import InputError
+from roughvisc.study.budget.solves import FOLDER, Array, Bench, Reading, nearest_rows, read, stated_by
+from roughvisc.study.budget.sources import SURROGATES, Asked, Found, Population, Values, judge, known_errors, together
+from roughvisc.study.budget.variants import Variants, with_rows
+from roughvisc.study.ensembles import STANDING, STANDING_ATTRIBUTES, ratio, standing
+from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.quantities import Observable, Observe, known_quantity
+from roughvisc.study.quantities import Observable, known_quantity
 from roughvisc.study.statement.case import Case, read_study
-from roughvisc.study.storage.store import result_path, whole_result
-from roughvisc.units import Quantity, in_si, quantities, stated_quantity
+from roughvisc.study.storage.store import result_path
+from roughvisc.topography.parameters import parameters
+from roughvisc.units import Quantity, in_si, quantities
 from roughvisc.variables.axes import AXES
 
 if TYPE_CHECKING:
     from distributed import Client
-
-log = logging.getLogger("roughvisc")
-Array = NDArray[np.float64]
-#: Folder of the further solves, in that of the results.
-FOLDER = "budget"
 
 
 @quantities(modulus_error="1", time_scale_error="1", cutoff="m")
@@ -116,10 +110,12 @@ def budget(
         [quantity] if isinstance(quantity, str) else list(quantity),
         at=at,
         sharp=sharp,
-        modulus_error=modulus_error,
-        time_scale_error=time_scale_error,
-        cutoff=cutoff,
-        population=population,
+        known={
+            "modulus_error": modulus_error,
+            "time_scale_error": time_scale_error,
+            "cutoff": cutoff,
+            "population": population,
+        },
         out=out,
         client=client,
         workers=workers,
@@ -128,97 +124,57 @@ def budget(
     if isinstance(quantity, str):
         return found[quantity]
     names = xr.DataArray(list(found), dims="quantity", name="quantity")
-    together = xr.concat(list(found.values()), names, combine_attrs="drop_conflicts")
-    return together.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
+    over_all = xr.concat(list(found.values()), names, combine_attrs="drop_conflicts")
+    return over_all.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
 
 
 def budgets(
     case: Case | str | Path | xr.Dataset,
     names: Sequence[str],
     *,
+    known: Mapping[str, Any] | None = None,
     at: Sequence[Quantity] | Quantity | None = None,
     sharp: bool = False,
-    modulus_error: Quantity | None = None,
-    time_scale_error: Quantity | None = None,
-    cutoff: Quantity | None = None,
-    population: Population | None = None,
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
-    """Name of each of some quantities -> its :func:`budget`, all from the same solves."""
-    kept, (case, folder) = _kept(case), case_of(case, out)
+    """Name of each of some quantities -> its :func:`budget`, all from the same solves.
+
+    Parameters
+    ----------
+    known : mapping, optional
+        What is known of errors, by the keys that ``[want]`` of a study has for it, in SI.
+    case, names, at, sharp, out, client, workers, progress
+        As :func:`budget` has them.
+    """
+    source = case.encoding.get("source") if isinstance(case, xr.Dataset) else None
+    case, folder = case_of(case, out)
     if not names:
         raise InputError("quantity is empty: expected at least one")
-    experiment = case.experiment()
-    quantities = [known_quantity(name, experiment.axis, experiment.largest_speed > 0) for name in names]
-    if population is not None and population not in get_args(Population):
-        raise InputError(f"population is {population!r}: expected {' or '.join(map(repr, get_args(Population)))}")
-    known = {
-        "modulus_error": check_share("modulus_error", modulus_error),
-        "time_scale_error": check_share("time_scale_error", time_scale_error),
-        "cutoff": None if cutoff is None else stated_quantity(cutoff, "m", "cutoff", above=0),
-        "population": population,
-    }
-    fields = tuple(dict.fromkeys(field for one in quantities for field in one.fields))
-    axis = AXES[experiment.axis]
+    quantities = [known_quantity(name, case) for name in names]
+    errors = known_errors(case, known or {})
+    axis = AXES[case.experiment().axis]
     given = in_si(at, axis.variables[axis.name].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
-    base = with_rows(case, places, fields)
-    stated = stated_by(kept or result_path(result_folder(case), case.key), quantities, axis.name, places)
-    asked = Asked(Variants(base, base.height()), sharp, **known_errors(case, known), stated=stated)
+    base = with_rows(case, places, [field for one in quantities for field in one.fields])
+    finished = Path(source) if source else result_path(result_folder(case), case.key)
+    stated = stated_by(finished, quantities, axis.name, places)
+    asked = Asked(Variants(base, base.height()), sharp, **errors, stated=stated)
     solves = asked.solves()
-    if asked.stated.result is not None:
+    if stated.result is not None:
         del solves["own"]
-    results = solved("budget", solves, folder, watch=watcher(progress), client=client, workers=workers)
-    if asked.stated.result is not None:
-        results["own"] = asked.stated.result
-    try:
-        rows = _rows_at(results["own"], experiment.axis, places)
-        aligned = {name: _rows_at(one, experiment.axis, rows) for name, one in results.items()}
-        return {one.name: _of_quantity(asked, one, aligned) for one in quantities}
-    finally:
-        for one in results.values():
-            one.close()
-
-
-def solved(
-    what: str,
-    solves: Mapping[Any, Case],
-    folder: Path,
-    *,
-    watch: Monitor,
-    client: Client | None = None,
-    workers: int | None = None,
-    threads: int | None = None,
-    same_bits: bool = False,
-    retry_failed: bool = False,
-) -> dict[Any, xr.Dataset]:
-    """Name -> whole result of each of some solves, from their files in a folder.
-
-    Raises
-    ------
-    RoughviscError
-        If one fails.
-    """
-    outcomes = run_cases(
-        list(solves.values()),
-        folder,
-        watch=watch,
-        client=client,
-        workers=workers,
-        threads=threads,
-        same_bits=same_bits,
-        retry_failed=retry_failed,
-    )
-    for name, one in solves.items():
-        outcome = outcomes[one.key]
-        if outcome.entry is None:
-            raise RoughviscError(f"{what}: the solve {name!r} failed: {outcome.message}")
-        if outcome.kind != "done":
-            log.warning("%s: the solve %r: %s: %s", what, name, outcome.kind, outcome.message)
-    return {name: whole_result(result_path(folder, one.key)) for name, one in solves.items()}
+    watch = partial(watcher, progress)
+    bench = Bench(quantities, folder, watch, client=client, workers=workers, retry_failed=False, what="budget")
+    with bench.results(solves) as results:
+        one = results["own"] if stated.result is None else stated.result
+        if places is not None:  # slides have theirs by the cell
+            one = one.isel({axis.name: nearest_rows(one[axis.name], places)})
+        own = read(one, base, quantities)
+        readings = {name: read(result, base, quantities).at(own.places) for name, result in results.items()}
+    readings["own"] = own
+    return {one.name: _of_quantity(asked, one, readings) for one in quantities}
 
 
 def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path]:
@@ -234,100 +190,68 @@ def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tup
     return stated, Path(out).expanduser() if out is not None else beside / FOLDER
 
 
-def _kept(case: Case | str | Path | xr.Dataset) -> Path | None:
-    """The file of a result that is given."""
-    source = case.encoding.get("source") if isinstance(case, xr.Dataset) else None
-    return Path(source) if source else None
-
-
-def known_errors(case: Case, given: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of the errors of a case's numbers: as given, else as the study states it."""
-    stated = case.settings.want
-    found = {name: one if one is not None or stated is None else getattr(stated, name) for name, one in given.items()}
-    return found | {"population": found["population"] or "patch"}
-
-
-def _rows_at(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
-    """The rows of a result nearest to some places of its axis; all rows where None. Slides have theirs by the cell."""
-    if places is None:
-        return result
-    wanted = np.asarray(places[axis].values if isinstance(places, xr.Dataset) else places, dtype=float)
-    nearest = np.abs(result[axis].values[:, None] - wanted).argmin(axis=0)
-    return result.isel({axis: nearest})
-
-
-def _of_quantity(asked: Asked, quantity: Observable, results: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def _of_quantity(asked: Asked, quantity: Observable, readings: Mapping[str, Reading]) -> xr.Dataset:
     """The budget of one quantity."""
-    observe = observed_with(asked.variants.case)
-    values = {name: quantity.of(one, observe) for name, one in results.items()}
-    own = results["own"]
-    stated_error = quantity.stated_error(own, values["own"])
-    judged = {source.name: source.judge(asked, quantity, values, stated_error) for source in SOURCES}
-    seconds = {name: float(one["wall_time"].values[-1]) for name, one in results.items()}
+    own = readings["own"]
+    values = {name: one.values[quantity.name] for name, one in readings.items()}
+    judged = judge(asked, quantity, values, own.stated[quantity.name])
+    seconds = {name: one.seconds for name, one in readings.items()}
     value = values["fine" if asked.sharp else "own"]
-    axis = asked.variants.case.experiment().axis
-    found = assembled(asked, quantity, judged, value, own[axis].values, seconds, seconds["own"])
-    variables, attributes = own_statistics(asked, values, axis)
-    return found.assign(variables).assign_attrs(attributes)
-
-
-def observed_with(case: Case) -> Observe:
-    """Keyword arguments of the observables of a case, as its study states them."""
-    return {} if (stated := case.settings.observe) is None else stated.stated()
+    case = asked.variants.case
+    found = assembled(case, asked.population, quantity, judged, value, own.places, seconds)
+    has_surrogates = asked.draws and not case.settings.surface.taper  # which have none
+    return _with_own_statistics(found, asked, values) if has_surrogates else found
 
 
 def assembled(
-    asked: Asked,
+    case: Case,
+    population: Population,
     quantity: Observable,
     judged: Mapping[str, Found],
     value: Array,
     places: Array,
     seconds: Mapping[str, float],
-    case_cost: float,
 ) -> xr.Dataset:
-    """The budget of a quantity from what its sources make of it.
+    """The budget of a quantity of a case from what its sources make of it.
 
     Parameters
     ----------
-    asked : Asked
-        What is known beside the case.
+    case : Case
+    population : {"patch", "ensemble"}
     quantity : Observable
     judged : mapping
         Name -> what each source makes of it.
     value, places : ndarray
         Value of the quantity at each place of the axis, and those places.
     seconds : mapping
-        Name of each solve -> its wall time [s].
-    case_cost : float
-        That of the case itself. [s]
+        Name of each solve -> its wall time; ``own``: that of the case itself. [s]
     """
-    case = asked.variants.case
-    axis = case.experiment().axis
+    axis, shape = case.experiment().axis, value.shape
     with np.errstate(invalid="ignore"):
         known = np.where(np.abs(value) > 0, value, math.nan)
-    down, up = (together(judged.values(), value.shape, side) for side in (-1, 1))
+    down, up = (together(judged.values(), shape, side) for side in (-1, 1))
     half_width = [
-        np.full(value.shape, math.nan) if one.half_width is None else one.half_width for one in judged.values()
+        np.broadcast_to(math.nan if one.half_width is None else one.half_width, shape) for one in judged.values()
     ]
-    direction = [np.broadcast_to(one.direction, value.shape).astype("int8") for one in judged.values()]
+    direction = [np.broadcast_to(one.direction, shape).astype("int8") for one in judged.values()]
     cost = [sum(seconds[name] for name in one.solves) for one in judged.values()]
     over, units = ("source", axis), {"units": quantity.units}
     return xr.Dataset(
         {
             "half_width": (over, half_width, {"units": "1", "long_name": "half-width of the logarithm at 95 %"}),
             "direction": (over, direction, _DIRECTION),
-            "state": ("source", [_state(one) for one in judged.values()], {"long_name": "whether a source counts"}),
+            "state": ("source", [one.state for one in judged.values()], {"long_name": "whether a source counts"}),
             "method": ("source", [one.method for one in judged.values()], {"long_name": "how it was found"}),
             "cost": ("source", cost, {"units": "s", "long_name": "wall time of the solves that it took"}),
             "value": (axis, value, units | {"long_name": quantity.name.replace("_", " ")}),
             "lower": (axis, known * np.exp(-down), units | {"long_name": "lower bound at 95 %"}),
             "upper": (axis, known * np.exp(up), units | {"long_name": "upper bound at 95 %"}),
-            "case_cost": ((), case_cost, {"units": "s", "long_name": "wall time of the case itself"}),
+            "case_cost": ((), seconds["own"], {"units": "s", "long_name": "wall time of the case itself"}),
         },
         coords={"source": list(judged), axis: (axis, places, {"units": AXES[axis].variables[axis].units})},
         attrs={
             "quantity": quantity.name,
-            "population": asked.population,
+            "population": population,
             "case": case.to_json(),
             "title": case.title,
             "open": "; ".join(name for name, one in judged.items() if one.half_width is None),
@@ -342,17 +266,25 @@ _DIRECTION = {
 }
 
 
-def _state(found: Found) -> Literal["counted", "none", "open"]:
-    if found.half_width is None:
-        return "open"
-    return "counted" if found.counts else "none"
+def _with_own_statistics(found: xr.Dataset, asked: Asked, values: Values) -> xr.Dataset:
+    """A budget that states how its number compares with surfaces of random phases and the same spectrum.
 
-
-def together(found: Iterable[Found], shape: tuple[int, ...], side: int) -> Array:
-    """Half-width of all sources on one side."""
-    squares = np.zeros(shape)
-    for one in found:
-        if one.half_width is not None:
-            towards = np.broadcast_to(one.direction, shape)
-            squares += np.where((towards == 0) | (towards == side), one.half_width, 0.0) ** 2
-    return np.sqrt(squares)
+    The number is that on cells twice as long, on which the surrogates are.
+    """
+    drawn = np.array([values[name] for name in SURROGATES])
+    over_mean, stands = ratio(values["coarse"], drawn.mean(axis=0)), standing(values["coarse"], drawn)
+    kurtosis = float(parameters(asked.variants.height)["Sku"])
+    attributes: dict[str, Any] = {"kurtosis": kurtosis}
+    apart = [STANDING[number] not in ("inside", "not_known") for number in stands]
+    if any(apart):
+        ends = dict.fromkeys(f"{one:.2g}" for one in (over_mean[apart].min(), over_mean[apart].max()))
+        attributes["own_note"] = (
+            f"not a random-phase surface: the number is {' to '.join(ends)} of the mean of {len(SURROGATES)} Gaussian "
+            f"surrogates, outside the 99 % in which they scatter. Heights have a kurtosis of {kurtosis:.2g} "
+            "(3: Gaussian). The spectrum alone does not give the number; the value stays that of the surface"
+        )
+    of_mean = {"units": "1", "long_name": "ratio to the mean of its surrogates"}
+    (axis,) = found["value"].dims
+    return found.assign(
+        surrogate_ratio=(axis, over_mean, of_mean), standing=(axis, stands, STANDING_ATTRIBUTES)
+    ).assign_attrs(attributes)

@@ -18,16 +18,19 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import stats
 
 from roughvisc.errors import InputError
-from roughvisc.study.budget.budget import observed_with
+from roughvisc.study.budget.budget import assembled
+from roughvisc.study.budget.grids import DEARER, FINEST, FLOOR, Around, errors_in_words, largest_error, refusal
+from roughvisc.study.budget.solves import Array, nearest_rows
+from roughvisc.study.budget.sources import Found
 from roughvisc.study.execution.run import compute
 from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case
@@ -36,13 +39,14 @@ from roughvisc.study.storage.store import write_dataset
 if TYPE_CHECKING:
     from distributed import Client
 
-Array = NDArray[np.float64]
 #: Draws of a level before their variance is believed.
 PILOT = 20
 #: Draws of all levels, beyond which a target is refused.
 MOST = 10_000
 #: Seeds of a level, none of which another has.
 _SEEDS = 1_000_000
+#: Error at which the search for the best in a time begins.
+_FIRST_GOAL = 0.3
 
 
 @dataclass(frozen=True)
@@ -198,8 +202,149 @@ def _values(
     for text in texts:
         case = Case.from_json(text)
         found = compute(case, progress=False, threads=threads)
-        rows = np.abs(found[case.experiment().axis].values[:, None] - places).argmin(axis=0)
+        rows = nearest_rows(found[case.experiment().axis], places)
         for name in names:
-            values[name].append(QUANTITIES[name].of(found, observed_with(case))[rows])
+            values[name].append(QUANTITIES[name].of(found, case)[rows])
         seconds += float(found["wall_time"].values[-1])
     return values, seconds
+
+
+@dataclass(frozen=True)
+class OfPopulation:
+    """The number of all surfaces of a recipe, with its error.
+
+    Attributes
+    ----------
+    around : Around
+        Of the surface of the case itself, on the coarsest grid that holds its waves: for the floor.
+    levels : dict
+        Level -> draws of all grids down to the finest.
+    targets : dict
+        Name of each quantity -> error of its logarithm that was aimed at.
+    """
+
+    around: Around
+    levels: dict[int, Level]
+    targets: Mapping[str, float]
+
+    @property
+    def level(self) -> int:
+        """The finest."""
+        return min(self.levels)
+
+    @property
+    def quantities(self) -> Sequence[Observable]:
+        """Those that are wanted."""
+        return self.around.quantities
+
+    @property
+    def spent(self) -> float:
+        """Wall time of all solves. [s]"""
+        return self.around.spent + sum(one.seconds for one in self.levels.values())
+
+    def seconds_of_next(self) -> float:
+        """Expected wall time of a pilot on the next grid. [s]"""
+        return PILOT * DEARER * self.levels[self.level].cost
+
+    def grid(self, quantity: Observable) -> Array:
+        """Error of the grid, by the means over the draws, as of three grids of one surface."""
+        last, before = (np.abs(self.levels[self.level + n].mean(quantity.name)) for n in (0, 1))
+        return np.asarray(quantity.grid_factor * np.maximum(last, before / 4))
+
+    def judged(self, quantity: Observable) -> dict[str, Found]:
+        """Name -> what each source makes of the quantity."""
+        half, _ = scatter_of(self.levels, quantity.name)
+        return self.around.judged(quantity) | {
+            "grid": Found(self.grid(quantity), "means of the draws with cells twice and four times as long"),
+            "sample": Found(half, self.draws(), solves=("draws",)),
+            "longest waves": Found(0.0, "the number is that of surfaces of this size", counts=False),
+        }
+
+    def draws(self) -> str:
+        """How many draws on which grids."""
+        shape, held = self.around.asked.variants.shape, self.around.grids.held
+        cells = {level: [round(n * 2.0 ** (held - level)) for n in shape] for level in self.levels}
+        counts = (f"{one.count} on {cells[level][0]} x {cells[level][1]} cells" for level, one in self.levels.items())
+        return f"draws: {', '.join(counts)}"
+
+    def error(self, quantity: Observable, names: Sequence[str] | None = None) -> float:
+        """The largest error of the logarithm that some sources give together; of all where None."""
+        return largest_error(self.judged(quantity), self.around.touches, names)
+
+    def errors(self) -> dict[str, float]:
+        """Name of each quantity -> its whole error."""
+        return {one.name: self.error(one) for one in self.quantities}
+
+    def floor(self, quantity: Observable) -> float:
+        """What neither grids nor draws lessen."""
+        return self.around.floor(quantity)
+
+    def rooms(self) -> dict[str, Array]:
+        """Name of each quantity -> what all else leaves of the square of its target for the draws."""
+        found = {}
+        for one in self.quantities:
+            others = self.around.error(one, (*FLOOR, "time steps and solver"))
+            found[one.name] = self.targets[one.name] ** 2 - others**2 - self.grid(one) ** 2
+        return found
+
+    def budget(self, quantity: Observable, chosen: Case) -> xr.Dataset:
+        """The budget of a quantity, whose value is the mean of the logarithm over all surfaces."""
+        seconds = {name: one.seconds for name, one in self.around.parts.items()}
+        seconds["own"] = self.levels[self.level].cost
+        seconds["draws"] = sum(one.seconds for one in self.levels.values())
+        value, places = np.exp(mean_of(self.levels, quantity.name)), self.around.places()
+        return assembled(chosen, "ensemble", quantity, self.judged(quantity), value, places, seconds)
+
+
+def mean_of_population(around: Around, targets: Mapping[str, float], limit: float) -> OfPopulation:
+    """Draws on grids, from a pilot on three of them to as many and as fine as it takes for the targets, or in a time.
+
+    Raises
+    ------
+    InputError
+        If a target takes a finer grid than there is, too many draws, or more than the time.
+    """
+    bench, grids, quantities = around.bench, around.grids, around.quantities
+    top = grids.held + 2
+    counts = dict.fromkeys(range(top, grids.held - 1, -1), PILOT)
+    goals = {one.name: math.log1p(targets.get(one.name, _FIRST_GOAL)) for one in quantities}
+    best: OfPopulation | None = None
+    on_level = cache(grids.case)
+
+    def drawn(level: int, count: int) -> Level:
+        coarser = on_level(level + 1) if level < top else None
+        where = (quantities, around.places(), bench.folder, bench.client, bench.threads)
+        return draw(level, count, on_level(level), coarser, *where)
+
+    pilot = around.spent * PILOT
+    if around.spent + pilot > limit:
+        needed = f"expected some {pilot:.2g} s at least, for a pilot of draws"
+        raise refusal(grids.own, [f"time: found {limit:g} s: {needed}"])
+    while True:
+        found = OfPopulation(around, {level: drawn(level, count) for level, count in counts.items()}, goals)
+        rooms = found.rooms()
+        told = errors_in_words(found.errors(), targets)
+        bench.tell(f"{found.draws()}: {told}")
+        more = dict(counts)
+        if any((rooms[name] < 0.5 * goals[name] ** 2).any() for name in goals) and found.level > FINEST:
+            more[found.level - 1] = PILOT
+            wait = found.seconds_of_next()
+        elif any((rooms[name] <= 0.05 * goals[name] ** 2).any() for name in goals):
+            if not targets and best is not None:
+                return best
+            raise refusal(grids.own, [f"{told}: the grids alone leave too much, with the finest there is"])
+        else:
+            more = counts_for(found.levels, {name: np.sqrt(room) for name, room in rooms.items()})
+            wait = sum((more[level] - counts[level]) * one.cost for level, one in found.levels.items())
+        if more == counts:
+            if targets:
+                return found
+            best, goals = found, {name: 0.7 * goal for name, goal in goals.items()}
+            continue
+        if found.spent + wait > limit or sum(more.values()) > MOST:
+            if not targets and best is not None:
+                return best
+            limits = f"{limit:g} s" if math.isfinite(limit) else f"{MOST} draws"
+            needed = f"{sum(more.values())} draws and some {found.spent + wait:.2g} s at least"
+            raise refusal(grids.own, [f"population: found a limit of {limits}: expected {needed}; so far {told}"])
+        counts = more

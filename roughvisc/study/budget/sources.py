@@ -7,23 +7,23 @@ numbers were known: see docs/howto/whole-error.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.fit import AnyFit
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.materials.spectrum import lattice
-from roughvisc.study.budget.stated import Stated
+from roughvisc.study.budget.solves import Array, Stated
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
 from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
-from roughvisc.units import unit_for
+from roughvisc.study.statement.schema.evaluation import KNOWN
+from roughvisc.units import stated_quantity, unit_for
 
-Array = NDArray[np.float64]
 Population = Literal["patch", "ensemble"]
 #: Of two grids: the power with which the error of the grid is taken to vanish, and Roache's factor.
 _ORDER, _TWO_GRIDS = 1.5, 3.0
@@ -120,13 +120,41 @@ class Asked:
         return math.log2(self.variants.shortest_wave / self.cutoff)
 
 
+def stated_errors(case: Case) -> dict[str, Any]:
+    """What the study of a case knows of errors."""
+    want = case.settings.want
+    return {} if want is None else want.model_dump(include=set(KNOWN), exclude_none=True)
+
+
+def known_errors(case: Case, given: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of the errors of a case's numbers: as given, else as its study states it.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected.
+    """
+    known = {name: one for name, one in given.items() if one is not None}
+    for name in ("modulus_error", "time_scale_error"):
+        value = known.get(name, 0.0)
+        if not (isinstance(value, int | float) and 0 <= value < 1):
+            raise InputError(f"{name} is {value!r}: expected a relative error, at least 0 and below 1")
+    if "cutoff" in known:
+        known["cutoff"] = stated_quantity(known["cutoff"], "m", "cutoff", above=0)
+    found: dict[str, Any] = {"population": "patch"} | stated_errors(case) | known
+    if found["population"] not in get_args(Population):
+        expected = " or ".join(map(repr, get_args(Population)))
+        raise InputError(f"population is {found['population']!r}: expected {expected}")
+    return found
+
+
 @dataclass(frozen=True)
 class Found:
     """What a source makes of a number.
 
     Attributes
     ----------
-    half_width : ndarray or None
+    half_width : ndarray, float or None
         Of the logarithm, at each place [-]; None where it is not known.
     method : str
         How it was found, or what would be needed to know it.
@@ -138,22 +166,36 @@ class Found:
         Whether the source has a meaning here.
     """
 
-    half_width: Array | None
+    half_width: Array | float | None
     method: str
     direction: Any = 0
     solves: tuple[str, ...] = ()
     counts: bool = True
 
+    @property
+    def state(self) -> Literal["counted", "none", "open"]:
+        """Whether it is part of the whole error."""
+        if self.half_width is None:
+            return "open"
+        return "counted" if self.counts else "none"
+
+
+def _no_source(why: str) -> Found:
+    """What has no meaning here."""
+    return Found(0.0, why, counts=False)
+
 
 Values = Mapping[str, Array]
 
 
-@dataclass(frozen=True)
-class Source:
-    """A source of error: its name, and what it makes of a quantity from the values of the solves and stated errors."""
-
-    name: str
-    judge: Callable[[Asked, Observable, Values, Array], Found] = field(repr=False)
+def together(found: Iterable[Found], shape: tuple[int, ...], side: int) -> Array:
+    """Half-width of all sources on one side."""
+    squares = np.zeros(shape)
+    for one in found:
+        if one.half_width is not None:
+            towards = np.broadcast_to(one.direction, shape)
+            squares += np.where((towards == 0) | (towards == side), one.half_width, 0.0) ** 2
+    return np.sqrt(squares)
 
 
 def _apart(values: Values, one: str, other: str) -> Array:
@@ -164,10 +206,6 @@ def _apart(values: Values, one: str, other: str) -> Array:
 
 def _length(metres: float) -> str:
     return unit_for(metres, "m").text(metres, 3)
-
-
-def _nothing(values: Values) -> Array:
-    return np.zeros_like(values["own"])
 
 
 def _time_and_solver(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
@@ -191,11 +229,9 @@ def _grid(asked: Asked, quantity: Observable, values: Values, stated: Array) -> 
 
 def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
     if not asked.variants.is_rough:
-        return Found(_nothing(values), "the surface is the whole body, and no sample", counts=False)
+        return _no_source("the surface is the whole body, and no sample")
     if asked.population == "patch":
-        return Found(
-            _nothing(values), "the number is of this patch; population 'ensemble' asks for its roughness", counts=False
-        )
+        return _no_source("the number is of this patch; population 'ensemble' asks for its roughness")
     with np.errstate(divide="ignore", invalid="ignore"):
         scatter = np.std(np.log([values[name] for name in SURROGATES]), axis=0, ddof=1)
     words = f"{PATCHES} Gaussian surrogates on cells twice as long"
@@ -207,11 +243,11 @@ def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -
 
 def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array) -> Found:
     if not asked.variants.is_rough:
-        return Found(_nothing(values), "the surface is no sample of a roughness", counts=False)
+        return _no_source("the surface is no sample of a roughness")
     if asked.cutoff is None:
         return Found(None, "state cutoff, the shortest wavelength that the real surface has")
     if not asked.octaves:
-        return Found(_nothing(values), f"the grid holds all waves down to {_length(asked.cutoff)}")
+        return Found(0.0, f"the grid holds all waves down to {_length(asked.cutoff)}")
     stated = asked.stated.octave and not asked.sharp
     change = (
         asked.stated.octave[quantity.name] if stated else _apart(values, "fine" if asked.sharp else "own", "smooth")
@@ -227,13 +263,13 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array
 
 def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
     if not asked.variants.is_rough:
-        return Found(_nothing(values), "the surface is no sample of a roughness", counts=False)
+        return _no_source("the surface is no sample of a roughness")
     count = asked.variants.number_of_waves
     if not quantity.of_longest_waves or count >= _FEW_WAVES:
-        return Found(_nothing(values), f"{count:.0f} waves carry the height", counts=False)
+        return _no_source(f"{count:.0f} waves carry the height")
     words = f"{count:.2g} waves carry the height (below {_FEW_WAVES:.0f})"
     if asked.population == "patch":
-        return Found(_nothing(values), f"{words}: the number is of this patch alone", counts=False)
+        return _no_source(f"{words}: the number is of this patch alone")
     return Found(None, f"{words}, so that it depends on the size of the scan: scan a larger patch")
 
 
@@ -245,7 +281,7 @@ def _modulus(asked: Asked, quantity: Observable, values: Values, stated: Array) 
 
 def _time_scale(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
     if not _creeps(asked.variants.case):
-        return Found(_nothing(values), "the material does not creep", counts=False)
+        return _no_source("the material does not creep")
     if asked.time_scale_error is None:
         return Found(None, "state time_scale_error, the relative error of the times of the material")
     return _of_material(asked, asked.time_scale_error, "slower", "times of the material", values)
@@ -255,7 +291,7 @@ def _material_fit(asked: Asked, quantity: Observable, values: Values, stated: Ar
     """By the largest error of the modulus over the times that a place asks for, and the change by the modulus."""
     fits = asked.fits
     if not fits:
-        return Found(_nothing(values), "the material is given by its parameters", counts=False)
+        return _no_source("the material is given by its parameters")
     intervals = _times(asked.variants, values["own"].size)
     errors, outside = np.zeros(values["own"].shape), np.zeros(values["own"].shape, bool)
     of_loss = np.zeros_like(errors)
@@ -306,7 +342,7 @@ def _times(variants: Variants, places: int) -> Array:
 def _of_material(asked: Asked, error: float, solve: str, what: str, values: Values) -> Found:
     """By the change that a tenth more makes."""
     if not error:
-        return Found(_nothing(values), f"{what} are exact")
+        return Found(0.0, f"{what} are exact")
     slope = np.abs(_apart(values, solve, asked.compared)) / math.log(STEP)
     return Found(math.log1p(error) * slope, f"{what} {100 * (STEP - 1):.0f} % larger", solves=(solve,))
 
@@ -320,19 +356,24 @@ def _creeps(case: Case) -> bool:
 
 def _window(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
     if "mirrored" not in values:
-        return Found(_nothing(values), "the surface is not tapered", counts=False)
+        return _no_source("the surface is not tapered")
     return Found(np.abs(_apart(values, "own", "mirrored")), "mirror images in place of the taper", solves=("mirrored",))
 
 
-#: In the order of a table.
-SOURCES = (
-    Source("time steps and solver", _time_and_solver),
-    Source("grid", _grid),
-    Source("sample", _sample),
-    Source("next octave of waves", _next_octave),
-    Source("longest waves", _longest_waves),
-    Source("modulus", _modulus),
-    Source("time scale", _time_scale),
-    Source("material fit", _material_fit),
-    Source("window", _window),
-)
+#: Name -> what it makes of a quantity from the values of the solves and the stated errors, in the order of a table.
+SOURCES: dict[str, Callable[[Asked, Observable, Values, Array], Found]] = {
+    "time steps and solver": _time_and_solver,
+    "grid": _grid,
+    "sample": _sample,
+    "next octave of waves": _next_octave,
+    "longest waves": _longest_waves,
+    "modulus": _modulus,
+    "time scale": _time_scale,
+    "material fit": _material_fit,
+    "window": _window,
+}
+
+
+def judge(asked: Asked, quantity: Observable, values: Values, stated: Array) -> dict[str, Found]:
+    """Name -> what each source makes of a quantity."""
+    return {name: source(asked, quantity, values, stated) for name, source in SOURCES.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.errors import InputError
-from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.material import TEMPERATURE
-from roughvisc.study.trade.ladder import grid_change, is_data
+from roughvisc.study.trade.ladder import changed_keys, grid_change, is_data
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import last_octave, modes
 
@@ -119,29 +117,12 @@ def slower(case: Case) -> Case:
     return vary(case, changes | {"material.shift_factor": STEP * material.shift})
 
 
-def with_rows(case: Case, places: Any, fields: tuple[str, ...]) -> Case:
+def with_rows(case: Case, places: Any, fields: Iterable[str]) -> Case:
     """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
     settings, experiment = case.solving(), case.experiment()
-    changes: dict[str, Any] = {"keep.fields": list(fields), "solve.grid_error": False}
+    changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
     if getattr(experiment, "last_octave", False):  # a source of its own here, and twice the cost of every solve
         changes[f"{experiment.table}.last_octave"] = False
     if places is not None:
-        wanted = experiment.with_rows_at(settings, [float(one) for one in places])
-        changes |= _changed_settings(settings, wanted)
+        changes |= changed_keys(settings, experiment.with_rows_at(settings, [float(one) for one in places]))
     return vary(case, changes)
-
-
-def _changed_settings(before: Any, after: Any) -> Mapping[str, Any]:
-    """Keys of a study that turn settings into others."""
-    return {
-        f"{one.table}.{name}": list(value) if isinstance(value, tuple) else value
-        for name, one in ENTRIES.items()
-        if (value := getattr(after, name)) != getattr(before, name)
-    }
-
-
-def check_share(name: str, value: float | None) -> float | None:
-    """A relative error that is given, checked."""
-    if value is not None and not (isinstance(value, int | float) and 0 <= value < 1):
-        raise InputError(f"{name} is {value!r}: expected a relative error, at least 0 and below 1")
-    return value

@@ -16,15 +16,16 @@ from roughvisc.experiment.resources import PROCESS
 from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, stages_of, work
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.quantities import Observable
+from roughvisc.study.quantities import Observable, observables_of
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import result_path, whole_result, write_result
 from roughvisc.study.trade.ladder import Setting, changed, duration_of, has_steps, shape_of
-from roughvisc.study.trade.reference import quantities_of
 from roughvisc.topography.grid import nominal_area
+from roughvisc.variables.axes import AXES
 
 Report = Callable[[str, float, float], None]
-
+#: What is compared, in the order of the results, beside the friction coefficient where something slides.
+QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
 #: A run that took less is repeated, up to so many times in all; the fastest counts. [s]
 _SHORT, _REPEATS = 1.0, 3
 #: A run that took more corrects what is expected of the others. [s]
@@ -37,6 +38,19 @@ _MARCHED = 1e-2
 _DECADE = 0.25
 #: Convolutions a step of the seed paper's solver takes, over those of the preconditioned one; measured: 8 to 15.
 _SEED_SOLVE = 12.0
+
+
+def quantities_of(case: Case) -> tuple[str, ...]:
+    """What can be compared in the results of a case."""
+    experiment = case.experiment()
+    names = (*QUANTITIES, "friction_coefficient") if experiment.largest_speed > 0 else QUANTITIES
+    return tuple(name for name in names if name in AXES[experiment.axis].variables)
+
+
+def further_quantities_of(case: Case) -> tuple[str, ...]:
+    """What else can be: what is derived from the fields of the results, and what is given in most."""
+    usual = quantities_of(case)
+    return tuple(name for name in observables_of(case) if name not in usual)
 
 
 class NotRun(RoughviscError):
@@ -170,8 +184,7 @@ class TimedRuns:
             raise NotRun(complaint)
         with whole_result(self._path) as kept:
             dataset = kept.load()
-        observe = {} if (stated := case.settings.observe) is None else stated.stated()
-        found = {one.name: (case.experiment().axis, one.of(dataset, observe)) for one in self._derived}
+        found = {one.name: (case.experiment().axis, one.of(dataset, case)) for one in self._derived}
         return Run(dataset.assign(found), took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)
 
     def _timed(self, case: Case, label: str) -> tuple[float, xr.Dataset, int]:

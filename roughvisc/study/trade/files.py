@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.formats import to_current
-from roughvisc.study.trade.floor import require_same
+from roughvisc.study.trade.recommend import require_same
 from roughvisc.units import quantity
 
 log = logging.getLogger("roughvisc")
@@ -34,6 +34,15 @@ def trade_folder(case: Case, out: str | Path | None) -> Path:
     return result_folder(case, folder.with_name(f"{folder.name}-trade"))
 
 
+def _read(path: str | Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+        return file.load()
+
+
+def _holds_a_trade(dataset: xr.Dataset) -> bool:
+    return "run_time" in dataset and "quantity" in dataset.dims
+
+
 def open_trade(path: str | Path) -> xr.Dataset:
     """Open what ``roughvisc trade`` wrote.
 
@@ -43,11 +52,10 @@ def open_trade(path: str | Path) -> xr.Dataset:
         If the file is absent or is something else.
     """
     try:
-        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
-            dataset = to_current(file.load())
+        dataset = to_current(_read(path))
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be opened: {error}: expected a trade of roughvisc (.nc)") from error
-    if "run_time" not in dataset or "quantity" not in dataset.dims:
+    if not _holds_a_trade(dataset):
         raise InputError(f"{path}: is not a trade: expected a file that roughvisc trade wrote")
     return dataset
 
@@ -59,8 +67,7 @@ def budgets_in(folder: Path, names: Iterable[str], case: Case) -> list[xr.Datase
         if not path.is_file():
             continue
         try:
-            with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
-                one = file.load()
+            one = _read(path)
             require_same(one, case)
         except (OSError, ValueError, RuntimeError) as error:  # an InputError is a ValueError
             log.warning("%s: does not count: %s", path, error)
@@ -73,7 +80,7 @@ def is_trade(path: str | Path) -> bool:
     """Whether a file is one that ``roughvisc trade`` wrote, as far as its variables tell."""
     try:
         with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
-            return "run_time" in file and "quantity" in file.dims
+            return _holds_a_trade(file)
     except (OSError, ValueError, RuntimeError):
         return False
 

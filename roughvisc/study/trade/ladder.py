@@ -162,6 +162,15 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool =
     return vary(case, changes)
 
 
+def changed_keys(before: Settings, after: Settings) -> dict[str, Any]:
+    """Keys of a study, and values, that turn settings into others."""
+    return {
+        f"{one.table}.{name}": list(value) if isinstance(value, tuple) else value
+        for name, one in ENTRIES.items()
+        if (value := getattr(after, name)) != getattr(before, name)
+    }
+
+
 def grid_change(case: Case, shape: tuple[int, int], coarsening: float, absent: bool = False) -> tuple[str, list[int]]:
     """Key of a study and its value that make the surface's cells so many times longer.
 
@@ -196,7 +205,6 @@ def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
     shape : tuple of int
         Cells of its grid.
     """
-    duration = duration_of(case)
     rungs = [Setting(tolerance) for tolerance in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)]
     for coarsening, tolerance in ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)):
         if min(shape) / coarsening >= _FEWEST:
@@ -204,13 +212,8 @@ def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:
     if not is_data(case):
         rungs += [Setting(1e-3, coarsening=c) for c in (0.5, 0.25) if max(shape) / c <= _MOST]
     rungs.append(Setting(1e-3, precision=FLOAT32))
-    if duration > 0:
+    if duration := duration_of(case):
         rungs.append(Setting(1e-2, memory="direct"))
-        rungs += [Setting(time_step=round_to(duration / steps)) for steps in (20, 80)]
-        rungs += [Setting(time_step=round_to(duration / steps), method="seed") for steps in (20, 80)]
+        steps = [float(f"{duration / count:.3g}") for count in (20, 80)]  # so that a study file with them reads well
+        rungs += [Setting(time_step=step, method=method) for method in ("fast", "seed") for step in steps]
     return rungs
-
-
-def round_to(value: float, digits: int = 3) -> float:
-    """A number with few digits, so that a study file with it reads well."""
-    return float(f"{value:.{digits}g}")

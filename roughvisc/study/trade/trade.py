@@ -16,15 +16,12 @@ from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.progress import reporting
-from roughvisc.settings import ENTRIES
 from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case, read_study, vary
-from roughvisc.study.trade.bench import NotRun, Report, TimedRuns
-from roughvisc.study.trade.finest import ReferenceRun, all_grids
-from roughvisc.study.trade.floor import require_same, with_floors
-from roughvisc.study.trade.ladder import Setting, is_data, ladder, shape_of
-from roughvisc.study.trade.recommend import known_quantity
-from roughvisc.study.trade.reference import ClosedForm, closed_form, further_quantities_of, quantities_of
+from roughvisc.study.trade.bench import NotRun, Report, TimedRuns, further_quantities_of, quantities_of
+from roughvisc.study.trade.ladder import Setting, changed_keys, is_data, ladder, shape_of
+from roughvisc.study.trade.recommend import known_quantity, require_same, with_floors
+from roughvisc.study.trade.reference import ClosedForm, ReferenceRun, all_grids, closed_form
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import RESULT_FORMAT
@@ -112,9 +109,9 @@ def trade(
         bench = TimedRuns(case, height, Path(folder), budget, report, derived)
         known = exact.quantities if exact else ()
         finest = None if set(bench.quantities) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
-        rows = [_row(bench, setting, exact, finest) for setting in sorted(rungs, key=bench.expected)]
-    order = [rungs.index(row["rung"]) for row in rows]
-    rows = [rows[i] for i in np.argsort(order, kind="stable")]
+        order = np.argsort([bench.expected(setting) for setting in rungs], kind="stable")  # the cheapest run first
+        found = {number: _row(bench, rungs[number], exact, finest) for number in order}
+    rows = [found[number] for number in range(len(rungs))]
     return with_floors(_labelled(bench, rows, exact, finest), budgets)
 
 
@@ -129,13 +126,7 @@ def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], deri
     shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
     shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]
     cells = [(sides[0] * shape[0] / nx, sides[1] * shape[1] / ny) for nx, ny in shapes]
-    common = experiment.with_common_rows(settings, cells)
-    changes |= {
-        f"{one.table}.{name}": value
-        for name, one in ENTRIES.items()
-        if (value := getattr(common, name)) != getattr(settings, name)
-    }
-    return vary(case, changes)
+    return vary(case, changes | changed_keys(settings, experiment.with_common_rows(settings, cells)))
 
 
 def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: ReferenceRun | None) -> dict[str, Any]:
@@ -143,36 +134,30 @@ def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: R
     shape = shape_of(bench.case, bench.shape, setting.coarsening)
     missing = dict.fromkeys(bench.quantities, math.nan)
     row: dict[str, Any] = {
-        "rung": setting,
         "setting": bench.label(setting),
         "family": setting.family,
-        "method": setting.method,
-        "memory": setting.memory,
-        "tolerance": setting.tolerance,
-        "time_step": math.nan if setting.time_step is None else setting.time_step,
-        "coarsening": setting.coarsening,
-        "precision": math.nan if setting.precision is None else setting.precision,
+        **{name: math.nan if value is None else value for name, value in vars(setting).items()},
         "cells_x": shape[0],
         "cells_y": shape[1],
         "error": missing,
         "coarsening_error": missing,
         "note": "",
+        **dict.fromkeys(("run_time", "transforms", "steps", "peak_memory", "disk_size"), math.nan),
     }
-    costs = dict.fromkeys(("run_time", "transforms", "steps", "peak_memory", "disk_size"), math.nan)
     try:
         if finest and not is_data(bench.case):
             finest.check(setting)
         run = bench.run(setting)
         against_finest = finest.errors(run.dataset) if finest else {}
     except NotRun as error:
-        return row | costs | {"note": str(error)}
-    row["error"] = missing | against_finest | (exact.errors(run.dataset) if exact else {})
+        return row | {"note": str(error)}
     if finest:
         alone = finest.of_coarsening(setting.coarsening)
         row["coarsening_error"] = missing | {
             name: alone[name] for name in bench.quantities if not (exact and name in exact.quantities)
         }
     return row | {
+        "error": missing | against_finest | (exact.errors(run.dataset) if exact else {}),
         "run_time": run.seconds,
         "transforms": float(run.dataset["convolutions"].sum()),
         "steps": float(run.steps),
@@ -189,9 +174,8 @@ def _labelled(
     bench: TimedRuns, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: ReferenceRun | None
 ) -> xr.Dataset:
     case, quantities = bench.case, bench.quantities
-    names = [name for name in rows[0] if name != "rung"]
     columns: dict[str, Any] = {}
-    for name in names:
+    for name in rows[0]:
         values = [row[name] for row in rows]
         if name in ("error", "coarsening_error"):
             columns[name] = (("setting", "quantity"), np.array([[v[q] for q in quantities] for v in values], float))

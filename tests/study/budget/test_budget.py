@@ -128,8 +128,12 @@ def test_budget__grid_of_two_and_three(tmp_path):
 def test_budget__missing_waves_count_on_one_side(tmp_path):
     """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
     study = case(ROUGH, tmp_path)
-    one = budgets(study, ["contact_area", "mean_gap"], out=tmp_path / "b", cutoff="18 um", workers=0, progress=False)
-    two = budgets(study, ["contact_area", "mean_gap"], out=tmp_path / "b", cutoff="9 um", workers=0, progress=False)
+    one = budgets(
+        study, ["contact_area", "mean_gap"], out=tmp_path / "b", known={"cutoff": "18 um"}, workers=0, progress=False
+    )
+    two = budgets(
+        study, ["contact_area", "mean_gap"], out=tmp_path / "b", known={"cutoff": "9 um"}, workers=0, progress=False
+    )
     octave = "next octave of waves"
     assert (one["contact_area"]["direction"].sel(source=octave) == -1).all()
     assert (one["mean_gap"]["direction"].sel(source=octave) == 1).all()
@@ -344,10 +348,12 @@ def test_budget__reads_what_a_result_states_of_its_grid(tmp_path):
 def test_budget__reads_the_last_octave_that_a_curve_states(tmp_path):
     text = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\nspeeds = [1e-3, 1e-2]\npressure = "50 kPa"\n'
     plain = case(text + '[solve]\nboundary = "periodic"\n', tmp_path)
-    solved = budgets(plain, ["friction_coefficient", "contact_area"], out=tmp_path / "b", cutoff="18 um", **QUIET)
+    solved = budgets(
+        plain, ["friction_coefficient", "contact_area"], out=tmp_path / "b", known={"cutoff": "18 um"}, **QUIET
+    )
     study = rv.vary(plain, {"friction.last_octave": True, "solve.grid_error": True})
     result = rv.run(study, out=tmp_path / "results", progress=False)
-    found = budgets(result, ["friction_coefficient", "contact_area"], cutoff="18 um", **QUIET)
+    found = budgets(result, ["friction_coefficient", "contact_area"], known={"cutoff": "18 um"}, **QUIET)
     assert not list((tmp_path / "results" / "budget").glob("*.nc"))
     octave = {"source": "next octave of waves"}
     for name, one in found.items():

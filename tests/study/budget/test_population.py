@@ -1,6 +1,7 @@
 """Multilevel Monte Carlo over the surfaces of a recipe, and the number that it gives."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from scipy import optimize, stats
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget import population
-from roughvisc.study.budget.population import Level, counts_for, mean_of, scatter_of
-from roughvisc.study.budget.target import Bench, Grids, first_grids, mean_of_population, wanting
+from roughvisc.study.budget.grids import Grids, first_grids
+from roughvisc.study.budget.population import Level, counts_for, mean_of, mean_of_population, scatter_of
+from roughvisc.study.budget.solves import Bench
+from roughvisc.study.budget.target import wanting
 from roughvisc.study.budget.variants import Variants
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.quantities import QUANTITIES
@@ -106,18 +109,19 @@ def prepared(tmp_path, target, **changes):
     (tmp_path / "study.toml").write_text(STUDY)
     case = wanting(rv.vary(rv.read_study(tmp_path / "study.toml"), changes), {"mean_gap": target})
     bench = Bench([QUANTITIES["mean_gap"]], tmp_path / "budget", Monitor, [].append)
-    return case, bench, *first_grids(case, bench, {"mean_gap": target}, np.inf)
+    return first_grids(case, bench, {"mean_gap": target}, np.inf)
 
 
 @pytest.mark.thorough
 def test_mean__is_within_the_target_of_the_truth(tmp_path, made_up):
-    case, bench, grids, around = prepared(tmp_path, 0.03)
-    off = []
+    around = prepared(tmp_path, 0.03)
+    own, off = around.grids, []
     for seed in range(20):
         (tmp_path / str(seed)).mkdir()
-        other = Bench(bench.quantities, tmp_path / str(seed), Monitor, [].append)
-        moved = Variants(rv.vary(grids.variants.case, {"surface.seed": seed}), grids.variants.height)
-        found = mean_of_population(case, Grids(grids.own, moved), around, other, {"mean_gap": 0.03}, np.inf)
+        moved = Variants(rv.vary(own.variants.case, {"surface.seed": seed}), own.variants.height)
+        bench = replace(around.bench, folder=tmp_path / str(seed))
+        other = replace(around, bench=bench, grids=Grids(own.own, moved))
+        found = mean_of_population(other, {"mean_gap": 0.03}, np.inf)
         assert found.error(QUANTITIES["mean_gap"]) <= np.log(1.03)
         off.append(float(mean_of(found.levels, "mean_gap")[0]) + 11.0)
     assert np.mean(np.abs(off) <= np.log(1.03)) >= 0.85
@@ -125,34 +129,34 @@ def test_mean__is_within_the_target_of_the_truth(tmp_path, made_up):
 
 
 def test_draws__of_a_pair_have_the_same_waves_and_no_level_those_of_another(tmp_path, made_up):
-    case, bench, grids, around = prepared(tmp_path, 0.05)
-    found = mean_of_population(case, grids, around, bench, {"mean_gap": 0.05}, np.inf)
+    around = prepared(tmp_path, 0.05)
+    found = mean_of_population(around, {"mean_gap": 0.05}, np.inf)
     grids_of = {}
     for seed, cells in made_up:
         grids_of.setdefault(seed, []).append(cells)
     assert len(grids_of) == sum(one.count for one in found.levels.values())
     assert {tuple(one) for one in grids_of.values()} == {(7,), (14, 7), (27, 14), (54, 27)}
     count = len(made_up)
-    mean_of_population(case, grids, around, bench, {"mean_gap": 0.05}, np.inf)
+    mean_of_population(around, {"mean_gap": 0.05}, np.inf)
     assert len(made_up) == count  # all were kept
     assert min(one.count for one in found.levels.values()) >= 20
 
 
 def test_target__that_takes_too_many_draws_or_too_long_is_refused(tmp_path, made_up, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.budget.target.MOST", 300)
+    monkeypatch.setattr("roughvisc.study.budget.population.MOST", 300)
     for part, limit, told in ((0.004, np.inf, "limit of 300 draws"), (0.01, 1.0, "limit of 1 s|expected some")):
-        case, bench, grids, around = prepared(tmp_path, part)
+        around = prepared(tmp_path, part)
         with pytest.raises(InputError, match=told):
-            mean_of_population(case, grids, around, bench, {"mean_gap": part}, limit)
+            mean_of_population(around, {"mean_gap": part}, limit)
 
 
 def test_zero__in_a_draw_has_no_logarithm(tmp_path, monkeypatch):
     monkeypatch.setattr(
         population, "_values", lambda texts, names, places, threads: ({"mean_gap": [[0.0]] * len(texts)}, 1.0)
     )
-    case, bench, grids, around = prepared(tmp_path, 0.05)
+    around = prepared(tmp_path, 0.05)
     with pytest.raises(InputError, match="mean_gap: found zero, or less, in 20 of 20 draws"):
-        mean_of_population(case, grids, around, bench, {"mean_gap": 0.05}, np.inf)
+        mean_of_population(around, {"mean_gap": 0.05}, np.inf)
 
 
 def test_run__of_a_population_ends_with_its_mean(tmp_path, made_up):

@@ -10,7 +10,9 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.budget.budget import budgets
-from roughvisc.study.budget.target import Bench, first_grids, parse_targets, tolerance_for
+from roughvisc.study.budget.grids import first_grids, tolerance_for
+from roughvisc.study.budget.solves import Bench
+from roughvisc.study.budget.target import parse_targets
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.quantities import QUANTITIES
 from roughvisc.study.statement.case import Case
@@ -153,7 +155,7 @@ def test_floor__of_one_scan_asks_for_so_many(tmp_path):
     with pytest.raises(InputError, match="scans would help") as refused:
         got(study, tmp_path, {"mean_gap": "1 %", "population": "ensemble"})
     folder = tmp_path / "results" / "budget"
-    found = budgets(study, ["mean_gap"], population="ensemble", out=folder, workers=0, progress=False)
+    found = budgets(study, ["mean_gap"], known={"population": "ensemble"}, out=folder, workers=0, progress=False)
     half = float(found["mean_gap"]["half_width"].sel(source="sample").max())
     told = next(line for line in str(refused.value).splitlines() if "sample" in line)
     assert int(re.search(r"(\d+) scans", told)[1]) == pytest.approx((half / np.log(1.01)) ** 2, rel=0.05)
@@ -201,7 +203,7 @@ def test_tolerance__is_sharpened_where_steps_and_solver_take_much_of_the_target(
     for part in (0.9, 0.01):
         bench = Bench([QUANTITIES["leak_rate"]], tmp_path / "budget", Monitor, told.append)
         tolerance = tolerance_for(study, {"leak_rate": part})
-        _, around = first_grids(study, bench, {"leak_rate": part}, np.inf)
+        around = first_grids(study, bench, {"leak_rate": part}, np.inf)
         half = float(around.solves[0].stated["leak_rate"].max())
         assert (around.asked.variants.case.solving().tolerance < tolerance) == (part == 0.01)
         assert half < 0.5 * np.log1p(part)

@@ -24,10 +24,10 @@ from roughvisc import closed_forms
 from roughvisc.experiment import grid_error as grid_convergence
 from roughvisc.study.statement.case import vary
 from roughvisc.study.storage.store import write_dataset
-from roughvisc.study.trade.bench import TimedRuns
+from roughvisc.study.trade.bench import QUANTITIES, TimedRuns
 from roughvisc.study.trade.files import open_trade
 from roughvisc.study.trade.ladder import FLOAT32, Setting, changed, ladder, shape_of
-from roughvisc.study.trade.reference import QUANTITIES, closed_form
+from roughvisc.study.trade.reference import closed_form
 from roughvisc.variables import VARIABLES
 
 

@@ -17,8 +17,8 @@ from roughvisc.study.statement.case import read_study
 from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade import recommend
 from roughvisc.study.trade.apply import apply
+from roughvisc.study.trade.bench import QUANTITIES
 from roughvisc.study.trade.ladder import Setting
-from roughvisc.study.trade.reference import QUANTITIES
 from roughvisc.views.console.accuracy_tables import trade_table
 from roughvisc.views.figures.trade import _FAMILIES
 

@@ -14,8 +14,8 @@ import roughvisc as rv
 from roughvisc.study.budget.budget import budgets
 from roughvisc.study.statement.case import vary
 from roughvisc.study.trade import recommend
-from roughvisc.study.trade.floor import with_floors
 from roughvisc.study.trade.ladder import Setting
+from roughvisc.study.trade.recommend import with_floors
 
 AREA = "contact_area"
 

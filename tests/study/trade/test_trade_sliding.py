@@ -15,8 +15,8 @@ from roughvisc.study.statement.case import read_study
 from roughvisc.study.trade import recommend
 from roughvisc.study.trade.apply import apply
 from roughvisc.study.trade.bench import NotRun, TimedRuns
-from roughvisc.study.trade.finest import differences
 from roughvisc.study.trade.ladder import Setting, ladder
+from roughvisc.study.trade.reference import differences
 from roughvisc.views.console.accuracy_tables import trade_table
 
 WAVE = """
