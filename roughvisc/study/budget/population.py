@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -35,9 +35,6 @@ from roughvisc.study.execution.run import compute
 from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import write_dataset
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 #: Draws of a level before their variance is believed.
 PILOT = 20
@@ -113,43 +110,27 @@ def counts_for(levels: Mapping[int, Level], rooms: Mapping[str, Array]) -> dict[
     return {level: math.ceil(one) for level, one in wanted.items()}
 
 
-def draw(
-    level: int,
-    count: int,
-    fine: Case,
-    coarse: Case | None,
-    quantities: Sequence[Observable],
-    places: Array,
-    folder: Path,
-    client: Client | None = None,
-    threads: int | None = None,
-) -> Level:
-    """So many draws of a level; those that are kept in the folder are not computed again.
+def draw(around: Around, level: int, count: int, fine: Case, coarse: Case | None) -> Level:
+    """So many draws of a level; those that are kept in the folder of the solves are not computed again.
 
     Parameters
     ----------
-    level : int
-        Of the grid.
-    count : int
-        Number of draws.
+    around : Around
+        What is read off each draw, at which places of the axis, and where it is computed: without a client in this
+        process.
+    level, count : int
+        Of the grid, and number of draws.
     fine, coarse : Case
         Of the grid and of the next coarser one, None where there is none; the seed is another in each draw.
-    quantities, places
-        What is read off each draw, and at which places of the axis.
-    folder : Path
-        Where they are kept.
-    client : distributed.Client, optional
-        Where they are computed; without one in this process.
-    threads : int, optional
-        Of each solve.
 
     Raises
     ------
     InputError
         If a quantity is zero in a draw, and has no logarithm.
     """
-    names = [one.name for one in quantities]
-    path = folder / f"draws-{fine.key}-{'single' if coarse is None else coarse.key}.nc"
+    bench, places = around.bench, around.places()
+    names = [one.name for one in bench.quantities]
+    path = bench.folder / f"draws-{fine.key}-{'single' if coarse is None else coarse.key}.nc"
     kept = _kept(path, names, places)
     known = 0 if kept is None else kept.sizes["draw"]
     if known < count:
@@ -157,10 +138,11 @@ def draw(
         stated = [json.loads(one.to_json()) for one in (fine, coarse) if one is not None]
         seeds = range(first + known, first + count)
         texts = [[json.dumps(one | {"surface": one["surface"] | {"seed": seed}}) for one in stated] for seed in seeds]
-        if client is None:
-            found = [_values(text, names, places, threads) for text in texts]
+        if bench.client is None:
+            found = [_values(text, names, places, bench.threads) for text in texts]
         else:
-            found = client.gather(client.map(_values, texts, names=names, places=places, threads=1, pure=False))
+            solves = bench.client.map(_values, texts, names=names, places=places, threads=1, pure=False)
+            found = bench.client.gather(solves)
         new = xr.Dataset(
             {
                 **{name: (("draw", "grid", "row"), np.array([values[name] for values, _ in found])) for name in names},
@@ -304,17 +286,15 @@ def mean_of_population(around: Around, targets: Mapping[str, float], limit: floa
     InputError
         If a target takes a finer grid than there is, too many draws, or more than the time.
     """
-    bench, grids, quantities = around.bench, around.grids, around.quantities
+    grids = around.grids
     top = grids.held + 2
     counts = dict.fromkeys(range(top, grids.held - 1, -1), PILOT)
-    goals = {one.name: math.log1p(targets.get(one.name, _FIRST_GOAL)) for one in quantities}
+    goals = {one.name: math.log1p(targets.get(one.name, _FIRST_GOAL)) for one in around.quantities}
     best: OfPopulation | None = None
     on_level = cache(grids.case)
 
     def drawn(level: int, count: int) -> Level:
-        coarser = on_level(level + 1) if level < top else None
-        where = (quantities, around.places(), bench.folder, bench.client, bench.threads)
-        return draw(level, count, on_level(level), coarser, *where)
+        return draw(around, level, count, on_level(level), on_level(level + 1) if level < top else None)
 
     pilot = around.spent * PILOT
     if around.spent + pilot > limit:
@@ -324,7 +304,7 @@ def mean_of_population(around: Around, targets: Mapping[str, float], limit: floa
         found = OfPopulation(around, {level: drawn(level, count) for level, count in counts.items()}, goals)
         rooms = found.rooms()
         told = errors_in_words(found.errors(), targets)
-        bench.tell(f"{found.draws()}: {told}")
+        around.bench.tell(f"{found.draws()}: {told}")
         more = dict(counts)
         if any((rooms[name] < 0.5 * goals[name] ** 2).any() for name in goals) and found.level > FINEST:
             more[found.level - 1] = PILOT

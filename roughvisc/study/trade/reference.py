@@ -177,9 +177,7 @@ def _elastic(growing: ClosedForm, indenter: Indenter, material: Material) -> Clo
     def pressure(r: Array, t: float) -> Array:
         return modulus * indenter.scaled_pressure(r, radius[t])
 
-    return ClosedForm(
-        "Hertz, Sneddon", growing.centre, growing.times, growing.radius, growing.approach, pressure, indenter
-    )
+    return replace(growing, name="Hertz, Sneddon", pressure=pressure)
 
 
 def _punch(
@@ -242,8 +240,8 @@ class ReferenceRun:
 
     def __init__(self, bench: TimedRuns, rungs: Sequence[Setting], data: bool) -> None:
         fast = [setting for setting in rungs if setting.method == "fast"] or list(rungs)
-        self.sharpest = min(setting.tolerance for setting in fast)
-        candidates = [Setting(self.sharpest / _SHARPER, coarsening=grid) for grid in _finest_grids(rungs, data)]
+        self._sharpest = min(setting.tolerance for setting in fast)
+        candidates = [Setting(self._sharpest / _SHARPER, coarsening=grid) for grid in _finest_grids(rungs, data)]
         allowed = bench.left / 2
         self._bench = bench
         self._setting = next((one for one in candidates if bench.expected(one) <= allowed), candidates[-1])
@@ -291,7 +289,7 @@ class ReferenceRun:
         names, own, fine = self._bench.quantities, self._setting.coarsening, self._dataset
         unknown = dict.fromkeys(names, math.nan)
         try:
-            looser = self.errors(self._bench.run(replace(self._setting, tolerance=self.sharpest)).dataset)
+            looser = self.errors(self._bench.run(replace(self._setting, tolerance=self._sharpest)).dataset)
         except NotRun:
             return unknown, unknown
         # the error follows the tolerance, unevenly: hence the larger safety factor
