@@ -43,31 +43,13 @@ def foretold(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
     """
     if isinstance(case.experiment(), Loading):
         return march_of(case, height, copies)
-    return on_coarse_grids(case, height)
-
-
-def on_coarse_grids(case: Case, height: xr.DataArray) -> CostEstimate:
-    """Rows as steps, and convolutions, from coarse grids.
-
-    Parameters
-    ----------
-    case : Case
-        Any.
-    height : xarray.DataArray
-        Its surface. [m]
-
-    Raises
-    ------
-    InputError
-        If the case is impossible.
-    """
     experiment = case.experiment().on_area(nominal_area(height))
     cheaper, count, dearer = experiment.cheaper()
     settings = replace(case.solving(), fields=(), grid_error=False)
-    copies = _copies(case, height)
-    halved = solve(Problem(copies[0], case.body(), settings), cheaper)
+    fewer, few = _copies(case, height)
+    halved = solve(Problem(fewer, case.body(), settings), cheaper)
     began = time.perf_counter()
-    found = solve(Problem(copies[1], case.body(), settings), cheaper)
+    found = solve(Problem(few, case.body(), settings), cheaper)
     took = time.perf_counter() - began
     count = count or found.sizes[experiment.axis]
     finest, before = (float(one["convolutions"].mean()) for one in (found, halved))
@@ -88,7 +70,7 @@ def on_coarse_grids(case: Case, height: xr.DataArray) -> CostEstimate:
         fraction=float(found["contact_fraction"].max()),
         kept=tuple(contact.tolist()),
         pressed=_pressed(found),
-        coarse_run=CoarseRun(copies[1], found.sizes[experiment.axis], float(found["convolutions"].sum()), took),
+        coarse_run=CoarseRun(few, found.sizes[experiment.axis], float(found["convolutions"].sum()), took),
         halved=_pressed(halved) if max(height.shape) > _COARSE[1] else None,
     )
 

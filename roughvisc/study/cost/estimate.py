@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -102,20 +102,6 @@ def stage_at(stages: Sequence[Stage], level: float, width: Widths) -> int:
 _MOST = 24
 
 
-def slid_cells(program: Program, height: xr.DataArray) -> int:
-    """Steps that all slides of a program take: one a cell.
-
-    Parameters
-    ----------
-    program : Program
-        The loading program.
-    height : xarray.DataArray, dims (x, y)
-        The surface. [m]
-    """
-    sides = spacing(height, "height")
-    return sum(segment.slide.cells(sides) for segment in program.segments if segment.slide is not None)
-
-
 def shortened(program: Program, height: xr.DataArray) -> Program:
     """The program with slides of at least one cell of a coarse surface, and not of many, at their speed.
 
@@ -164,12 +150,32 @@ _CHUNK, _COMPRESSED = 8, (0.24, 0.4)
 
 
 class Passed(NamedTuple):
-    """A step of a coarse march: approach, extent of its contact along x and y [m], what it took, and its time [s]."""
+    """A step of a coarse march: what it took, and the contact at its end.
+
+    Attributes
+    ----------
+    level, width
+        Approach of the contact, and its extent along x and along y. [m]
+    convolutions : float
+        Of this step.
+    time, force
+        At its end. [s], [N]
+    touching, fraction
+        Part of the cells in contact, and contact fraction, which is corrected for the grid.
+    slides, damped, by_approach
+        Whether it is in a slide, by the two-step rule, and under a given approach.
+    """
 
     level: float
     width: tuple[float, float]
     convolutions: float
     time: float = 0.0
+    force: float = 0.0
+    touching: float = 0.0
+    fraction: float = 0.0
+    slides: bool = False
+    damped: bool = False
+    by_approach: bool = False
 
 
 class CoarseRun(NamedTuple):
@@ -346,20 +352,21 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
     if settings.time_step != "auto":
         taken["steps"] = in_all[1][0]
     if program.slides:
-        cells = slid_cells(program, height)
+        sides = spacing(height)
+        cells = sum(one.slide.cells(sides) for one in program.segments if one.slide is not None)  # a step each
         each = second.slid_convolutions / max(second.slid, 1.0)
         taken = {"steps": taken["steps"] + cells, "convolutions": taken["convolutions"] + cells * each, "slid": cells}
     rows = taken["steps"] if settings.times is None else float(len(kept_times(program, settings.times) or ()))
     finest = pressed(grid, second.push)
     halved = pressed(grid, second.push, MOST_PRESSED // 2) if max(shapes[grid]) > MOST_PRESSED else None
-    known = {
+    known: dict[str, Any] = {
         "whole": first.whole and second.whole,
         "fraction": finest.fraction,
         "at_border": settings.boundary == "free" and finest.at_border,
         "pressed": finest,
         "halved": halved,
     }
-    return CostEstimate(**{**vars(_rescaled(second, finest)), **taken, **known, "rows": rows})
+    return replace(_rescaled(second, finest), **taken, **known, rows=rows)
 
 
 def _rescaled(found: CostEstimate, pressed: Pressed) -> CostEstimate:
@@ -405,56 +412,69 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
         program, settings = shortened(program, height), replace(settings, times=() if settings.times else None)
     profile = Profile(height, settings.missing, kernel=case.body().kernel)
     scene, _ = build_scene(profile, case.body(), program, settings)
-    steps = rows = damped = 0
-    reached = contact = fraction = level = force = 0.0
-    work, instants = 0, [0.0]
-    slid = slid_work = 0
-    kept, contacts = set(scene.times or ()), []
     course: list[Passed] = []
-    began = time.perf_counter()
-    forces, largest, push, bordering = [0.0], (-1.0, 0.0), Push(load=0.0), False
+    reached, work, bordering, began = 0.0, 0, False, time.perf_counter()
     for step in march(scene) if settings.method == "fast" else march_seed(scene):
-        now = step.shown.time
-        steps += 1
-        touching = step.shown.pressure > 0
+        now, touching = step.shown.time, step.shown.pressure > 0
         share = float(np.mean(touching))
-        if settings.times is None or now in kept:
-            rows += 1
-            contacts.append(share)
-        damped += now > reached and _is_damped(scene, now - reached)
-        contact = max(contact, share)
         taken_off = staircase_area(touching, scene) / (scene.operator.cell_area * touching.size)
-        fraction = max(fraction, share - taken_off)
-        level, force = max(level, step.level), max(force, step.shown.force)
-        course.append(Passed(step.level, width_of(touching, profile), step.state.convolutions - work, now))
+        course.append(
+            Passed(
+                level=step.level,
+                width=width_of(touching, profile),
+                convolutions=step.state.convolutions - work,
+                time=now,
+                force=step.shown.force,
+                touching=share,
+                fraction=share - taken_off,
+                slides=in_slide(step),
+                damped=now > reached and _is_damped(scene, now - reached),
+                by_approach=step.control == "approach",
+            )
+        )
         bordering = bordering or at_border(scene, step.shown.contact)
-        if in_slide(step):
-            slid, slid_work = slid + 1, slid_work + step.state.convolutions - work
         work, reached = step.state.convolutions, now
-        instants.append(now)
-        forces.append(step.shown.force)
-        if (share - taken_off, step.level) > largest:  # of few cells as many may touch at several approaches
-            largest = (share - taken_off, step.level)
-            push = Push(approach=step.level) if step.control == "approach" else _push(scene, instants, forces)
-        if outgrowing and bordering:
+        if (outgrowing and bordering) or work > _MOST_CONVOLUTIONS or len(course) > _MOST_STEPS:
             break
-        if work > _MOST_CONVOLUTIONS or steps > _MOST_STEPS:
-            break
-    whole = reached >= program.duration
-    stretch = 1.0
+    took = time.perf_counter() - began
+    steps, whole, stretch = len(course), bool(reached >= program.duration), 1.0
     if not whole:  # what is left is taken to go on as the later half of the steps went
-        half = len(instants) // 2
-        pace = (reached - instants[half]) / max(steps - half, 1)
+        half = (steps + 1) // 2
+        pace = (reached - (course[half - 1].time if half else 0.0)) / max(steps - half, 1)
         stretch += (program.duration - reached) / pace / steps if pace else 0.0
-    kept_rows, part = len(kept) or rows * stretch, damped / max(steps, 1)
-    known = (part, contact, bool(whole), level, force, fraction, tuple(contacts), slid, slid_work)
-    known = (*known, tuple(course), push, bordering)
-    coarse_run = CoarseRun(height, steps, work, time.perf_counter() - began)
-    return CostEstimate(steps * stretch, kept_rows, work * stretch, *known, coarse_run=coarse_run)
+    kept = set(scene.times or ())
+    rows = [one.touching for one in course if settings.times is None or one.time in kept]
+    slid = [one.convolutions for one in course if one.slides]
+    return CostEstimate(
+        steps=steps * stretch,
+        rows=len(kept) or len(rows) * stretch,
+        convolutions=work * stretch,
+        damped=sum(one.damped for one in course) / max(steps, 1),
+        contact=max([0.0, *(one.touching for one in course)]),
+        whole=whole,
+        level=max([0.0, *(one.level for one in course)]),
+        force=max([0.0, *(one.force for one in course)]),
+        fraction=max([0.0, *(one.fraction for one in course)]),
+        kept=tuple(rows),
+        slid=len(slid),
+        slid_convolutions=sum(slid),
+        course=tuple(course),
+        push=_push(scene, course),
+        at_border=bordering,
+        coarse_run=CoarseRun(height, steps, work, took),
+    )
 
 
-def _push(scene: Scene, instants: Sequence[float], forces: Sequence[float]) -> Push:
-    """What an elastic body is pressed with to have the contact at the last of some instants [s] under forces [N]."""
+def _push(scene: Scene, course: Sequence[Passed]) -> Push:
+    """What an elastic body is pressed with to have the largest contact of a march."""
+    if not course:
+        return Push(load=0.0)
+    # of few cells as many may touch at several approaches
+    largest = max(range(len(course)), key=lambda number: (course[number].fraction, course[number].level))
+    if course[largest].by_approach:
+        return Push(approach=course[largest].level)
+    till = course[: largest + 1]
+    instants, forces = ([0.0, *values] for values in zip(*((one.time, one.force) for one in till), strict=True))
     ages = instants[-1] - np.asarray(instants)
     means = [scene.compliance(float(age)) for age in 0.5 * (ages[1:] + ages[:-1])]
     return Push(load=max(float(np.dot(means, np.diff(forces))), 0.0))

@@ -7,7 +7,7 @@ import math
 import shutil
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -33,8 +33,9 @@ from roughvisc.notebook import table
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.study.audit.audit import evaluate
-from roughvisc.study.audit.evidence import Texture, of_case, texture_of
+from roughvisc.study.audit.evidence import of_case
 from roughvisc.study.audit.given import AuditInputs
+from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,
@@ -203,11 +204,12 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     rows = []
     for number, case in enumerate(cases):
         like = _nearest_case(number, list(marches), parameters)
-        surface = surfaces.get(_surface_name(cases[number], stated[number]))
-        row = _row if isinstance(case.experiment(), Loading) else _general_row
-        rows.append(
-            row(case, surface, marches.get(like), like == number, problems.get(number, ""), choices, stopwatch, there)
-        )
+        surface = surfaces[_surface_name(case, stated[number])]
+        ahead = _Ahead(case, surface, marches.get(like), like == number, problems.get(number, ""))
+        if isinstance(case.experiment(), Loading):
+            rows.append(_row(ahead, choices, stopwatch, there))
+        else:
+            rows.append(_general_row(ahead, stopwatch, there))
     columns = {name: ("case", np.array([row[name] for row in rows]), attributes(name)) for name in COLUMNS}
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
     labels = labels_of(parameters, stated[0], ("case",)).values()
@@ -324,75 +326,124 @@ class _Choices:
         return self._found[name]
 
 
-def _row(
-    case: Case,
-    surface: _Surface | None,
-    found: CostEstimate | None,
-    marched: bool,
-    problem: str,
-    choices: _Choices,
-    stopwatch: ConvolutionTimer,
-    there: Available,
-) -> dict[str, Any]:
-    settings = case.solving()
-    row = _blank(settings, marched, problem)
-    if surface is None or surface.height is None:
+@dataclass(frozen=True)
+class _Ahead:
+    """A case, its surface, and what it is expected to take.
+
+    Attributes
+    ----------
+    case : Case
+    surface : _Surface
+    found : CostEstimate or None
+        Of the case, or of the one most like it.
+    marched : bool
+        Whether it is of the case itself.
+    problem : str
+        Why the case is impossible; empty if it is not.
+    """
+
+    case: Case
+    surface: _Surface
+    found: CostEstimate | None
+    marched: bool
+    problem: str
+
+    def row(self) -> dict[str, Any]:
+        """A row of the plan of which nothing is known yet but the case and its grid."""
+        boundary, height = self.case.solving().boundary, self.surface.height
+        row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
+        row |= {"boundary": boundary, "padded": boundary == "free", "grows": False, "marched": self.marched}
+        row |= {"refusal": self.problem, "exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
+        if height is not None:
+            row |= {"cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
         return row
-    height, grows = surface.height, surface.grows and uses_window(settings) and case.body().separates
+
+    def expected(self, shape: tuple[int, ...], needed: Callable[[float], float], there: Available) -> dict[str, Any]:
+        """What the estimate says of any experiment, on the cells that it has in the end."""
+        assert self.found is not None
+        memory = needed(math.prod(shape))
+        return {
+            "refusal": "" if there.fits(memory) else too_large((shape[0], shape[1]), needed, there),
+            "rows": self.found.rows,
+            "convolutions": self.found.convolutions,
+            "memory": memory,
+        } | (self._of_march(self.found) if self.marched else {})
+
+    def _of_march(self, found: CostEstimate) -> dict[str, Any]:
+        """Of a case that was marched itself: what an audit says before the run, and how much comes into contact."""
+        surface, case, height = self.surface, self.case, self.surface.height
+        assert height is not None
+        boundary = case.settings.solve.boundary
+        if boundary not in surface.textures:
+            surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
+        foreseen = {"force": found.force, "approach": found.level, "fraction": found.fraction}
+        evidence = of_case(case, height, surface.textures[boundary], **foreseen)
+        row: dict[str, Any] = {"audit": evaluate(evidence, AuditInputs(), case.title).warning}
+        for prefix, pressed in (("", found.pressed), ("coarser_", found.halved)):  # the latter on cells twice as long
+            if pressed is not None:
+                cells = f"{prefix or 'pressed_'}cells"
+                row |= {f"{prefix}contact_fraction": pressed.fraction}
+                row |= {f"{cells}_x": pressed.shape[0], f"{cells}_y": pressed.shape[1]}
+        return row
+
+
+def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: Available) -> dict[str, Any]:
+    """What a program costs, by its memory, and the windows and grids that it comes through."""
+    case, surface, found = ahead.case, ahead.surface, ahead.found
+    settings, program, body, row = case.solving(), case.program(), case.body(), ahead.row()
+    if surface.height is None:
+        return row
+    height, grows = surface.height, surface.grows and uses_window(settings) and body.separates
     whole = next(i for i, stage in enumerate(surface.stages) if stage.outside == math.inf)
     window = whole > 0 and uses_window(settings)
-    mirrored = surface.mirrored and settings.method == "fast" and not case.program().slides
-    row |= {"grows": grows, "cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
+    mirrored = surface.mirrored and settings.method == "fast" and not program.slides
+    row["grows"] = grows
     try:
-        Problem(height, case.body(), settings).check_cells()
+        Problem(height, body, settings).check_cells()
         choice = choices.of(case, grows or window)
     except InputError as error:
         return row | {"refusal": str(error)}
-    exponentials = len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0
-    omitted = omitted_effects(choice, settings, window, mirrored)
-    row |= {"memory_model": choice.note, "exponentials": exponentials, "left_out": omitted}
-    row |= _pressures(case, surface, choice, found.force if found and marched else np.nan)
-    if found is None or problem:
+    largest = largest_pressure(height, program, found.force if found and ahead.marched else np.nan)
+    full = full_contact_pressure(surface.slope, choice.material, program.duration)
+    row |= {
+        "memory_model": choice.note,
+        "exponentials": len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0,
+        "left_out": omitted_effects(choice, settings, window, mirrored),
+        "nominal_pressure": largest,
+        "full_contact_pressure": full,
+        "warning": full_contact_warning(largest, full),
+        "program_note": program.note,
+    }
+    if found is None or ahead.problem:
         return row
     stages = surface.stages[0 if window else whole : None if grows else whole + 1]
     if settings.method != "fast":
         stages = (Stage(stages[0].shape, height.size),)
     solved = solved_on(stages, found)
-    found = replace(
-        found, convolutions=found.convolutions * (1 + solved.growths / max(found.steps, 1.0))
-    )  # tried again
+    again = 1 + solved.growths / max(found.steps, 1.0)  # a step in which it grows is tried again
+    found = replace(found, convolutions=found.convolutions * again)
     shape, cells = solved.stages[-1].shape, solved.cells
     timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
-    convolution = stopwatch.seconds(timed, settings.boundary, case.body().kernel) * work(cells) / work(timed.size)
-    sides = tuple(n * side for n, side in zip(height.shape, spacing(height), strict=True))
-    final = float(choice.material.contact_compliance(case.program().duration))
+    convolution = stopwatch.seconds(timed, settings.boundary, body.kernel) * work(cells) / work(timed.size)
     quarter = work(cells / 4) / work(cells)
-    beside = stopwatch.beside(found.coarse_run, settings.boundary, case.body().kernel)
-    seconds = wall_time(settings, solved, found, choice, convolution, beside)
+    sides = spacing(height)
+    size = (height.shape[0] * sides[0], height.shape[1] * sides[1])
+    final = float(choice.material.contact_compliance(program.duration))
+    waves = wave_limits(height.shape, sides)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
-    if not there.fits(needed(cells)):
-        row["refusal"] = too_large(shape, needed, there)
+    beside = stopwatch.beside(found.coarse_run, settings.boundary, body.kernel)
+    row |= replace(ahead, found=found).expected(shape, needed, there)
     if found.fraction < NEARLY_FULL:
         row["warning"] = ""
     return row | {
         "border_warning": border_warning(shape) if found.at_border and settings.edge == "error" else "",
         "final_cells_x": shape[0],
         "final_cells_y": shape[1],
-        "audit": _audit(case, surface, found) if marched else "",
-        "body_note": body_note(case.body().kernel, settings, (sides[0], sides[1]), final, found.force, found.level)
-        or layer_note(
-            case.body(),
-            settings.tolerance,
-            wave_limits(height.shape, spacing(height)),
-            (0.0, case.program().duration),
-        ),
+        "body_note": body_note(body.kernel, settings, size, final, found.force, found.level)
+        or layer_note(body, settings.tolerance, waves, (0.0, program.duration)),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
-        "rows": found.rows,
-        **_contact(found, marched),
-        "convolutions": found.convolutions,
-        "wall_time": seconds,
-        "memory": needed(cells),
+        "wall_time": wall_time(settings, solved, found, choice, convolution, beside),
         "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter, beside),
         "half_memory": needed(cells // 4),
         "rms_slope": surface.slope,
@@ -401,46 +452,14 @@ def _row(
     }
 
 
-def _contact(found: CostEstimate, marched: bool) -> dict[str, Any]:
-    """How much comes into contact, on which cells, and on cells twice as long; of a case that was marched itself."""
-    finest, halved = found.pressed, found.halved
-    if finest is None or not marched:
-        return {}
-    row = {"contact_fraction": finest.fraction, "pressed_cells_x": finest.shape[0], "pressed_cells_y": finest.shape[1]}
-    if halved is None:
+def _general_row(ahead: _Ahead, stopwatch: ConvolutionTimer, there: Available) -> dict[str, Any]:
+    """What an experiment of any other kind costs."""
+    case, surface, found = ahead.case, ahead.surface, ahead.found
+    settings, experiment, body, height = case.solving(), case.experiment(), case.body(), surface.height
+    row = ahead.row() | {"memory_model": experiment.called}
+    if height is None or found is None or ahead.problem:
         return row
-    longer = {"coarser_cells_x": halved.shape[0], "coarser_cells_y": halved.shape[1]}
-    return row | longer | {"coarser_contact_fraction": halved.fraction}
-
-
-def _blank(settings: Settings, marched: bool, problem: str) -> dict[str, Any]:
-    """A row of a case of which nothing is known yet."""
-    row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
-    free = settings.boundary == "free"
-    row |= {"boundary": settings.boundary, "padded": free, "grows": False, "marched": marched, "refusal": problem}
-    return row | {"exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
-
-
-def _general_row(
-    case: Case,
-    surface: _Surface | None,
-    found: CostEstimate | None,
-    marched: bool,
-    problem: str,
-    _: _Choices,
-    stopwatch: ConvolutionTimer,
-    there: Available,
-) -> dict[str, Any]:
-    """What an experiment of any kind will cost."""
-    settings, experiment, body = case.solving(), case.experiment(), case.body()
-    row = _blank(settings, marched, problem) | {"memory_model": experiment.called}
-    if surface is None or surface.height is None:
-        return row
-    height = surface.height
-    row |= {"cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
-    if found is None or problem:
-        return row
-    area, cells = nominal_area(height), height.size
+    area = nominal_area(height)
     convolution = stopwatch.seconds(height, settings.boundary, body.kernel)
     nominal = found.force / area
     size = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
@@ -449,46 +468,16 @@ def _general_row(
     def needed(cells: float) -> float:
         return PROCESS + experiment.bytes_needed(settings, body, cells, area)
 
-    if not there.fits(needed(cells)):
-        row["refusal"] = too_large((height.sizes["x"], height.sizes["y"]), needed, there)
+    row |= ahead.expected(height.shape, needed, there)
     return row | {
-        "audit": _audit(case, surface, found) if marched else "",
-        "rows": found.rows,
         **({"speeds": found.rows} if experiment.axis == "speed" else {}),
         "nominal_pressure": nominal,
         "full_contact_pressure": relaxed,
         "warning": full_contact_warning(nominal, relaxed),
-        **_contact(found, marched),
-        "convolutions": found.convolutions,
         "wall_time": found.convolutions * convolution
         + found.rows * stopwatch.beside(found.coarse_run, settings.boundary, body.kernel),
-        "memory": needed(cells),
-        "disk": disk(case, cells, found),
+        "disk": disk(case, height.size, found),
     }
-
-
-def _pressures(case: Case, surface: _Surface, choice: Choice, force: float) -> dict[str, Any]:
-    """Nominal pressure, by the force of a coarse march [N] where the program states none, and that of full contact."""
-    assert surface.height is not None
-    program = case.program()
-    largest = largest_pressure(surface.height, program, force)
-    full = full_contact_pressure(surface.slope, choice.material, program.duration)
-    return {
-        "nominal_pressure": largest,
-        "full_contact_pressure": full,
-        "warning": full_contact_warning(largest, full),
-        "program_note": program.note,
-    }
-
-
-def _audit(case: Case, surface: _Surface, found: CostEstimate) -> str:
-    """What an audit says before the run, by the load and the approach of a coarse march."""
-    assert surface.height is not None
-    height, boundary = surface.height, case.settings.solve.boundary
-    if boundary not in surface.textures:
-        surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
-    foreseen = {"force": found.force, "approach": found.level, "fraction": found.fraction}
-    return evaluate(of_case(case, height, surface.textures[boundary], **foreseen), AuditInputs(), case.title).warning
 
 
 def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
