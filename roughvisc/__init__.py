@@ -8,15 +8,12 @@ DataArray, as soon as a function that gives or takes heights has been used; for 
 
 from __future__ import annotations
 
-import re
-from importlib import import_module
 from typing import Any
 
-with open(f"{__file__}i", encoding="utf-8") as _stub:
-    #: public name -> module or package that it is imported from
-    _PUBLIC = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \2$", _stub.read(), re.M)}
+from roughvisc.lazy import public_names
 
-__all__ = ["__version__", *sorted(_PUBLIC)]
+_load, _names = public_names(globals())
+__all__ = ["__version__", *_names]
 
 
 def __getattr__(name: str) -> Any:
@@ -24,13 +21,7 @@ def __getattr__(name: str) -> Any:
         from importlib import metadata  # slow to import
 
         return metadata.version("roughvisc")
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'roughvisc' has no attribute {name!r}")
-    module = _PUBLIC[name]
-    value = None if module == __name__ else getattr(import_module(module), name, None)
-    value = value or import_module(f"{module}.{name}")
-    globals()[name] = value
-    return value
+    return _load(name)
 
 
 def __dir__() -> list[str]:

@@ -31,6 +31,7 @@ _COST = {*_EXECUTION, "study.execution", "study.audit"}
 _TRADE = {*_COST, "study.cost", "mechanics.closed_forms"}
 ALLOWED = {
     "errors": set(),
+    "lazy": set(),
     "units": {"errors"},
     "tables": {"errors", "units"},
     "variables": {"errors", "units"},
@@ -47,7 +48,7 @@ ALLOWED = {
     "mechanics.stepping": {*_MARCH, "errors", "notebook", "units"} - {"mechanics.stepping"},
     "mechanics.sliding": {"errors", "mechanics.arrays", "mechanics.contact", "mechanics.bodies"},
     "mechanics.transport": {"errors", "mechanics.contact", "mechanics.bodies"},
-    "mechanics.closed_forms": {*_BODY, "errors", "mechanics.stepping", "units"},
+    "mechanics.closed_forms": {*_BODY, "errors", "lazy", "mechanics.stepping", "units"},
     "topography": {*_LABELS, "tables"},
     "settings": {"errors", "mechanics.bodies", "units", "variables"},
     "problem": _PROBLEM,

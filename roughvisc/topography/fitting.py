@@ -12,7 +12,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import level
-from roughvisc.topography.grid import checked, like, spacing
+from roughvisc.topography.grid import checked, like, require_complete, spacing
 from roughvisc.topography.spectrum import hann, modes
 
 #: Rings a decade of wavevector, and Hurst exponents tried.
@@ -70,8 +70,7 @@ def fit_self_affine(
     h = checked(h, "fit_self_affine")
     if meet not in ("rms_slope", "rms_height"):
         raise InputError(f"fit_self_affine: meet is {meet!r}: expected 'rms_slope' or 'rms_height'")
-    if np.isnan(h.values).any():
-        raise InputError(f"fit_self_affine: {int(np.isnan(h.values).sum())} points are missing: expected none (fill)")
+    require_complete(h, "fit_self_affine")
     if min(h.shape) < 16:
         raise InputError(f"fit_self_affine: found {h.shape[0]} x {h.shape[1]} cells: expected at least 16 each way")
     h = like(h, h.values - h.values.mean()) if periodic else level(h)

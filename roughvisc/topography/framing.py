@@ -174,8 +174,9 @@ def combine(
     about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
     sha = h2.attrs.get("source_sha256")
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
-    h2 = h2 if flip is None else _reversed(h2, flip)
-    line += f", reversed along {flip}" if flip else ""
+    if flip is not None:  # heights and marks in the opposite order, along a coordinate that stays
+        h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
+        line += f", reversed along {flip}"
     if align == "centre":
         h1, h2, way = _laid_on(h1, h2, offset)
         apart = ", ".join(f"{float(d):.6g}" for d in offset)
@@ -265,11 +266,6 @@ def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
             f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
             "(see also resample and crop)"
         )
-
-
-def _reversed(h: xr.DataArray, axis: str) -> xr.DataArray:
-    """The heights and marks in the opposite order along an axis whose coordinate stays. [m]"""
-    return h.isel({axis: slice(None, None, -1)}).assign_coords({axis: h[axis]})
 
 
 @quantities(width="m")

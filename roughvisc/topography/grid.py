@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.blocks import count_of
 from roughvisc.units import quantity, shown
 from roughvisc.variables import VARIABLES
 
@@ -336,27 +337,32 @@ def require_heights(h: xr.DataArray, step: str) -> None:
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
 
 
-def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf, strict: bool = True) -> float:
-    """A finite number above `low` (or at it, unless `strict`) and not above `high`."""
+def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)") -> None:
+    """Refuse a grid of which points are missing."""
+    if missing := h.size - count_of(h.values):
+        raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
+
+
+def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf) -> float:
+    """A finite number above `low` and not above `high`."""
     right = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    if not right or value < low or (strict and value == low) or value > high:
-        above = f"above {low:g}" if strict else f"of at least {low:g}"
+    if not (right and low < value <= high):
         below = f" and at most {high:g}" if math.isfinite(high) else ""
-        raise InputError(f"{name} is {value!r}: expected a finite number {above}{below} [{unit}]")
+        raise InputError(f"{name} is {value!r}: expected a finite number above {low:g}{below} [{unit}]")
     return float(value)
 
 
-def pair(name: str, value: Any, unit: str = "m") -> tuple[float, float]:
-    """Two positive numbers, or one for both."""
-    both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
+def pair(name: str, value: Any) -> tuple[float, float]:
+    """Two positive lengths, or one for both. [m]"""
+    both = _both(value)
     if len(both) != 2:
-        raise InputError(f"{name} is {value!r}: expected one number or a pair (x, y) [{unit}]")
-    return number(name, both[0], unit), number(name, both[1], unit)
+        raise InputError(f"{name} is {value!r}: expected one number or a pair (x, y) [m]")
+    return number(name, both[0], "m"), number(name, both[1], "m")
 
 
 def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     """Two whole numbers of cells, or one for both."""
-    both = value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)
+    both = _both(value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole:
         raise InputError(
@@ -365,3 +371,8 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     if both[0] * both[1] > MOST_CELLS:
         raise InputError(f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}")
     return int(both[0]), int(both[1])
+
+
+def _both(value: Any) -> Any:
+    """What is given for x and y, or once for both."""
+    return value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)

@@ -16,7 +16,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
 from roughvisc.topography.blocks import row_blocks
-from roughvisc.topography.grid import metres_in, taper_weights, unit_of, with_coordinates, with_taper_weights
+from roughvisc.topography.grid import metres_in, taper_weights, unit_of, with_coordinates
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
@@ -29,7 +29,9 @@ _CLASSIC = (b"CDF\x01", b"CDF\x02")
 def grid_channels(path: Path) -> tuple[Channel, ...]:
     """The variables of a grid file that span two dimensions or more."""
     with _open(path) as dataset:
-        return _channels(dataset)
+        found = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim >= 2]
+        found.sort(key=lambda name: _NAMES.index(name) if name in _NAMES else len(_NAMES))
+        return tuple(_channel(i, name, dataset[name]) for i, name in enumerate(found))
 
 
 def is_labelled(path: Path) -> bool:
@@ -77,9 +79,8 @@ def open_grid(
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
     if heights and metres != 1.0:
         values *= metres  # of which the grid is a view
-    grid = with_coordinates(h.values, *axes, attrs)
+    grid = with_coordinates(h.values, *axes, attrs, taper=taper_weights(h))
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
-    grid = with_taper_weights(grid, taper_weights(h))
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
             grid = grid.isel({axis: slice(None, None, -1)})
@@ -115,12 +116,6 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
 def _begins(path: Path) -> bytes:
     with path.open("rb") as stream:
         return stream.read(4)
-
-
-def _channels(dataset: xr.Dataset) -> tuple[Channel, ...]:
-    found = [name for name, variable in dataset.data_vars.items() if variable.ndim >= 2]
-    found.sort(key=lambda name: _NAMES.index(name) if name in _NAMES else len(_NAMES))
-    return tuple(_channel(i, str(name), dataset[name]) for i, name in enumerate(found))
 
 
 def _channel(index: int, name: str, variable: xr.DataArray) -> Channel:

@@ -106,7 +106,10 @@ class Opened:
 
 def open_instrument(path: Path, format: str | None) -> Opened:
     """Header of an instrument file, by the format's name, ``"auto"``, or the suffix (None)."""
-    format = _detected(path) if format == "auto" else format
+    if format == "auto":
+        from SurfaceTopography.IO import detect_format
+
+        format = detect_format(str(path))
     suffix = path.suffix.lower().removeprefix(".")
     for name, read in READERS.items():
         if format == name or (format is None and suffix in OWN_SUFFIXES[name]):
@@ -249,17 +252,17 @@ def _sdf(path: Path) -> Opened:
     return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), lambda *_: cell, 0, maker)
 
 
-#: Format -> what reads the header of its files; of those that SurfaceTopography does not read here.
-READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf, "csv": lambda path: _csv(path)}
-_BUILT_IN = frozenset(OWN_SUFFIXES)
-
-
 def _csv(path: Path) -> Opened:
     """Points x, y, z one a line, as SurfaceTopography takes them, or else a matrix."""
     opened = _tried(path, "xyz")
     if isinstance(opened, Opened):
         return opened
     return replace(_surface_topography(path, "asc"), format="csv")
+
+
+#: Format -> what reads the header of its files; of those that SurfaceTopography does not read here.
+READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf, "csv": _csv}
+_BUILT_IN = frozenset(OWN_SUFFIXES)
 
 
 def _npy(path: Path) -> Opened:
@@ -270,12 +273,6 @@ def _npy(path: Path) -> Opened:
         return np.multiply(heights.T, unit, dtype=float, order="C"), None
 
     return Opened("npy", (Channel(0, "array", areal, heights.shape[::-1], None),), load)
-
-
-def _detected(path: Path) -> str:
-    from SurfaceTopography.IO import detect_format
-
-    return detect_format(str(path))
 
 
 def _tried(path: Path, format: str) -> Opened | Exception:

@@ -16,7 +16,7 @@ import scipy.sparse
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.blocks import column_blocks, count_of, row_blocks
+from roughvisc.topography.blocks import column_blocks, row_blocks
 from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
@@ -25,6 +25,7 @@ from roughvisc.topography.grid import (
     like,
     noted,
     number,
+    require_complete,
     resampled_taper,
     spacing,
     with_coordinates,
@@ -82,13 +83,11 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     """
     h = checked(h, "resample")
     shape = counts("shape", shape)
-    complete = _is_complete(h)
     repeats = _repeats("resample", h, periodic)
-    if periodic and not complete:
-        missing = h.size - count_of(h.values)
-        raise InputError(f"resample: {missing} points are missing: expected none for periodic=True (see fill)")
+    if periodic:
+        require_complete(h, "resample", "none for periodic=True (see fill)")
     cells = [Cells.of(old, new) for old, new in zip(h.shape, shape, strict=True)]
-    if repeats and complete:
+    if repeats and _is_complete(h):
         heights, way = resample_periodic(h.values, shape), "by Fourier interpolation"
     else:
         heights, way = lay_on_cells(h, *cells)
@@ -176,9 +175,7 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
             f"without_short_waves: shortest is {shortest!r}: expected at least two cells, {2 * max(sides):.6g} [m], "
             f"and less than the sides, {min(lengths):.6g} [m]"
         )
-    if not _is_complete(h):
-        missing = h.size - count_of(h.values)
-        raise InputError(f"without_short_waves: {missing} points are missing: expected none (see fill)")
+    require_complete(h, "without_short_waves")
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
     if _repeats("without_short_waves", h, periodic):
         q_x = 2 * np.pi * scipy.fft.fftfreq(h.shape[0], sides[0])

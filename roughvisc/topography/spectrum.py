@@ -10,9 +10,9 @@ import scipy.ndimage
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.blocks import column_blocks, count_of, mean_of, row_blocks
+from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
 from roughvisc.topography.bridging import bridged
-from roughvisc.topography.grid import checked, filled_points, like, spacing
+from roughvisc.topography.grid import checked, filled_points, like, require_complete, spacing
 from roughvisc.topography.missing_points import in_large_holes
 
 #: Share of the points that may be bridged.
@@ -154,8 +154,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None, *, bridge: bool 
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     """
     h = _bridged(checked(h, "psd", least=1)) if bridge else checked(h, "psd", least=1)
-    if missing := h.size - count_of(h.values):
-        raise InputError(f"psd: {missing} points are missing: expected none (bridge=True goes by the others)")
+    require_complete(h, "psd", "none (bridge=True goes by the others)")
     if window not in (None, "hann"):
         raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
     cells, shape = spacing(h), h.shape

@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
-from roughvisc.topography.grid import checked, labelled, noted, spacing
+from roughvisc.topography.grid import checked, labelled, noted, require_complete, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.topography.synthesis import RandomWaves, make_hermitian, synthesised
 
@@ -77,9 +77,9 @@ def surrogate(
         raise InputError(f"surrogates: amplitudes is {amplitudes!r}: expected 'gaussian' or 'fixed'")
     if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
         raise InputError(f"surrogates: seed is {seed!r}: expected a whole number >= 0")
-    if not np.isfinite(h.values).all():
-        raise InputError("surrogates: points are missing: expected a surface without any (see fill)")
-    h = _measured_part(h)
+    require_complete(h, "surrogates")
+    if is_mirrored(h.values):
+        h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # its rings are as wide
     (nx, ny), sides = h.shape, spacing(h)
@@ -103,8 +103,3 @@ def surrogate(
     return noted(
         grid, f"surrogate {realisation} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
     )
-
-
-def _measured_part(h: xr.DataArray) -> xr.DataArray:
-    """The part of a surface that its mirror images repeat; all of it where it is not made of them. [m]"""
-    return h[: h.shape[0] // 2, : h.shape[1] // 2] if is_mirrored(h.values) else h

@@ -172,13 +172,10 @@ def self_affine(
     heights = synthesised(spectrum, shape[1])
     heights *= target / math.sqrt(slope2 if rms_height is None else variance)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
-    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": _plain_seed(seed)}
+    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes}
+    parameters |= {"seed": int(seed) if isinstance(seed, int | np.integer) else None}
     attrs = recipe_of("self_affine", parameters, size, shape) | {"period": list(size)}
     return labelled(heights, cell_of(size, shape), attrs)
-
-
-def _plain_seed(seed: Any) -> int | None:
-    return int(seed) if isinstance(seed, int | np.integer) else None
 
 
 @dataclass(frozen=True)

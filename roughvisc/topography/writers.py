@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -98,10 +98,7 @@ def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], opti
         raise InputError(f"{file}: is a surface card already: expected a scan file")
     lines = [f"title = {_text(file.stem)}", f"file = {_text(Path(os.path.relpath(file, folder)).as_posix())}"]
     lines.append(f"sha256 = {_text(sha256(file))}")
-    for key in ("format", "channel", "unit", "height_unit", "spacing"):
-        value = options.get(key)
-        if value is not None:
-            lines.append(f"{key} = {_text(value) if isinstance(value, str) else _numbers(value)}")
+    lines += [f"{key} = {value}" for key, value in _how_to_read(options, _numbers).items()]
     return "\n".join(lines) + _REST
 
 
@@ -144,11 +141,7 @@ def surface_table(
     file, remarks = Path(file), remarks or {}
     near = Path(os.path.relpath(file, folder))
     entries = {"file": _text((file.resolve() if near.parts[0] == ".." else near).as_posix())}
-    for key in ("format", "channel", "unit", "height_unit"):
-        if options.get(key) is not None:
-            entries[key] = _text(options[key]) if isinstance(options[key], str) else str(options[key])
-    if options.get("spacing") is not None:
-        entries["spacing"] = _lengths(options["spacing"])
+    entries |= _how_to_read(options, _lengths)
     for key, value in steps.items():
         if key == "crop":
             entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
@@ -163,6 +156,12 @@ def surface_table(
         for line, key in zip(lines, entries, strict=True)
     ]
     return "\n".join(["[surface]", *shown]) + "\n"
+
+
+def _how_to_read(options: Mapping[str, Any], spacing: Callable[[Any], str]) -> dict[str, str]:
+    """Options that a file needs to be opened, as TOML; the spacing in a way of its own."""
+    ways = dict.fromkeys(("format", "channel", "unit", "height_unit"), _text) | {"spacing": spacing}
+    return {key: way(options[key]) for key, way in ways.items() if options.get(key) is not None}
 
 
 def written_quantity(value: float, unit: str, digits: int = 6) -> str:
@@ -186,8 +185,8 @@ def _lengths(value: Any) -> str:
     return _text(written_quantity(float(value), "m"))
 
 
-def _text(value: str) -> str:
-    """A TOML string: JSON's, but for one character."""
+def _text(value: str | int) -> str:
+    """A TOML string or number: JSON's, but for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -125,6 +126,14 @@ class Kernel(Protocol):
         total = np.cumsum(np.cumsum(quadrant, axis=0), axis=1)
         x, y = ((a, b) for a, b in zip(before, after, strict=True))
         return np.asarray(sum(total[np.ix_(i, j)] for i in x for j in y))
+
+
+def half_space_transfer(factor: Callable[[Array], Array], qx: ArrayLike, qy: ArrayLike) -> Array:
+    """``(2 / |q|)`` times a factor of positive wave numbers [1/m]; zero at ``q = 0``, as of a half-space. [m]"""
+    q = np.asarray(np.hypot(qx, qy), dtype=float)
+    acts = q > 0
+    q = np.where(acts, q, 1.0)
+    return np.where(acts, 2 / q * factor(q), 0.0)
 
 
 def has_finite_mean(kernel: Kernel) -> bool:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
+from roughvisc.mechanics.bodies.kernel import Kernel, check_grid, half_space_transfer
 
 Array = NDArray[np.float64]
 # So many depths of images a decade, from this part of the thinnest layer on: at any distance they are right to 1e-5 of
@@ -169,20 +169,13 @@ class Layered(Kernel):
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """``(2 / |q|) S(|q|)``; zero at ``q = 0``, as of a half-space. [m]"""
-        q = np.asarray(np.hypot(qx, qy), dtype=float)
-        acts = q > 0
-        q = np.where(acts, q, 1.0)
-        return np.where(acts, 2 / q * self.factor(q), 0.0)
+        return half_space_transfer(self.factor, qx, qy)
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Love's kernel and the images, for cells of any length. [m]"""
         kernel = love_kernel(shape, spacing)
         depths, weights = _images(self.factor, self.thicknesses, self.of_long_waves)
         return kernel + image_influence(shape, spacing, depths, weights)
-
-    def described(self) -> dict[str, Any]:
-        """The kernel itself."""
-        return {"kernel": repr(self)}
 
 
 @lru_cache(maxsize=8)

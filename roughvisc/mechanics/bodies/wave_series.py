@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.bodies.kernel import Kernel, half_space_transfer
 from roughvisc.mechanics.bodies.layered import effective_compliance, image_depths, image_influence
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -193,10 +193,7 @@ class WaveKernel(Kernel):
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """``2 C(|q|) / |q|``; zero at ``q = 0``."""
-        q = np.asarray(np.hypot(qx, qy), dtype=float)
-        acts = q > 0
-        q = np.where(acts, q, 1.0)
-        return np.where(acts, 2 / q * self._along(np.log(np.clip(q, self.q[0], self.q[-1]))), 0.0)
+        return half_space_transfer(lambda q: self._along(np.log(np.clip(q, self.q[0], self.q[-1]))), qx, qy)
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """That of a half-space as short waves feel it, and images, as of a layered elastic one."""

@@ -8,16 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, punch_pressure
+from roughvisc.mechanics.closed_forms.indenters import Cone, Indenter, Paraboloid, positive, punch_pressure
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
-
-
-def _refuse_unless_positive(**values: float) -> None:
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{name} is {value!r}: expected a positive number")
 
 
 @dataclass(frozen=True)
@@ -55,7 +49,8 @@ class AxisymmetricContact:
 
 
 def _elastic(indenter: Indenter, contact_modulus: float, force: float) -> AxisymmetricContact:
-    _refuse_unless_positive(contact_modulus=contact_modulus, force=force)
+    positive("contact_modulus", contact_modulus, "Pa")
+    positive("force", force, "N")
     radius = float(indenter.radius_at_scaled_force(force / contact_modulus))
     return AxisymmetricContact(indenter, contact_modulus, radius, float(indenter.reduced(radius)), force)
 
@@ -196,7 +191,12 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
     """
-    _refuse_unless_positive(radius=radius, contact_modulus=contact_modulus, force=force)
+    for name, value, unit in (
+        ("radius", radius, "m"),
+        ("contact_modulus", contact_modulus, "Pa"),
+        ("force", force, "N"),
+    ):
+        positive(name, value, unit)
     return FlatPunchContact(contact_modulus, radius, force / (2 * contact_modulus * radius), force)
 
 
@@ -280,12 +280,10 @@ def westergaard(
     >>> round(contact.contact_fraction, 12)
     0.5
     """
-    _refuse_unless_positive(
-        amplitude=amplitude, wavelength=wavelength, contact_modulus=contact_modulus, mean_pressure=mean_pressure
-    )
-    full = np.pi * contact_modulus * amplitude / wavelength
+    positive("mean_pressure", mean_pressure, "Pa")
+    full = full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
     sine = np.sqrt(min(mean_pressure / full, 1.0))
-    return WavyContact(wavelength, float(full), mean_pressure, float(wavelength / np.pi * np.arcsin(sine)))
+    return WavyContact(wavelength, full, mean_pressure, float(wavelength / np.pi * np.arcsin(sine)))
 
 
 @quantities(amplitude="m", wavelength="m", contact_modulus="Pa")
@@ -314,7 +312,9 @@ def full_contact_pressure(
     """
     if waves not in (1, 2):
         raise InputError(f"waves is {waves!r}: expected 1 or 2")
-    _refuse_unless_positive(amplitude=amplitude, wavelength=wavelength, contact_modulus=contact_modulus)
+    positive("amplitude", amplitude, "m")
+    positive("wavelength", wavelength, "m")
+    positive("contact_modulus", contact_modulus, "Pa")
     return float(np.sqrt(waves) * np.pi * contact_modulus * amplitude / wavelength)
 
 

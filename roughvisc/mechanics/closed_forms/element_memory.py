@@ -1,8 +1,9 @@
-"""Memory of the elements of the method of dimensionality reduction (MDR), independent of that of the grid."""
+"""Memory of the elements of the method of dimensionality reduction (MDR), independent of that of the grid.
+
+Both kinds have one column an element, in order of creation.
+"""
 
 from __future__ import annotations
-
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,26 +11,6 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]
-
-
-class Memory(Protocol):
-    """What the elements remember. One column an element, in order of creation."""
-
-    def predict(self, h: float, count: int) -> tuple[Array, float]:
-        """Displacement left by the past after a step, and compliance to the new force."""
-        ...
-
-    def accept(self, force: Array) -> None:
-        """End the step with the forces found."""
-        ...
-
-    def insert(self, left: int, right: int, weight: float, count: int) -> None:
-        """New column ``count``, between two old ones."""
-        ...
-
-    def restart(self) -> None:
-        """After a corner or a jump: rates are not continuous there."""
-        ...
 
 
 class Exponentials:
@@ -53,6 +34,7 @@ class Exponentials:
         self.last_h = 0.0
 
     def predict(self, h: float, count: int) -> tuple[Array, float]:
+        """Displacement left by the past after a step, and compliance to the new force."""
         now, force = self.now[:, :count], self.force[:count]
         weights = np.append(self.compliances, self.flow)
         if h == 0:
@@ -77,6 +59,7 @@ class Exponentials:
         return weights @ kept, self.glassy + float(weights @ gain)
 
     def accept(self, force: Array) -> None:
+        """End the step with the forces found."""
         assert self._pending is not None
         h, kept, gain = self._pending
         count = len(force)
@@ -87,6 +70,7 @@ class Exponentials:
         self.force[:count] = force
 
     def insert(self, left: int, right: int, weight: float, count: int) -> None:
+        """New column ``count``, between two old ones."""
         for field in (self.now, self.before, self.force):
             field[..., count] = (1 - weight) * field[..., left] + weight * field[..., right]
         if self._pending is not None:

@@ -128,36 +128,3 @@ def full_contact_wave(amplitude: Quantity, wavenumber: Quantity, material: Prony
     Contact stays full as long as the sum of the waves and the mean pressure is nowhere negative.
     """
     return ContactRelaxation.of(material)(t) * wavenumber * amplitude / 2
-
-
-@quantities(amplitude="m", wavelength="m", t="s")
-def westergaard_half_width(
-    amplitude: Quantity, wavelength: Quantity, material: Material, program: Program, t: ArrayLike
-) -> Array:
-    r"""Half-width of the contacts of ``amplitude cos(2 pi x / wavelength)`` under a mean pressure that never falls.
-
-    Parameters
-    ----------
-    amplitude, wavelength : float or str
-        Of the profile. [m]
-    material : Material
-        The half-space.
-    program : Program
-        Rising ramps, holds and jumps of "load", here the mean pressure. [Pa]
-    t : array_like of float or str
-        Times. [s]
-
-    Returns
-    -------
-    ndarray
-        Half-width of a contact strip; half the wavelength in full contact. [m]
-
-    Notes
-    -----
-    As for other growing contacts, the elastic form holds with ``int C dp`` for mean pressure over modulus:
-
-    .. math:: \sin^2 \frac{\pi b}{l} = \frac{l}{\pi a} \int_0^t C(t - s) \, d\bar p(s)
-    """
-    _control(program, "load")
-    scaled = hereditary_integral(material.contact_compliance, material.contact_integral, program, t)
-    return np.asarray(wavelength / np.pi * np.arcsin(np.sqrt(np.minimum(scaled * wavelength / (np.pi * amplitude), 1))))

@@ -9,13 +9,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, punch_pressure
+from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, places, positive, punch_pressure
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
+
+
+def with_decays(first: float, weights: Array, times: Array, t: ArrayLike) -> Array:
+    """``first + sum weights exp(-t / times)``."""
+    t = np.asarray(t, dtype=float)
+    total = np.full(t.shape, first)
+    for weight, time in zip(weights, times, strict=True):
+        total = total + weight * np.exp(-t / time)
+    return total
 
 
 @dataclass(frozen=True)
@@ -43,11 +52,7 @@ class ContactRelaxation:
 
     def __call__(self, t: ArrayLike) -> Array:
         """``E(t)``. [Pa]"""
-        t = np.asarray(t, dtype=float)
-        total = np.full(t.shape, self.equilibrium)
-        for modulus, time in zip(self.moduli, self.times, strict=True):
-            total = total + modulus * np.exp(-t / time)
-        return total
+        return with_decays(self.equilibrium, self.moduli, self.times, t)
 
     def integral(self, t: ArrayLike) -> Array:
         """``int_0^t E``. [Pa s]"""
@@ -64,15 +69,30 @@ class ContactRelaxation:
 
     def rate(self, t: ArrayLike) -> Array:
         """``-dE/dt``, never negative. [Pa/s]"""
-        t = np.asarray(t, dtype=float)
-        total = np.zeros(t.shape)
-        for modulus, time in zip(self.moduli, self.times, strict=True):
-            total = total + modulus / time * np.exp(-t / time)
-        return total
+        return with_decays(0.0, self.moduli / self.times, self.times, t)
 
 
 @dataclass(frozen=True)
-class StepLoad:
+class _Growing:
+    """Contact that only grows: elastic at every instant, under the force of unit modulus ``int C dW``."""
+
+    indenter: Indenter
+
+    def scaled_force(self, t: ArrayLike) -> Array:
+        """``int C dW``. [m2]"""
+        raise NotImplementedError
+
+    def radius(self, t: ArrayLike) -> Array:
+        """Contact radius at ``t >= 0``. [m]"""
+        return self.indenter.radius_at_scaled_force(self.scaled_force(t))
+
+    def approach(self, t: ArrayLike) -> Array:
+        """Approach at ``t >= 0``. [m]"""
+        return self.indenter.reduced(self.radius(t))
+
+
+@dataclass(frozen=True)
+class StepLoad(_Growing):
     """Contact under a load that is applied at time zero and kept.
 
     Parameters
@@ -85,17 +105,12 @@ class StepLoad:
         The load. [N]
     """
 
-    indenter: Indenter
     material: Material
     force: float
 
-    def radius(self, t: ArrayLike) -> Array:
-        """Contact radius at ``t >= 0``. [m]"""
-        return self.indenter.radius_at_scaled_force(self.force * self.material.contact_compliance(t))
-
-    def approach(self, t: ArrayLike) -> Array:
-        """Approach at ``t >= 0``. [m]"""
-        return self.indenter.reduced(self.radius(t))
+    def scaled_force(self, t: ArrayLike) -> Array:
+        """``W C(t)``. [m2]"""
+        return self.force * self.material.contact_compliance(t)
 
     def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
         """Pressure at ``r`` [m] and ``t >= 0``, which are broadcast. [Pa]
@@ -105,7 +120,7 @@ class StepLoad:
         if not isinstance(self.material, Prony):
             raise InputError("pressure under a step load is implemented for exponential series only")
         relaxation = ContactRelaxation.of(self.material)
-        r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
+        r, t = places(r, t)
         entry = bisect(lambda s: self.radius(s) - r, np.zeros(r.shape), t)
         entry = np.where(r <= self.radius(0.0), 0.0, entry)
 
@@ -164,8 +179,7 @@ def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity)
     >>> float(press.radius(0.0)), float(press.radius(7.0))
     (1.0, 2.0)
     """
-    if not (np.isfinite(force) and force > 0):
-        raise InputError(f"force is {force!r}: expected a positive number [N]")
+    positive("force", force, "N")
     return StepLoad(Paraboloid(sphere_radius), material, force)
 
 
@@ -215,8 +229,7 @@ def kelvin_voigt_step(sphere_radius: Quantity, material: Prony, force: Quantity)
     """
     if not isinstance(material, Prony) or material.glassy or material.fluidity or len(material.compliances) != 1:
         raise InputError("material is not a Kelvin-Voigt solid: expected one retarded compliance and nothing else")
-    if not (np.isfinite(force) and force > 0):
-        raise InputError(f"force is {force!r}: expected a positive number [N]")
+    positive("force", force, "N")
     return KelvinVoigtStep(Paraboloid(sphere_radius), material, force)
 
 
@@ -259,7 +272,7 @@ def hereditary_integral(
 
 
 @dataclass(frozen=True)
-class GrowingContact:
+class GrowingContact(_Growing):
     """Contact under a load that never falls; see :func:`lee_radok`.
 
     Parameters
@@ -272,18 +285,12 @@ class GrowingContact:
         The load.
     """
 
-    indenter: Indenter
     material: Material
     program: Program
 
-    def radius(self, t: ArrayLike) -> Array:
-        """Contact radius. [m]"""
-        compliance, integral = self.material.contact_compliance, self.material.contact_integral
-        return self.indenter.radius_at_scaled_force(hereditary_integral(compliance, integral, self.program, t))
-
-    def approach(self, t: ArrayLike) -> Array:
-        """Approach. [m]"""
-        return self.indenter.reduced(self.radius(t))
+    def scaled_force(self, t: ArrayLike) -> Array:
+        """``int C dW``. [m2]"""
+        return hereditary_integral(self.material.contact_compliance, self.material.contact_integral, self.program, t)
 
 
 def lee_radok(indenter: Indenter, material: Material, program: Program) -> GrowingContact:
@@ -323,7 +330,7 @@ def lee_radok(indenter: Indenter, material: Material, program: Program) -> Growi
 
 
 @dataclass(frozen=True)
-class PowerLawRamp:
+class PowerLawRamp(_Growing):
     """A sphere pressed at a constant loading rate on a power-law material; see :func:`power_law_ramp`."""
 
     indenter: Paraboloid
@@ -331,19 +338,14 @@ class PowerLawRamp:
     coefficient: float
     exponent: float
 
-    def radius(self, t: ArrayLike) -> Array:
-        """Contact radius. [m]"""
+    def scaled_force(self, t: ArrayLike) -> Array:
+        """``int C dW``. [m2]"""
         t = np.asarray(t, dtype=float)
-        scaled = self.loading_rate * self.coefficient * t ** (1 + self.exponent) / (1 + self.exponent)
-        return self.indenter.radius_at_scaled_force(scaled)
-
-    def approach(self, t: ArrayLike) -> Array:
-        """Approach. [m]"""
-        return self.indenter.reduced(self.radius(t))
+        return self.loading_rate * self.coefficient * t ** (1 + self.exponent) / (1 + self.exponent)
 
     def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
         """Pressure at ``r`` [m] and ``t > 0`` [s], which are broadcast. [Pa]"""
-        r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
+        r, t = places(r, t)
         power = (1 + self.exponent) / 3  # a ~ t^power
         radius = self.radius(t)
         share = np.minimum(r / radius, 1.0) ** (1 / power)  # of the time, when the edge passes r

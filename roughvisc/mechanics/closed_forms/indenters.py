@@ -54,6 +54,12 @@ class Indenter(Hashable, Protocol):
         ...
 
 
+def places(r: ArrayLike, other: ArrayLike) -> tuple[Array, Array]:
+    """Distances from the axis, not negative, and as many of another number. [m]"""
+    at, numbers = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(other, dtype=float))
+    return at, numbers
+
+
 def positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0):
         raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
@@ -97,12 +103,12 @@ class Paraboloid:
 
     def scaled_pressure(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``2 sqrt(a^2 - r^2) / (pi R)``. [-]"""
-        r, a = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
+        r, a = places(r, radius)
         return np.asarray(2 / (np.pi * self.radius) * np.sqrt(np.maximum((a - r) * (a + r), 0.0)))
 
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``(2 a^2 - r^2) / (2 R)`` inside; ``((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2)) / (pi R)`` outside. [m]"""
-        r, a = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
+        r, a = places(r, radius)
         out = np.maximum(r, a)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(out > 0, a / out, 1.0)
@@ -147,7 +153,7 @@ class Cone:
 
     def scaled_pressure(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``(m / 2) arcosh(a / r)``; infinite at the apex. [-]"""
-        r, radius = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
+        r, radius = places(r, radius)
         with np.errstate(divide="ignore", invalid="ignore"):
             # arcosh(1 + e) without the rounding of 1 + e, which would be the whole value near the edge
             excess = np.where(r < radius, (radius - r) / r, 0.0)
@@ -155,7 +161,7 @@ class Cone:
 
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """``m (pi a / 2 - r)`` inside; ``m (a asin(a/r) - r + sqrt(r^2 - a^2))`` outside. [m]"""
-        r, a = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
+        r, a = places(r, radius)
         out = np.maximum(r, a)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(out > 0, a / out, 1.0)
@@ -185,7 +191,7 @@ def punch_pressure(r: ArrayLike, radius: ArrayLike, force: ArrayLike) -> Array:
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.34).
     """
-    r, radius = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
+    r, radius = places(r, radius)
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = np.asarray(force) / (2 * np.pi * radius * np.sqrt(np.maximum((radius - r) * (radius + r), 0.0)))
         return np.asarray(np.where(r <= radius, inside, 0.0))

@@ -24,13 +24,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.closed_forms.element_memory import AllForces, Exponentials, Memory
-from roughvisc.mechanics.closed_forms.element_row import ElementRow, OutOfElements, edge
+from roughvisc.mechanics.closed_forms.element_memory import AllForces, Exponentials
 from roughvisc.mechanics.closed_forms.indenters import Indenter
-from roughvisc.mechanics.closed_forms.instants import fastest_change, instants_of, same_instant
 from roughvisc.mechanics.closed_forms.sheet import OnSheet
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.stepping.program import Program, Segment
 from roughvisc.units import quantities
 
 Array = NDArray[np.float64]
@@ -58,10 +56,68 @@ class ContactHistory:
     error: float
 
 
+class _OutOfElements(Exception):
+    """The contact reached the last element."""
+
+
+class _ElementRow:
+    """The elements: where they are, and the equilibrium of a step.
+
+    The edge of the contact becomes an element after every step: forces have kinks there and nowhere else.
+    """
+
+    def __init__(self, indenter: Indenter, outermost: float, count: int, capacity: int):
+        self.x = np.zeros(capacity)
+        self.x[:count] = outermost * (np.arange(count) / (count - 1)) ** 2
+        self.g = np.zeros(capacity)
+        self.g[:count] = indenter.reduced(self.x[:count])
+        self.indenter = indenter
+        self.count = count
+        self.order = np.arange(count)
+
+    def area(self, x: Array, y: Array, level: float) -> tuple[float, float]:
+        """``int (level - y)_+ dx`` of the interpolant, and the length over which it is positive."""
+        d = level - y
+        d0, d1, width = d[:-1], d[1:], np.diff(x)
+        low, high = np.minimum(d0, d1), np.maximum(d0, d1)
+        crossing = (low < 0) & (high > 0)
+        share = np.where(crossing, high / np.where(crossing, high - low, 1.0), high > 0)
+        total = np.where(crossing, high * share, np.where(high > 0, d0 + d1, 0.0)) @ width / 2
+        return float(total), float(share @ width)
+
+    def level_for(self, x: Array, y: Array, area: float, guess: float) -> float:
+        """Level under which the interpolant encloses an area: Newton's method on a convex function."""
+        bottom, top = float(np.min(y)), float(np.max(y))
+        if self.area(x, y, top)[0] < area:
+            raise _OutOfElements
+        level = guess if bottom < guess < top else top
+        for _ in range(200):
+            found, slope = self.area(x, y, level)
+            step = (area - found) / slope if slope > 0 else np.inf
+            before, level = level, min(level + step, top)  # a hardly touching start would throw it far away
+            if abs(level - before) <= 4e-16 * (abs(level) + abs(bottom)):
+                break
+        return max(level, bottom)
+
+
+def _edge(x: Array, y: Array, level: float, strict: bool) -> tuple[int, float]:
+    """Index of the last touching element and the radius; (-1, 0) where nothing touches."""
+    touching = level > y
+    if not touching.any():
+        return -1, 0.0
+    last = int(len(y) - 1 - np.argmax(touching[::-1]))
+    if last == len(y) - 1:
+        raise _OutOfElements
+    depth = level - y[: last + 1]
+    if strict and np.any(depth < -0.01 * np.max(depth)):
+        raise ConvergenceError("the contact is no longer a disc: the reduction to independent elements does not hold")
+    return last, float(x[last] + (x[last + 1] - x[last]) * depth[-1] / (y[last + 1] - y[last]))
+
+
 class _Run:
     """One pass through a program at one resolution."""
 
-    def __init__(self, indenter: Indenter, memory: Memory, row: ElementRow, *, strict: bool):
+    def __init__(self, indenter: Indenter, memory: Exponentials | AllForces, row: _ElementRow, *, strict: bool):
         self.indenter, self.memory, self.row, self.strict = indenter, memory, row, strict
         self.radius = self.approach = self.force = self.work = 0.0
         self.largest_radius = 0.0
@@ -88,7 +144,7 @@ class _Run:
             level = float(np.min(y))
         else:
             level = row.level_for(x, y, value * compliance / 2, self.approach)
-        last, radius = edge(x, y, level, self.strict)
+        last, radius = _edge(x, y, level, self.strict)
         depth = np.maximum(level - (row.g[: row.count] + free), 0.0)
         if last >= 0:
             weight = (radius - x[last]) / (x[last + 1] - x[last])
@@ -113,6 +169,54 @@ class _Run:
         for i in range(1, increments + 1):
             u = i / increments  # slow at both ends, where force may grow as a power of approach
             self.advance(0.0, control, start + (value - start) * u**3 * (10 - 15 * u + 6 * u**2))
+
+
+def _instants_of(segment: Segment, start: float, stops: Array, steps: int, refine: int, fastest: float) -> Array:
+    """Instants after the start of a segment: fine after the corner, landing on the stops, nested when refined."""
+    length = segment.duration
+    if length == 0:
+        return np.zeros(16 * refine)
+    if segment.amplitude:  # uniform but for the first quarter of a period
+        steps = int(np.ceil(steps * max(1.0, length / segment.period)))
+        bend = min(segment.period / (2 * length), 0.5)
+
+        def instant(u: Array) -> Array:
+            return np.where(u < bend, u**2 / (2 * bend), u - bend / 2) / (1 - bend / 2)
+
+    else:  # quadratic, then exponential, so that all decades down to the fastest mode are seen
+        stretch = np.arcsinh(np.sqrt(min(max(1.0, length / fastest), 1e12)))
+        closing = segment.control == "load" and segment.end == 0  # quadratic again where the contact vanishes
+
+        def instant(u: Array) -> Array:
+            if closing:
+                u = u * (2 - u)
+            return np.asarray((np.sinh(stretch * u) / np.sinh(stretch)) ** 2)
+
+    fine = np.linspace(0, 1, 20001)
+    inner = [stop - start for stop in stops if start < stop < start + length]
+    marks = [0.0, *(np.interp(np.array(inner) / length, instant(fine), fine) if inner else []), 1.0]
+    instants = []
+    for (u0, u1), (t0, t1) in zip(pairwise(marks), pairwise([0.0, *inner, length]), strict=True):
+        count = refine * max(1, int(np.ceil(steps * (u1 - u0) - 1e-9)))
+        part = instant(u0 + (u1 - u0) * np.arange(count + 1) / count)
+        instants.append(t0 + (t1 - t0) * (part[1:] - part[0]) / (part[-1] - part[0]))
+        instants[-1][-1] = t1
+    return np.concatenate(instants)
+
+
+def _fastest_change(material: Material) -> float:
+    """Shortest time on which a material changes; infinite if unknown. [s]"""
+    if not isinstance(material, Prony):
+        return np.inf
+    times = list(material.times)
+    if material.glassy:
+        times += list(material.relaxation_spectrum()[2])
+    return min(times, default=np.inf)
+
+
+def _same_instant(times: Array, instant: float) -> NDArray[np.bool_]:
+    """Which of the times an instant is: a time less the start of its segment, plus that, may be a rounding off."""
+    return np.abs(times - instant) <= 4 * np.finfo(float).eps * times
 
 
 def _outermost(indenter: Indenter, material: Material, program: Program) -> float:
@@ -151,20 +255,20 @@ def _pass(
 ) -> tuple[Array, float]:
     """Radius, approach, force and work at the times, and the largest radius, at one resolution."""
     steps, refine, elements = resolution
-    corners, fastest = program.corners, fastest_change(material)
+    corners, fastest = program.corners, _fastest_change(material)
     meshes = [
-        instants_of(segment, start, times, steps, refine, fastest)
+        _instants_of(segment, start, times, steps, refine, fastest)
         for segment, start in zip(program.segments, corners, strict=False)
     ]
     total = sum(len(mesh) for mesh in meshes)
-    memory: Memory
+    memory: Exponentials | AllForces
     if exponentials:
         assert isinstance(material, Prony)
         memory = Exponentials(material, elements + total, stiff=stiff)
     else:
         memory = AllForces(material, elements + total, total)
     can_jump = float(material.contact_compliance(0.0)) > 0
-    run = _Run(indenter, memory, ElementRow(indenter, outermost, elements, elements + total), strict=strict)
+    run = _Run(indenter, memory, _ElementRow(indenter, outermost, elements, elements + total), strict=strict)
     kept = np.zeros((4, len(times)))
     for segment, start, end, mesh in zip(program.segments, corners, corners[1:], meshes, strict=False):
         memory.restart()
@@ -176,7 +280,7 @@ def _pass(
                 raise InputError("a jump of approach needs a material with instantaneous compliance")
             else:
                 run.pending_load = segment.end
-            at = same_instant(times, end)
+            at = _same_instant(times, end)
             kept[:, at] = run.state[:, None] if can_jump or end == 0 else kept[:, at]
             continue
         begin = run.value(segment.control)
@@ -184,7 +288,7 @@ def _pass(
         for instant in mesh:
             run.advance(float(instant) - before, segment.control, segment.value(float(instant), begin))
             before = float(instant)
-            at = same_instant(times, start + before if before < segment.duration else end)
+            at = _same_instant(times, start + before if before < segment.duration else end)
             kept[:, at] = run.state[:, None]
     return kept, run.largest_radius
 
@@ -194,7 +298,7 @@ def _growing_row(run: Callable[..., tuple[Array, float]], outermost: float) -> t
     for _ in range(40):
         try:
             return run(outermost=outermost), outermost
-        except OutOfElements:
+        except _OutOfElements:
             outermost *= 1.5
     raise ConvergenceError("the contact radius grows beyond all bounds")
 
@@ -286,7 +390,7 @@ def reduced_contact(
         raise InputError(f"refinements is {refinements!r}: expected at least 1")
     exponentials = exponentials and isinstance(material, Prony)
     coarse = [
-        instants_of(segment, start, instants, steps, 1, fastest_change(material))
+        _instants_of(segment, start, instants, steps, 1, _fastest_change(material))
         for segment, start in zip(program.segments, corners, strict=False)
     ]
     stiff = _rings(material, coarse)

@@ -24,7 +24,7 @@ from scipy.special import j0
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, panels
-from roughvisc.mechanics.closed_forms.indenters import Indenter, positive, punch_pressure
+from roughvisc.mechanics.closed_forms.indenters import Indenter, places, positive, punch_pressure
 from roughvisc.mechanics.closed_forms.layer import ElasticLayer
 from roughvisc.units import Quantity, quantities
 
@@ -99,12 +99,12 @@ class OnSheet:
 
     def scaled_pressure(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """Pressure over contact modulus of an elastic contact; zero outside. [-]"""
-        r, radius = _broadcast(r, radius)
+        r, radius = places(r, radius)
         return self.indenter.scaled_pressure(r, radius) + self._within(r, radius, _Contact.added_pressure)
 
     def displacement(self, r: ArrayLike, radius: ArrayLike) -> Array:
         """Surface displacement of an elastic contact, inside and outside. [m]"""
-        r, radius = _broadcast(r, radius)
+        r, radius = places(r, radius)
         beyond = self._within(r, radius, _Contact.displacement) * self.sheet.thickness
         return np.asarray(np.where(r <= radius, self.reduced(radius) - self.height(r), beyond))
 
@@ -227,12 +227,6 @@ def _inverted(function: Callable[[float], Array], value: float, near: float) -> 
     if low == high:
         return low
     return float(brentq(lambda a: float(function(a)) - value, low, high, xtol=1e-14 * high, rtol=1e-14))
-
-
-def _broadcast(r: ArrayLike, radius: ArrayLike) -> tuple[Array, Array]:
-    """Distances and radii of one shape."""
-    at, contact = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(radius, dtype=float))
-    return at, contact
 
 
 @lru_cache(maxsize=4096)

@@ -20,18 +20,16 @@ Complex = NDArray[np.complex128]
 _BEYOND = 100.0
 
 
-def complex_compliance(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Complex:
+def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     r"""Displacement over pressure where both oscillate as ``exp(i w t)``.
 
     Parameters
     ----------
     material : Material
         A series and a power law have it in closed form, and so has a pair of these; anything else is taken by its
-        certified series.
+        certified series, see :func:`over_frequencies`.
     frequency : array_like
         Angular frequencies ``w``, of either sign. [1/s]
-    tolerance : float
-        Relative error of a series in place of the material.
 
     Returns
     -------
@@ -65,7 +63,7 @@ def complex_compliance(material: Material, frequency: ArrayLike, tolerance: floa
     ([0.5, 0.375], [0.0, -0.125])
     """
     w = np.asarray(frequency, dtype=float)
-    closed = over_frequencies(material, w, tolerance)
+    closed = over_frequencies(material, w)
     if isinstance(closed, Pair):
         return complex_compliance(closed.a, w) + complex_compliance(closed.b, w)
     return _of_power_law(closed, w) if isinstance(closed, PowerLaw) else _of_series(closed, w)

@@ -4,7 +4,7 @@ The half-space enters the contact through one function, the contact compliance
 ``C(t) = 1/E*(t) = (1 - nu) J(t) / 2`` with the shear creep compliance ``J``; two deformable bodies add theirs.
 
 The constructors take either a Poisson ratio, constant in time (a half unless given), or an elastic bulk modulus,
-with which it changes in time: see :func:`roughvisc.mechanics.materials.bulk.with_elastic_bulk`.
+with which it changes in time: see :func:`roughvisc.mechanics.materials.relaxation.with_elastic_bulk`.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.bulk import in_volume
 from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
 from roughvisc.mechanics.materials.fit import PairFit
 from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
 from roughvisc.mechanics.materials.power_law import PowerLaw
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.materials.protocol import Material, complete
-from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.relaxation import from_relaxation, in_volume
 from roughvisc.mechanics.materials.tabulated import Tabulated
 from roughvisc.notebook import table
 from roughvisc.units import Quantity, quantities
@@ -276,12 +275,13 @@ class Pair:
     @property
     def note(self) -> str:
         """The notes of both."""
-        return _notes(self.a, self.b)
+        return "; ".join(f"{name}: {body.note}" for name, body in (("a", self.a), ("b", self.b)) if body.note)
 
     @property
     def fit(self) -> PairFit | None:
-        """What the measurements of both leave unknown."""
-        return _fit_of(self.a, self.b)
+        """What the measurements of both leave unknown; None if neither is a fit."""
+        bodies = tuple((body, getattr(body, "fit", None)) for body in (self.a, self.b))
+        return PairFit(bodies) if any(fit is not None for _, fit in bodies) else None
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance of one incompressible body that would make the same contact. [1/Pa]"""
@@ -318,8 +318,9 @@ def pair(a: Material, b: Material) -> Prony | Pair:
     >>> float(pair(elastic(2e6, 0.3), maxwell(1e6, 1e6)).contact_compliance(3.0))  # 0.35/2e6 + 0.25 (1 + 3)/1e6
     1.175e-06
     """
+    both = Pair(complete(a), complete(b))
     if not (isinstance(a, Prony) and isinstance(b, Prony)):
-        return Pair(complete(a), complete(b))
+        return both
     glassy, fluidity = 0.0, 0.0
     compliances: dict[float, float] = {}
     for body in (a, b):
@@ -333,17 +334,7 @@ def pair(a: Material, b: Material) -> Prony | Pair:
         fluidity,
         tuple(compliances.values()),
         tuple(compliances),
-        note=_notes(a, b),
-        stands_for=TWO_BODIES,
-        fit=_fit_of(a, b),
+        note=both.note,
+        stands_for=both.stands_for,
+        fit=both.fit,
     )
-
-
-def _fit_of(a: Material, b: Material) -> PairFit | None:
-    """What the measurements of both leave unknown; None if neither is a fit."""
-    bodies = tuple((body, getattr(body, "fit", None)) for body in (a, b))
-    return PairFit(bodies) if any(fit is not None for _, fit in bodies) else None
-
-
-def _notes(a: Material, b: Material) -> str:
-    return "; ".join(f"{name}: {body.note}" for name, body in (("a", a), ("b", b)) if body.note)

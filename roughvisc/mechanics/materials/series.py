@@ -133,10 +133,10 @@ def power_law_series(material: PowerLaw, shortest: float, longest: float, tolera
         if met and spacing < 0.7 * met:
             break
         rule = _Rule.over(material, spacing, shortest, longest)
-        found = _measured(material, rule.series(material), times)
+        found = _measured(material, rule.series(), times)
         if found.error <= tolerance:
             met = met or float(spacing)
-            found = _measured(material, rule.trimmed(material, times, tolerance).series(material), times)
+            found = _measured(material, rule.trimmed(times, tolerance).series(), times)
         if _better(found, best, tolerance):
             best = found
     return best
@@ -234,6 +234,7 @@ def _check_range(shortest: float, longest: float, tolerance: float) -> None:
 class _Rule:
     """Trapezoidal rule of a power law: ``y`` ascends, and rates are ``exp(y) / time_scale``."""
 
+    material: PowerLaw
     y: Array
     weights: Array
     spacing: float
@@ -246,32 +247,32 @@ class _Rule:
         y = spacing * np.arange(low, high + 1, dtype=float)
         exponent = material.exponent
         factor = material.coefficient * exponent / math.gamma(1 - exponent) * spacing
-        return cls(y, factor * np.exp(-exponent * y), spacing)
+        return cls(material, y, factor * np.exp(-exponent * y), spacing)
 
-    def series(self, material: PowerLaw) -> Prony:
+    def series(self) -> Prony:
         """The terms as a series, with the tails beyond them summed up."""
-        weight, time = self._faster(material, -1)
+        weight, time = self._faster(-1)
         return Prony(
-            material.glassy,
-            self._slower(material, 0),
+            self.material.glassy,
+            self._slower(0),
             (weight, *self.weights[::-1].tolist()),
-            (time, *(material.time_scale * np.exp(-self.y[::-1])).tolist()),
-            material.poisson,
+            (time, *(self.material.time_scale * np.exp(-self.y[::-1])).tolist()),
+            self.material.poisson,
         )
 
-    def trimmed(self, material: PowerLaw, times: Array, tolerance: float) -> _Rule:
+    def trimmed(self, times: Array, tolerance: float) -> _Rule:
         """Fewer terms: the fastest and the slowest given to the tails while the error allows it."""
-        exact = np.asarray(material.creep_compliance(times))
+        exact = self.material.creep_compliance(times)
 
         def term(i: int) -> Array:
-            return self.weights[i] * -np.expm1(-np.exp(self.y[i]) * times / material.time_scale)
+            return self.weights[i] * -np.expm1(-np.exp(self.y[i]) * times / self.material.time_scale)
 
         def tails(first: int, last: int) -> Array:
-            weight, time = self._faster(material, last)
-            return self._slower(material, first) * times - weight * np.expm1(-times / time)
+            weight, time = self._faster(last)
+            return self._slower(first) * times - weight * np.expm1(-times / time)
 
         first, last = 0, self.y.size - 1
-        kept = material.glassy + sum(term(i) for i in range(last + 1))
+        kept = self.material.glassy + sum(term(i) for i in range(last + 1))
         while first < last:
             trials = [(kept - term(first), first + 1, last), (kept - term(last), first, last - 1)]
             reached = [np.abs((rest + tails(*ends)) / exact - 1).max() for rest, *ends in trials]
@@ -279,22 +280,22 @@ class _Rule:
             if reached[end] > tolerance:
                 break
             kept, first, last = trials[end]
-        return _Rule(self.y[first : last + 1], self.weights[first : last + 1], self.spacing)
+        return replace(self, y=self.y[first : last + 1], weights=self.weights[first : last + 1])
 
-    def _faster(self, material: PowerLaw, last: int) -> tuple[float, float]:
+    def _faster(self, last: int) -> tuple[float, float]:
         """One term for all beyond the last: its compliance [1/Pa], and its time, which keeps their integral. [s]"""
-        exponent, spacing = material.exponent, self.spacing
+        exponent, spacing = self.material.exponent, self.spacing
         # sums of geometric series: of the weights, and of weight times retardation time
         weights = math.exp(-exponent * spacing) / -math.expm1(-exponent * spacing)
         moments = math.exp(-(1 + exponent) * spacing) / -math.expm1(-(1 + exponent) * spacing)
-        time = material.time_scale * math.exp(-self.y[last])
+        time = self.material.time_scale * math.exp(-self.y[last])
         return float(self.weights[last] * weights), float(time * moments / weights)
 
-    def _slower(self, material: PowerLaw, first: int) -> float:
+    def _slower(self, first: int) -> float:
         """Fluidity for all before the first term: the sum of weight times rate. [1/(Pa s)]"""
-        spacing = (1 - material.exponent) * self.spacing
+        spacing = (1 - self.material.exponent) * self.spacing
         before = math.exp(-spacing) / -math.expm1(-spacing)
-        return float(self.weights[first] * math.exp(self.y[first]) / material.time_scale * before)
+        return float(self.weights[first] * math.exp(self.y[first]) / self.material.time_scale * before)
 
 
 def _levelled(columns: Array, exact: Array, glassy: float) -> Iterator[Array]:

@@ -492,14 +492,6 @@ def test_full_contact_wave__starts_elastic_and_relaxes_to_the_rubber():
         assert found == pytest.approx(cf.full_contact_pressure(amplitude, wavelength, 1 / compliance, waves=1))
 
 
-def test_westergaard_half_width__is_elastic_with_the_compliance_of_the_moment():
-    program = Program().load(200.0, over=0.0).hold(5.0)
-    for t in (0.0, 0.5, 5.0):
-        elastic = cf.westergaard(1e-3, 1.0, 1e6 / float(ZENER.contact_compliance(t)), 200.0)
-        soft = materials.zener(1e6, 0.5e6, 0.5e6)
-        assert float(cf.westergaard_half_width(1e-3, 1.0, soft, program, t)) == pytest.approx(elastic.half_width)
-
-
 def test_reduced_contact__keeps_times_that_are_no_exact_sums():
     """0.1 + (0.35 - 0.1) is not 0.35 in floating point: the state at such a time was left zero."""
     times = np.linspace(0, 0.4, 9)

@@ -11,8 +11,8 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation
-from roughvisc.mechanics.closed_forms.indenters import Indenter
+from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, with_decays
+from roughvisc.mechanics.closed_forms.indenters import Indenter, places
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.stepping.program import Program
@@ -202,7 +202,7 @@ class SingleMaximum:
 
     def pressure(self, r: ArrayLike, t: ArrayLike) -> Array:
         """Pressure at ``r`` [m] and ``t`` [s], which are broadcast; infinite under the apex of a cone. [Pa]"""
-        r, t = np.broadcast_arrays(np.abs(np.asarray(r, dtype=float)), np.asarray(t, dtype=float))
+        r, t = places(r, t)
         t1, grown = self._twin(t)
         radius = self.indenter.radius_at_scaled_force(grown)
         at = self.indenter.scaled_force(r)
@@ -221,10 +221,9 @@ class SingleMaximum:
 
 def _creep_rate(material: Prony, t: Array) -> Array:
     """``dC/dt`` of the contact compliance. [1/(Pa s)]"""
-    total = np.full(np.shape(t), material.fluidity)
-    for compliance, time in zip(material.compliances, material.times, strict=True):
-        total = total + compliance / time * np.exp(-t / time)
-    return np.asarray(0.5 * (1 - material.poisson) * total)
+    times = np.array(material.times)
+    rate = with_decays(material.fluidity, np.array(material.compliances) / times, times, t)
+    return np.asarray(0.5 * (1 - material.poisson) * rate)
 
 
 @quantities(end="s")
