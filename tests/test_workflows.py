@@ -271,6 +271,14 @@ def test_plans_and_limit__are_measured(monkeypatch, capsys):
         assert 0.8 < said["disk"] / found["disk"] < 1.25, kind
 
 
+@pytest.mark.thorough
+def test_batched_benchmark__solves_a_stack_as_accurately(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    (row,) = importlib.import_module("batched").main([32], count=3, repeats=1)
+    assert 0 < row["transforms"] < row["solver"] < row["case"]
+    assert 0 < row["lockstep_error"] < 2 * row["error"] < 1e-3
+
+
 def test_big_scans_and_results__are_measured(tmp_path, monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     scans, results = importlib.import_module("big_scans"), importlib.import_module("big_results")
