@@ -38,6 +38,7 @@ from roughvisc.mechanics.stepping.step import (
     is_outgrown,
     segment_number,
     trial_step,
+    without_past,
 )
 from roughvisc.mechanics.stepping.tangential import tangential_force
 
@@ -232,12 +233,12 @@ def followed(
 
 def coarse_step(scene: Scene, state: State, companion: Trajectory, trial: Trial) -> State:
     """State whose companion has accepted a step to the same instant."""
-    changes = advance_trajectory(scene, companion, trial)
+    advanced = advance_trajectory(scene, companion, trial)
     if companion.unresolved:
-        changes |= {"before": None, "memory": scene.memory.restart(changes["memory"])}
+        advanced = without_past(scene, advanced)
     # no field of the instant before is ever asked for
-    changes["before"] = changes["before"] and changes["before"].without_fields()
-    return replace(state, companion=replace(companion, **changes), behind=0, **cost_after(state, trial))
+    advanced = replace(advanced, before=advanced.before and advanced.before.without_fields())
+    return replace(state, companion=advanced, behind=0, **cost_after(state, trial))
 
 
 def with_error_estimate(

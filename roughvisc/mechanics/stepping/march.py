@@ -148,7 +148,7 @@ def _defer_jump(scene: Scene, state: State, segment: Segment, value: float) -> S
     entered = start_segment(scene, state)
     following = scene.program.segments[entered.segment : entered.segment + 1]
     held = bool(following) and following[0].control == "load"
-    return entered.with_each(lambda one: {"unresolved": True, "start": value if held else one.start})
+    return entered.with_each(lambda one: replace(one, unresolved=True, start=value if held else one.start))
 
 
 def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[Step | None]:

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -363,6 +363,10 @@ class Trajectory:
         return pressure, weighted(terms, empty(known.shape), threads)
 
 
+#: A trajectory, or the whole state of a march.
+AnyTrajectory = TypeVar("AnyTrajectory", bound=Trajectory)
+
+
 @dataclass(frozen=True)
 class State(Trajectory):
     """All that a march needs to go on: a plain value.
@@ -405,10 +409,9 @@ class State(Trajectory):
     iterations: int = 0
     convolutions: int = 0
 
-    def with_each(self, change: Callable[[Trajectory], dict[str, Any]]) -> State:
-        """The state with what changes of its own trajectory, and of its companion's."""
-        companion = self.companion and replace(self.companion, **change(self.companion))
-        return replace(self, **change(self), companion=companion)
+    def with_each(self, change: Callable[[Any], Any]) -> State:
+        """The state and its companion, both changed in the same way."""
+        return replace(change(self), companion=self.companion and change(self.companion))
 
 
 @dataclass(frozen=True)

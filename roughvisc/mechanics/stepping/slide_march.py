@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -25,15 +24,23 @@ from roughvisc.mechanics.stepping.companion import (
 )
 from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.program import Segment, Slid, Slide, instant
-from roughvisc.mechanics.stepping.scene import Guess, Instant, Scene, State, Step, Trajectory, Trial, Uncertainty
+from roughvisc.mechanics.stepping.scene import (
+    AnyTrajectory,
+    Guess,
+    Instant,
+    Scene,
+    State,
+    Step,
+    Trajectory,
+    Trial,
+    Uncertainty,
+)
 from roughvisc.mechanics.stepping.step import accept, restarted, start_segment, step_of, trial_step
 
 # Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
 # friction is a small part of it.
 _SHARE = 0.3
 _COMPANION_SHARE = 2.5
-
-Moved = TypeVar("Moved", bound=Trajectory)
 
 
 def through_slide(scene: Scene, state: State, segment: Segment) -> Iterator[Step]:
@@ -131,7 +138,7 @@ def _sharpened(step: Step, earlier: Uncertainty) -> Slid | None:
     return None if slid is None else replace(slid, work=slid.work - added)
 
 
-def _moved(scene: Scene, state: Moved, slide: Slide, cells: int) -> Moved:
+def _moved(scene: Scene, state: AnyTrajectory, slide: Slide, cells: int) -> AnyTrajectory:
     """State of the body as it lies under the profile when that has moved by so many cells."""
 
     def moved(one: Instant) -> Instant:

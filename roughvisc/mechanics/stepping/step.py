@@ -21,6 +21,7 @@ from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
 from roughvisc.mechanics.stepping.scene import (
     NO_FIELD,
+    AnyTrajectory,
     ControllerState,
     Guess,
     Instant,
@@ -158,8 +159,8 @@ def carried_into_step(
     return scene.operator, alpha, carried, scene.operator.displacement(carried)
 
 
-def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[str, Any]:
-    """What a trial changes of a trajectory, once it is accepted."""
+def advance_trajectory(scene: Scene, state: AnyTrajectory, trial: Trial) -> AnyTrajectory:
+    """A trajectory that has accepted a trial."""
     now, acts_on = trial.instant, scene.memory.acts_on
     if acts_on == "displacement":
         assert now.unit_displacement is not None
@@ -178,27 +179,28 @@ def advance_trajectory(scene: Scene, state: Trajectory, trial: Trial) -> dict[st
         work = state.work + work_between(scene, state, now.pressure, displacement, jumped=state.unresolved)
     else:
         displacement, work = NO_FIELD, spent.stored + spent.dissipated
-    return {
-        "now": now,
-        "displacement": displacement,
-        "before": state.now if trial.length > 0 else None,
-        "memory": memory,
-        "work": work,
-        "energy": spent,
-        "unresolved": False,
-    }
+    return replace(
+        state,
+        now=now,
+        displacement=displacement,
+        before=state.now if trial.length > 0 else None,
+        memory=memory,
+        work=work,
+        energy=spent,
+        unresolved=False,
+    )
 
 
 def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState, **more: Any) -> State:
     """State after an accepted trial; ``pace`` tells how long the next step may be, ``more`` what else is other."""
-    changes = advance_trajectory(scene, state, trial)
-    now, work = changes["now"], changes["work"]
+    advanced = advance_trajectory(scene, state, trial)
+    now = advanced.now
     return replace(
-        state,
-        **changes | more,
+        advanced,
+        **more,
         largest_force=max(state.largest_force, now.force),
         largest_approach=max(state.largest_approach, abs(now.approach)),
-        largest_work=max(state.largest_work, abs(work)),
+        largest_work=max(state.largest_work, abs(advanced.work)),
         contact_since=state.contact_since if now.force > 0 and state.now.force > 0 else state.now.time,
         pace=pace,
         **cost_after(state, trial),
@@ -322,9 +324,9 @@ def start_segment(scene: Scene, state: State) -> State:
     jumps = "approach" in neighbours and not scene.can_jump
     given = segments[index].control if index < len(segments) else None
 
-    def enter(one: Trajectory) -> dict[str, Any]:
+    def enter(one: AnyTrajectory) -> AnyTrajectory:
         start = 0.0 if given is None else one.now.force if given == "load" else one.now.approach
-        return {"start": start, "unresolved": jumps and one.now.force > 0, **without_past(scene, one)}
+        return replace(without_past(scene, one), start=start, unresolved=jumps and one.now.force > 0)
 
     entered = state.with_each(enter)
     # a corner in what is prescribed bends the histories and does not break them: the steps may stay as long, unless
@@ -337,13 +339,13 @@ def start_segment(scene: Scene, state: State) -> State:
 
 
 def restarted(scene: Scene, state: State, suggestion: float) -> State:
-    """State from which nothing is extrapolated."""
-    return replace(state, pace=replace(state.pace, suggestion=suggestion), **without_past(scene, state))
+    """State from which nothing is extrapolated, whose next step is as long as a suggestion. [s]"""
+    return replace(without_past(scene, state), pace=replace(state.pace, suggestion=suggestion))
 
 
-def without_past(scene: Scene, state: Trajectory) -> dict[str, Any]:
-    """What changes of a trajectory from which nothing is to be extrapolated."""
-    return {"before": None, "memory": scene.memory.restart(state.memory)}
+def without_past(scene: Scene, state: AnyTrajectory) -> AnyTrajectory:
+    """A trajectory from which nothing is extrapolated."""
+    return replace(state, before=None, memory=scene.memory.restart(state.memory))
 
 
 # The approach stays below the least gap beyond the grid by this factor: what is shown of a step's end is solved anew.
@@ -390,8 +392,8 @@ def enlarged(scene: Scene, state: State, time: float) -> tuple[Scene, State]:
     return scene, state.with_each(partial(_on_larger, scene, offset))
 
 
-def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict[str, Any]:
-    """What changes of a trajectory on a larger grid, in which the present one begins at a cell."""
+def _on_larger(scene: Scene, offset: tuple[int, int], state: AnyTrajectory) -> AnyTrajectory:
+    """A trajectory on a larger grid, in which the present one begins at a cell."""
     shape = scene.operator.shape
     memory = scene.memory.enlarged(state.memory, shape, offset, scene.operator.displacement)
 
@@ -406,4 +408,4 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: Trajectory) -> dict
     unit_displacement = scene.operator.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)
     displacement = carried + glassy * unit_displacement
-    return {"now": now, "displacement": displacement, "before": before, "memory": memory}
+    return replace(state, now=now, displacement=displacement, before=before, memory=memory)
