@@ -55,7 +55,6 @@ from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_mem
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
-from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
@@ -209,15 +208,7 @@ class LoadingRows(Rows):
     ) -> None:
         height, body, settings = problem.height, problem.body, problem.settings
         self._problem, self._settings, self._start = problem, settings, state
-        require_memory(
-            (height.sizes["x"], height.sizes["y"]),
-            settings,
-            body,
-            program,
-            in_memory=in_memory,
-            heights=height.values,
-            area=nominal_area(height),
-        )
+        require_memory(problem, program, in_memory=in_memory)
         mirror = settings.method == "fast" and not program.slides
         self.profile = Profile(
             height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=body.kernel

@@ -15,22 +15,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.profile import uses_window
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.arrays import is_wide
-from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import Memory
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
+from roughvisc.problem import Problem
 from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
 from roughvisc.topography.borders import is_mirrored
+from roughvisc.topography.grid import nominal_area
 
 _PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
 #: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
@@ -348,40 +348,26 @@ _FEWEST = 64
 _MADE = 4.0
 
 
-def require_memory(
-    shape: tuple[int, int],
-    settings: Settings,
-    body: Body,
-    program: Program,
-    *,
-    in_memory: bool,
-    heights: NDArray[np.float64] | None = None,
-    area: float = 1.0,
-) -> None:
-    """Refuse a case that takes more memory than there is, even if its contact stays sparse.
+def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> None:
+    """Refuse a march that takes more memory than there is, even if its contact stays sparse.
 
     Parameters
     ----------
-    shape : tuple of int
-        Cells of the surface.
-    settings, body, program : Settings, Body, Program
-        Of the case.
+    problem, program : Problem, Program
+        Of the case. A surface that is its own mirror image is solved on a quarter.
     in_memory : bool
         Whether the kept fields stay in memory.
-    heights : ndarray, optional
-        Of the surface, if they are there: a surface that is its own mirror image is solved on a quarter. [m]
-    area : float
-        That a nominal pressure refers to. [m2]
 
     Raises
     ------
     TooLargeError
         If it does not fit: what it needs, what there is, and what would fit.
     """
-    cells = math.prod(shape)
+    height, body, settings = problem.height, problem.body, problem.settings
+    cells = height.size
     if cells < WORTH_ASKING:
         return
-    memory = choose_body_memory(body, **memory_options(program.on_area(area), settings)).memory
+    memory = choose_body_memory(body, **memory_options(program.on_area(nominal_area(height)), settings)).memory
     rows = least_rows(settings, program)
     part = 0.0 if uses_window(settings) and not body.kernel.raises_surface else 1.0
 
@@ -391,7 +377,7 @@ def require_memory(
     there = memory_available()
     if there.fits(needed(cells)):
         return
-    if part and settings.method == "fast" and (heights is None or is_mirrored(heights)):
+    if part and settings.method == "fast" and is_mirrored(height.values):
         part = 0.25
         if there.fits(needed(cells)):
             return
@@ -403,7 +389,7 @@ def require_memory(
         savings.append(f"one kept field in place of {len(settings.fields)}")
     if settings.boundary == "free" and settings.edge == "accept" and there.fits(needed(cells, periodic)):
         savings.append("boundary = 'periodic'")
-    raise TooLargeError(too_large(shape, needed, there, savings))
+    raise TooLargeError(too_large((height.sizes["x"], height.sizes["y"]), needed, there, savings))
 
 
 def require_memory_of_curve(shape: tuple[int, int], settings: Settings) -> None:

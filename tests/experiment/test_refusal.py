@@ -17,6 +17,7 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import PROCESS, Available, cores, curve_bytes, memory_available, threads_for
 from roughvisc.experiment.steady_sliding import SlidingRows
 from roughvisc.mechanics import arrays as threads_module
+from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
@@ -102,17 +103,15 @@ def test_small_case__is_not_asked_about(monkeypatch):
 
 
 def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
-    ball, given = rv.sphere(1e-2, 1e-3, (600, 600)), {"area": 1e-6, "in_memory": False}
-    settings = Settings(boundary="periodic", times=2)
+    ball = rv.sphere(1e-2, 1e-3, (600, 600))
+    problem = Problem(ball, rv.Body(RUBBER), Settings(boundary="periodic", times=2))
     fields = 8.0 * ball.size
     limited(12 * fields)
-    resources.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=ball.values, **given)
-    off = ball.values + 1e-6 * np.arange(600)
+    resources.require_memory(problem, PRESS, in_memory=False)
+    off = problem.on(ball + 1e-6 * np.arange(600))
     with pytest.raises(TooLargeError):
-        resources.require_memory(ball.shape, settings, rv.Body(RUBBER), PRESS, heights=off, **given)
-    resources.require_memory(
-        ball.shape, Settings(boundary="free", times=2), rv.Body(RUBBER), PRESS, heights=off, **given
-    )
+        resources.require_memory(off, PRESS, in_memory=False)
+    resources.require_memory(off.on(off.height, boundary="free"), PRESS, in_memory=False)
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
