@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.groups import whole_of
 from roughvisc.study.audit.audit import audit
-from roughvisc.study.audit.finding import Finding
+from roughvisc.study.audit.limits import Finding
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write, verify_checksum
