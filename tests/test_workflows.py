@@ -240,12 +240,15 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatc
 def test_leakage_benchmark__certifies_what_it_times(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     rows = importlib.import_module("leakage").main(32)
-    by_solver = {name: [row for row in rows if row["solver"] == name] for name in ("factors", "dissection")}
+    by_solver = {name: [row for row in rows if row["solver"] == name] for name in ("factors", "two grids")}
     assert [row["upper"] > 0 for row in by_solver["factors"]][:2] == [True, True]
     for one, other in zip(*by_solver.values(), strict=True):
         assert one["upper"] - one["lower"] <= 1e-6 * one["upper"]
         assert one["contact"] == other["contact"]
         assert abs(one["upper"] - other["upper"]) <= 1e-9 * one["upper"]
+    (row,) = importlib.import_module("leakage").history(32, times=6)
+    assert 0 < row["answers"] <= row["bounds"] + 1e-12
+    assert row["bounds"] <= 1e-9
 
 
 @pytest.mark.thorough

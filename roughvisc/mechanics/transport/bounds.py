@@ -82,14 +82,25 @@ def _lead_away(network: Network, left: Array, flux: Array, into: Array, out: Arr
     out += np.where(last & leaving, carried, 0.0)
     into -= np.where(last & ~leaving, carried, 0.0)
     inner = below[~last]
-    pairs = np.sort(np.stack([inner, above[inner]]), axis=0)
-    face = np.searchsorted(network.first * (side + 1) + network.second, pairs[0] * (side + 1) + pairs[1])
-    flux[face] += np.where(inner < above[inner], carried[inner], -carried[inner])
+    outer = above[inner]
+    pairs = np.minimum(inner, outer) * (side + 1) + np.maximum(inner, outer)
+    face = np.searchsorted(network.first.astype(np.int64) * (side + 1) + network.second, pairs)
+    flux[face] += np.where(inner < outer, carried[inner], -carried[inner])
 
 
 def _summed_upward(order: Numbers, above: Numbers, left: Array) -> Array:
-    """What each cell passes on to the one above it in the tree: its own and all that lies below."""
-    carried, parent = [*left.tolist(), 0.0], above.tolist()
-    for cell in reversed(order[1:].tolist()):
-        carried[parent[cell]] += carried[cell]
-    return np.array(carried[:-1])
+    """What each cell passes on to the one above it in the tree: its own and all that lies below.
+
+    The order goes through the tree level by level, from its root, so that the cells above have ascending places.
+    """
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    over = place[above[order[1:]]] + 1  # place of the cell above, from one on; the root has none
+    over = np.concatenate([[0], over])
+    carried = np.append(left, 0.0)[order]
+    starts = [0, 1]
+    while starts[-1] < len(order):
+        starts.append(int(np.searchsorted(over, starts[-1], side="right")))
+    for start, middle, end in zip(starts[-3::-1], starts[-2::-1], starts[:0:-1], strict=False):
+        carried[start:middle] += np.bincount(over[middle:end] - start - 1, carried[middle:end], middle - start)
+    return carried[place[:-1]]

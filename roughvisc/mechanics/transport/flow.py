@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import linalg
 
 from roughvisc.mechanics.transport.bounds import bounds, imbalance
-from roughvisc.mechanics.transport.dissection import Cells, pressures
-from roughvisc.mechanics.transport.network import Array, Faces, Network, faces_of, network_of
+from roughvisc.mechanics.transport.network import Array, Network, equations, faces_of, factors, network_of
+from roughvisc.mechanics.transport.two_grids import pressures_on_two_grids
 
-#: Distance of the bounds, relative, at which no better pressures are sought; and how often they are.
+#: Distance of the bounds, relative, at which no better pressures are sought.
 _CLOSE = 1e-9
-_MOST_ROUNDS = 8
-#: Nested dissection is taken from so many cells on, if they are so large a part of the map: then it takes less time
-#: than factors, and always less memory (workflows/benchmarks/leakage.py).
-_LARGE, _OPEN = 2**18, 0.8
+#: How often they are sought at most: on two grids, if there are so many cells, and by factors after that.
+_ON_TWO_GRIDS, _LARGE = 2, 2**12
+_BY_FACTORS = 8
 
 
 @dataclass(frozen=True)
@@ -75,11 +74,11 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
 
     by cell-centred finite volumes: see :func:`roughvisc.mechanics.transport.network.faces_of` for the conductances.
     They are exact where the gap depends on one coordinate alone and is constant in each cell, and of second order in
-    the cells' sides where it is smooth. The equations are solved directly, since the conductances span many decades, on
-    which iterations with an algebraic multigrid stall: by SciPy's factorisation in the order of minimum degree, or, if
-    the map is large and mostly open, by nested dissection.
+    the cells' sides where it is smooth. Small maps are solved by SciPy's factors in the order of minimum degree, others
+    by conjugate gradients on two grids; if the conductances span too many decades for these, by factors, too.
 
-    The conductance given is the mean of its bounds, which are as close as rounding allows.
+    The conductance given is the mean of its bounds. By factors they are as close as rounding allows, on two grids
+    within 1e-9, and for most gaps within 1e-11.
 
     References
     ----------
@@ -92,9 +91,7 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     field = np.full(gap.shape, np.nan)
     if network is None:
         return Flow(0.0, 0.0, 0.0, field)
-    is_large = len(network.cells) >= max(_LARGE, _OPEN * gap.size)
-    solve = _by_dissection(faces, network) if is_large else _by_factors(network)
-    field.ravel()[network.cells], lower, upper = _solved(network, solve)
+    field.ravel()[network.cells], lower, upper = _solved(network, gap.shape[1])
     lower, upper = lower * faces.scale, upper * faces.scale
     return Flow((lower + upper) / 2, lower, upper, field)
 
@@ -127,7 +124,7 @@ def fluxes(gap: Array, spacing: tuple[float, float], pressure: Array, *, wrap: b
     return mean_along * faces.scale / spacing[1], mean_across * faces.scale / spacing[0]
 
 
-def _solved(network: Network, solve: Callable[[Array], Array]) -> tuple[Array, float, float]:
+def _solved(network: Network, width: int) -> tuple[Array, float, float]:
     """Pressures of the cells that conserve the fluid in each, and bounds on the conductance. [-]
 
     A lake behind narrow slits loses digits in the factors, as many as the slits are narrower than it is wide; each
@@ -135,7 +132,7 @@ def _solved(network: Network, solve: Callable[[Array], Array]) -> tuple[Array, f
     """
     pressure = np.zeros(len(network.cells))
     lower, upper = 0.0, np.inf
-    for _ in range(_MOST_ROUNDS):
+    for solve in _solvers(network, width):
         pressure = np.clip(pressure + solve(imbalance(network, pressure)), 0.0, 1.0)
         below, above = bounds(network, pressure)
         lower, upper = max(lower, below), min(upper, above)
@@ -144,41 +141,8 @@ def _solved(network: Network, solve: Callable[[Array], Array]) -> tuple[Array, f
     return pressure, min(lower, upper), upper  # that rounding may turn round
 
 
-def _by_dissection(faces: Faces, network: Network) -> Callable[[Array], Array]:
-    """Pressures of the cells from what comes into each of them, by nested dissection."""
-    kept = np.zeros(faces.across.shape, dtype=bool)
-    kept.ravel()[network.cells] = True
-    halves = np.zeros((4, *kept.shape))
-    halves[0, 1:] = halves[2, :-1] = 2 * np.where(kept[1:] & kept[:-1], faces.along[1:-1], 0.0)
-    halves[3] = 2 * np.where(kept & np.roll(kept, -1, axis=1), faces.across, 0.0)
-    halves[1] = np.roll(halves[3], 1, axis=1)
-    ground = np.zeros(kept.shape)
-    ground[0] += faces.along[0]
-    ground[-1] += faces.along[-1]
-    ground[~kept] = 0.0
-
-    def solve(source: Array) -> Array:
-        coming = np.zeros(kept.shape)
-        coming[kept] = source
-        return pressures(Cells(halves, ground, coming))[kept]
-
-    return solve
-
-
-def _by_factors(network: Network) -> Callable[[Array], Array]:
-    """The same by factors of the equations, which are scaled by the root of their diagonal."""
-    count = len(network.cells)
-    diagonal = network.entrance + network.exit
-    np.add.at(diagonal, network.first, network.conductance)
-    np.add.at(diagonal, network.second, network.conductance)
-    scale = 1 / np.sqrt(diagonal)
-    between = -network.conductance * scale[network.first] * scale[network.second]
-    every = np.arange(count)
-    entries = np.concatenate([between, between, np.ones(count)])
-    rows = np.concatenate([network.first, network.second, every])
-    columns = np.concatenate([network.second, network.first, every])
-    matrix = sparse.coo_array((entries, (rows, columns)), shape=(count, count)).tocsc()
-    # positive definite: no pivoting, and the ordering of symmetric matrices
-    options = {"SymmetricMode": True}
-    factors = linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return lambda source: scale * factors.solve(scale * source)
+def _solvers(network: Network, width: int) -> Iterator[Callable[[Array], Array]]:
+    """What gives the pressures in each round: two grids, if the network is large, and factors if that was in vain."""
+    if len(network.cells) >= _LARGE:
+        yield from itertools.repeat(functools.partial(pressures_on_two_grids, network, width), _ON_TWO_GRIDS)
+    yield from itertools.repeat(factors(equations(network)), _BY_FACTORS)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse import linalg
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -115,12 +117,12 @@ def network_of(faces: Faces) -> Network | None:
     cells = np.flatnonzero(kept)
     new = np.cumsum(kept) - 1
     open_ = open_[kept[first[open_]]]
-    ends = np.sort(np.stack([new[first[open_]], new[second[open_]]]), axis=0)
+    one, other = new[first[open_]], new[second[open_]]
+    ends = np.minimum(one, other), np.maximum(one, other)
     # two cells across whose borders meet share two faces: one of both together
     joined = sparse.coo_array((conductance[open_], ends), shape=(len(cells), len(cells))).tocsr()
-    rows = np.repeat(np.arange(len(cells)), np.diff(joined.indptr))
-    columns = joined.indices.astype(np.int64)
-    return Network(cells, rows, columns, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
+    rows = np.repeat(np.arange(len(cells), dtype=joined.indices.dtype), np.diff(joined.indptr))
+    return Network(cells, rows, joined.indices, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
 
 
 def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leaving: NDArray[np.bool_]) -> NDArray:
@@ -130,3 +132,27 @@ def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leav
     _, part = sparse.csgraph.connected_components(graph, directed=False)
     touched = [np.bincount(part[side], minlength=part.max(initial=0) + 1) > 0 for side in (entering, leaving)]
     return (touched[0] & touched[1])[part]
+
+
+def equations(network: Network) -> sparse.csr_array:
+    """The matrix of the balance of fluid in each cell: times the pressures it is what flows out."""
+    count = len(network.cells)
+    diagonal = network.entrance + network.exit
+    diagonal += np.bincount(network.first, network.conductance, count)
+    diagonal += np.bincount(network.second, network.conductance, count)
+    every = np.arange(count, dtype=network.first.dtype)
+    entries = np.concatenate([-network.conductance, -network.conductance, diagonal])
+    rows = np.concatenate([network.first, network.second, every])
+    columns = np.concatenate([network.second, network.first, every])
+    return sparse.coo_array((entries, (rows, columns)), shape=(count, count)).tocsr()
+
+
+def factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
+    """The solution of symmetric equations, by factors of them scaled by the root of their diagonal."""
+    scale = 1 / np.sqrt(matrix.diagonal())
+    scaling = sparse.diags_array(scale)
+    scaled = (scaling @ matrix @ scaling).tocsc()
+    # positive definite: no pivoting, and the ordering of symmetric matrices
+    options = {"SymmetricMode": True}
+    found = linalg.splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return lambda source: scale * found.solve(scale * source)

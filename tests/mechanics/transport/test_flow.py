@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from roughvisc.mechanics.transport import dissection
 from roughvisc.mechanics.transport import flow as solvers
+from roughvisc.mechanics.transport import two_grids
 from roughvisc.mechanics.transport.bounds import bounds
 from roughvisc.mechanics.transport.flow import flow, fluxes
 from roughvisc.mechanics.transport.network import faces_of, network_of
@@ -15,13 +15,12 @@ from roughvisc.mechanics.transport.network import faces_of, network_of
 CELL = (2e-6, 3e-6)
 
 
-@pytest.fixture(autouse=True, scope="module", params=["factors", "dissection"])
+@pytest.fixture(autouse=True, scope="module", params=["factors", "two grids"])
 def solver(request):
-    """Each of the two solvers of the equations; of tiles that small maps too have many of."""
+    """Each of the two solvers of the equations, which small maps too are solved by, to rounding."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solvers, "_LARGE", 0 if request.param == "dissection" else np.inf)
-        patch.setattr(solvers, "_OPEN", 0.0)
-        patch.setattr(dissection, "_LEAF", 2)
+        patch.setattr(solvers, "_LARGE", 0 if request.param == "two grids" else np.inf)
+        patch.setattr(two_grids, "_ENOUGH", 1e-30)
         yield request.param
 
 

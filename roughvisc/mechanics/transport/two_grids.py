@@ -1,0 +1,100 @@
+r"""Flow through a large network on two grids: conjugate gradients on its cells, direct factors of a coarse one.
+
+A cell of the coarse network is what strong faces join of a block of cells. Smoothed aggregation [1]_ carries its
+pressure to the cells: that of the coarse cells, :math:`T p`, and one step of Jacobi's, :math:`(1 - \omega D^{-1} A) T`.
+What differs from one cell to the next is left to Jacobi's steps before and after. Since the coarse equations are solved
+directly, a channel that is one cell wide in a narrow place does not slow the iterations down, as it does with an
+algebraic multigrid of many levels.
+
+.. [1] P. Vaněk, J. Mandel, M. Brezina, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
+   problems, Computing 56 (1996) 179-196.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from roughvisc.mechanics.transport.network import Array, Network, equations, factors
+
+#: Cells along the side of a block: larger ones mean fewer coarse cells and more iterations.
+_BLOCK = 4
+#: A face is strong if its conductance is at least so large a part of the geometric mean of what joins the two cells.
+_STRONG = 0.02
+#: Jacobi's relaxation, in the prolongation and in the iterations; eigenvalues of ``D^-1 A`` lie below two.
+_RELAXATION = 3 / 4
+#: Part of the energy that the pressures lack at most where the iterations end; and the most iterations.
+_ENOUGH, _MOST = 1e-17, 100
+#: What is added to the diagonal of the coarse equations, relative to what joins the cells to all others.
+_SHIFT = 1e-14
+
+
+def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array:
+    """Pressures of the cells at which what comes into each of them flows out again.
+
+    Parameters
+    ----------
+    network : Network
+        Cells and faces.
+    width : int
+        Number of the map's cells across the flow.
+    source : ndarray, shape (n,)
+        What comes into each cell.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        What the iterations have reached, if they do not converge.
+    """
+    matrix = equations(network)
+    diagonal = matrix.diagonal()
+    prolongation = _prolongation(network, width, matrix, diagonal)
+    restriction = prolongation.T.tocsr()
+    # rounding hides how coarse cells are joined to others if that is very loose; the shift keeps the equations positive
+    shift = np.maximum(_SHIFT * (prolongation.power(2).T @ diagonal), np.finfo(float).tiny)
+    on_coarse = factors(restriction @ (matrix @ prolongation) + sparse.diags_array(shift))
+    weight = _RELAXATION / diagonal
+
+    def precondition(left: Array) -> Array:
+        found = weight * left
+        found += prolongation @ on_coarse(restriction @ (left - matrix @ found))
+        found += weight * (left - matrix @ found)
+        return found
+
+    pressure, left = np.zeros_like(source), source.copy()
+    direction, before, energy = np.zeros_like(source), 1.0, 0.0
+    for _ in range(_MOST):
+        better = precondition(left)
+        product = float(left @ better)
+        direction *= product / before
+        direction += better
+        through = matrix @ direction
+        dissipation = float(direction @ through)
+        if not (product > _ENOUGH * energy and dissipation > 0):
+            break
+        length = product / dissipation
+        pressure += length * direction
+        left -= length * through
+        before, energy = product, energy + length * product
+    return pressure
+
+
+def _prolongation(network: Network, width: int, matrix: sparse.csr_array, diagonal: Array) -> sparse.csr_array:
+    """Pressures of the cells from those of the coarse cells; cells without a strong face belong to none of these."""
+    first, second, count = network.first, network.second, len(diagonal)
+    strong = network.conductance > _STRONG * np.sqrt(diagonal[first] * diagonal[second])
+    first, second = first[strong], second[strong]
+    along, across = np.divmod(network.cells, width)
+    block = along // _BLOCK * width + across // _BLOCK
+    inside = block[first] == block[second]
+    graph = sparse.coo_array((np.ones(inside.sum()), (first[inside], second[inside])), shape=(count, count))
+    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    belongs = np.zeros(count, dtype=bool)
+    belongs[first] = belongs[second] = True
+    is_coarse = np.bincount(part, belongs) > 0
+    coarse = (np.cumsum(is_coarse) - 1)[part[belongs]]
+    starts = np.concatenate([[0], np.cumsum(belongs)])
+    of_coarse = sparse.csr_array((np.ones(len(coarse)), coarse, starts), shape=(count, np.count_nonzero(is_coarse)))
+    step = matrix @ of_coarse
+    step.data *= np.repeat(-_RELAXATION / diagonal, np.diff(step.indptr))
+    return of_coarse + step
