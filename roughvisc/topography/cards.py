@@ -19,8 +19,8 @@ from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography import conditioning
 from roughvisc.topography.readers import existing, read_file, sha256
-from roughvisc.topography.recipes import BOUNDARIES, RECIPES, UNITS, make
 from roughvisc.topography.surrogates import surrogate
+from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, UNITS, make
 from roughvisc.units import quantity, shown
 
 _PROVENANCE = ("title", "description", "licence", "source")

@@ -1,4 +1,4 @@
-"""Surfaces from recipes: waves and self-affine roughness here, indenters from :mod:`.indenters`.
+"""Surfaces from recipes, as cards and studies name them: waves and roughness here, indenters from :mod:`.indenters`.
 
 Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the recipe stays in the attributes.
 """
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from inspect import Parameter, signature
 from typing import Any, Literal
 
 import numpy as np
@@ -19,8 +20,6 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, grown, recipe_of, sphere
 from roughvisc.units import Quantity, quantities
-
-__all__ = ["cone", "flat_punch", "grown", "is_analytic", "is_made_by", "self_affine", "sphere", "wavy"]
 
 
 @quantities(amplitude="m", wavelength="m", size="m")
@@ -251,6 +250,42 @@ def synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
         rows = scipy.fft.irfft(spectrum[start : start + 64], ny, axis=1, norm="forward")
         flat[start * ny : start * ny + rows.size] = rows.reshape(-1)
     return flat[: nx * ny].reshape(nx, ny)
+
+
+#: recipe -> what makes its heights
+_MAKERS: dict[str, Callable[..., xr.DataArray]] = {
+    maker.__name__: maker for maker in (sphere, cone, flat_punch, wavy, self_affine)
+}
+#: recipe -> its arguments and their defaults, those of the function itself; ``...``: none
+RECIPES: dict[str, dict[str, Any]] = {
+    name: {
+        key: ... if argument.default is Parameter.empty else argument.default
+        for key, argument in signature(maker).parameters.items()
+    }
+    for name, maker in _MAKERS.items()
+}
+#: argument -> its unit, the same in all recipes; what is not here is taken as it is
+UNITS = {
+    **dict.fromkeys(("size", "radius", "amplitude", "wavelength", "rms_height", "rolloff", "shortcut"), "m"),
+    **dict.fromkeys(("slope", "hurst", "rms_slope", "anisotropy"), "1"),
+}
+#: recipe -> the boundary that its surfaces are made for
+BOUNDARIES: dict[str, Literal["free", "periodic"]] = {
+    name: "periodic" if name in ("wavy", "self_affine") else "free" for name in _MAKERS
+}
+
+
+def make(name: str, arguments: Mapping[str, Any]) -> xr.DataArray:
+    """Heights of a recipe over (x, y), as cards and studies name it. [m]
+
+    Raises
+    ------
+    TypeError
+        If an argument is unknown or missing.
+    InputError
+        If an argument has a wrong value.
+    """
+    return _MAKERS[name](**arguments)
 
 
 def is_analytic(h: xr.DataArray) -> bool:

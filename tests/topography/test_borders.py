@@ -7,7 +7,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.topography.borders import boundary_of, is_periodic
 from roughvisc.topography.cards import boundary_after, boundary_of_card, condition, open_card
-from roughvisc.topography.recipes import BOUNDARIES, RECIPES
+from roughvisc.topography.synthesis import BOUNDARIES, RECIPES
 
 SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
 BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)

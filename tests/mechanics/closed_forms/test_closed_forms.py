@@ -1,5 +1,7 @@
 """Each closed form against an independent check: balance of forces, direct integration, limits, printed numbers."""
 
+import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -501,3 +503,22 @@ def test_reduced_contact__keeps_times_that_are_no_exact_sums():
     value = np.interp(times, [0, 0.1, 0.4], [0, 1e-2, 2e-3])
     assert found.approach == pytest.approx(value, rel=1e-12)
     assert np.all(found.radius[1:] > 0)
+
+
+def test_names__are_those_of_the_stub_whichever_module_comes_first():
+    from roughvisc.mechanics.closed_forms import single_maximum
+
+    assert dir(cf) == sorted(cf.__all__)
+    for name in cf.__all__:
+        assert getattr(cf, name).__name__ == name
+    assert cf.ting is single_maximum.ting
+    with pytest.raises(AttributeError, match="closed_forms' has no attribute 'boussinesq'"):
+        cf.boussinesq  # noqa: B018
+
+
+def test_import__of_one_closed_form_leaves_the_others_alone():
+    code = "import sys; from roughvisc.mechanics.closed_forms import hertz; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "roughvisc.mechanics.closed_forms.elastic" in loaded
+    assert not {"roughvisc.mechanics.closed_forms.cylinder", "roughvisc.mechanics.closed_forms.adhesion"} & loaded

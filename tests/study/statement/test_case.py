@@ -738,12 +738,12 @@ def test_study_schema__names_every_model_and_recipe():
 
 
 def test_recipes__are_those_of_surface_cards():
-    from roughvisc.topography import recipes
+    from roughvisc.topography import synthesis
 
-    assert {name: list(keys) for name, keys in RECIPES.items()} == {n: list(k) for n, k in recipes.RECIPES.items()}
+    assert {name: list(keys) for name, keys in RECIPES.items()} == {n: list(k) for n, k in synthesis.RECIPES.items()}
     defaults = {name: {key: default for key, (_, default) in keys.items()} for name, keys in RECIPES.items()}
-    assert defaults == recipes.RECIPES
-    assert recipes.RECIPES["wavy"] == {"amplitude": ..., "wavelength": ..., "size": ..., "shape": ..., "waves": 2}
+    assert defaults == synthesis.RECIPES
+    assert synthesis.RECIPES["wavy"] == {"amplitude": ..., "wavelength": ..., "size": ..., "shape": ..., "waves": 2}
 
 
 def test_height__is_conditioned_as_asked_for(study):

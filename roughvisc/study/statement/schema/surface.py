@@ -28,9 +28,9 @@ from roughvisc.study.statement.schema.section import (
     shown,
     whole,
 )
-from roughvisc.topography import recipes
+from roughvisc.topography import synthesis
 from roughvisc.topography.arguments import FILL, KEEP, ORDER, TURNS, WINDOW, Argument
-from roughvisc.topography.recipes import UNITS
+from roughvisc.topography.synthesis import UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -173,7 +173,7 @@ def _kind(recipe: str, key: str, default: Any) -> Any:
 #: name of a recipe -> the kind of each of its keys, and its default (``...``: none)
 RECIPES: dict[str, dict[str, Any]] = {
     name: {key: (_kind(name, key, default), default) for key, default in arguments.items()}
-    for name, arguments in recipes.RECIPES.items()
+    for name, arguments in synthesis.RECIPES.items()
 }
 
 
@@ -227,10 +227,10 @@ class FromRecipe(Raw):
     generate: str
 
     def raw(self) -> xr.DataArray:
-        return recipes.make(self.generate, {key: getattr(self, key) for key in RECIPES[self.generate]})
+        return synthesis.make(self.generate, {key: getattr(self, key) for key in RECIPES[self.generate]})
 
     def made_for(self) -> Boundary | None:
-        return recipes.BOUNDARIES[self.generate]
+        return synthesis.BOUNDARIES[self.generate]
 
 
 class SecondFace(Prepared, Raw):
