@@ -29,15 +29,13 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import no_results, result_files, whole_result
+    from roughvisc.study.storage.store import results_at, whole_result
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
     from roughvisc.views.sweep_figures.files import cases_in, results_of
 
-    paths = result_files(result) if result.is_dir() else [result]
-    if not paths:
-        raise no_results(result)
+    paths = results_at(result)
     console = Console()
     names = cases_in(paths) if result.is_dir() else {}
     drawn: list[Path] = []
@@ -103,13 +101,11 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.audit.given import from_options, of_study
-    from roughvisc.study.storage.store import no_results, result_files, whole_result
+    from roughvisc.study.storage.store import results_at, whole_result
     from roughvisc.views.console.accuracy_tables import audit_table
 
     given = from_options(stated).over(of_study(study) if study is not None else {})
-    paths = result_files(result) if result.is_dir() else [result]
-    if not paths:
-        raise no_results(result)
+    paths = results_at(result)
     console = Console()
     for path in paths:
         with whole_result(path) as dataset:

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +25,7 @@ from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
 from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.statement.identity import NUMERICS_REVISION, program
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable, warn_once
 from roughvisc.study.storage.lock import lock_case, lock_path
@@ -128,17 +127,16 @@ def _named(case: Case) -> Iterator[None]:
 
 def _provenance(case: Case, rows: str, before: str, transforms: str) -> dict[str, str | int]:
     """Attributes that say what this is, whence it came, and how to have it again."""
-    version = metadata.version("roughvisc")
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     named = f"run of {case.origin.name}" if case.origin else "run of a case"
     varied = "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items())
     return {
         "Conventions": "CF-1.11",
         "title": case.title + varied,
-        "source": f"roughvisc {version}",
+        "source": program(),
         "numerics_revision": NUMERICS_REVISION,
         "transforms": transforms,
-        "history": "\n".join(filter(None, [before, f"{now} roughvisc {version}: {named}"])),
+        "history": "\n".join(filter(None, [before, f"{now} {program()}: {named}"])),
         "references": REFERENCES,
         "comment": f"{AXES[rows].model} Attribute 'case' states the whole computation (JSON, SI units); "
         "'stated_error' how accurate it is; "

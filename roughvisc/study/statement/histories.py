@@ -98,20 +98,8 @@ def read_program(
     if len(chosen) > 1:
         raise InputError(f"found {', '.join(chosen)}: expected one column that is prescribed")
     control: Any = next(iter(chosen), "load")
-    unit = UNITS[control]
-    found = read_history(
-        path,
-        control,
-        time=time,
-        column=chosen.get(control, control),
-        start=start if start == "first" else stated_quantity(start, "s", "start"),
-        end=None if end is None else stated_quantity(end, "s", "end"),
-        zero=stated_quantity(zero, unit, "zero"),
-        factor=stated_quantity(factor, "1", "factor"),
-        noise=noise,
-        thin=thin,
-        decimal=decimal,
-    )
+    column, told = chosen.get(control, control), {"start": start, "end": end, "zero": zero, "factor": factor}
+    found = read_history(path, control, time=time, column=column, noise=noise, thin=thin, decimal=decimal, **told)
     return Program.table(found.times, found.values, control, note=found.note)
 
 
@@ -136,24 +124,27 @@ def read_history(
     time: str,
     column: str,
     start: float | str,
-    end: float | None,
-    zero: float,
+    end: float | str | None,
+    zero: float | str,
     factor: float,
     noise: float | str,
     thin: float | str,
     decimal: str | None,
 ) -> History:
-    """As :func:`read_program`, with quantities in SI, for one column of what is controlled."""
+    """As :func:`read_program`, for one column of what is controlled."""
+    unit = UNITS[control]
+    start = start if start == "first" else stated_quantity(start, "s", "start")
+    end = None if end is None else stated_quantity(end, "s", "end")
+    zero, factor = stated_quantity(zero, unit, "zero"), stated_quantity(factor, "1", "factor")
     if decimal not in (None, ".", ","):
         raise InputError(f"decimal: found {decimal!r}: expected '.' or ','")
     for name in (time, column):
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"found {name!r}: expected the name of a column")
-    wanted = {"time": Wanted(time, "s"), control: Wanted(column, UNITS[control])}
+    wanted = {"time": Wanted(time, "s"), control: Wanted(column, unit)}
     columns, lines = read_table(path, wanted, exported=True, decimal=decimal)
     times, values = columns["time"], _less(columns[control], zero) * factor
     _check_times(path, times, lines)
-    name, unit = Path(path).name, UNITS[control]
     first = float(times[0]) if start == "first" else float(start)
     said = [] if first == 0 else [f"{first:g} s in the file is time zero"]
     times, values = _cut(path, times, values, first, end)
@@ -167,7 +158,7 @@ def read_history(
         values[0] = 0.0
     kept = thinned(times, values, tolerance)
     segments = len(kept) - (values[0] == 0)
-    lead = f"{name}: {rows:,} rows became {segments:,} segments"
+    lead = f"{Path(path).name}: {rows:,} rows became {segments:,} segments"
     if tolerance:
         part = f", {100 * tolerance / largest:.2g} % of the largest {control}" if largest else ""
         lead += f", which pass every row within {tolerance:.3g} {unit}{part}"

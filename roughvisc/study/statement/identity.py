@@ -61,6 +61,11 @@ def identity(settings: Study) -> tuple[str, str]:
     return _digest(stated)[:16], surface[0]
 
 
+def program() -> str:
+    """This program and its version, as results state their source."""
+    return f"roughvisc {metadata.version('roughvisc')}"
+
+
 def program_version() -> str:
     """This version of roughvisc, and of the numbers that it gives.
 
@@ -69,7 +74,7 @@ def program_version() -> str:
     >>> program_version()  # doctest: +SKIP
     'roughvisc 0.1.dev493+g9bdb14a83 (numerics 15)'
     """
-    return f"roughvisc {metadata.version('roughvisc')} (numerics {NUMERICS_REVISION})"
+    return f"{program()} (numerics {NUMERICS_REVISION})"
 
 
 def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:

@@ -8,13 +8,12 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any, TextIO
 
 from roughvisc.errors import FolderError, InputError
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.statement.identity import NUMERICS_REVISION, program
 from roughvisc.study.storage.files import atomic_write, open_unlinked
 
 log = logging.getLogger("roughvisc")
@@ -78,7 +77,7 @@ def forget_failure(folder: Path, key: str) -> None:
 
 
 def _version() -> dict[str, Any]:
-    return {"source": f"roughvisc {metadata.version('roughvisc')}", "numerics": NUMERICS_REVISION}
+    return {"source": program(), "numerics": NUMERICS_REVISION}
 
 
 LOG = "sweep.log"

@@ -100,6 +100,18 @@ def require_writable(folder: Path, why: str = "") -> None:
         raise FolderError(f"{existing_part(folder)}: is not writable: expected a folder with write permission{needed}")
 
 
+def require_folder(folder: Path) -> None:
+    """Refuse what is no folder of results.
+
+    Raises
+    ------
+    InputError
+        If it is absent, or a file.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
+
+
 def existing_part(folder: Path) -> Path:
     """A folder, or what is there of the folders above it."""
     return next(place for place in (folder, *folder.absolute().parents) if place.exists())

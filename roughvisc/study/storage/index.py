@@ -24,7 +24,15 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.groups import attributes_of
-from roughvisc.study.storage.files import UNSEALED, append_checksum, atomic_write, unsealed, verify_checksum, warn_once
+from roughvisc.study.storage.files import (
+    UNSEALED,
+    append_checksum,
+    atomic_write,
+    require_folder,
+    unsealed,
+    verify_checksum,
+    warn_once,
+)
 from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.store import NETCDF, is_json_table, result_files, result_path
 from roughvisc.variables import RESULT_FORMAT, of_step
@@ -198,8 +206,7 @@ def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) ->
     InputError
         If the folder is absent or is none. What is no result is left out, and the log says so.
     """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
+    require_folder(folder)
     stored = _load(folder / INDEX)
     before = {entry.file: entry for entry in (*stored, *known)}
     entries: dict[str, Entry] = {}

@@ -185,6 +185,20 @@ def no_results(folder: Path) -> InputError:
     return InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
 
 
+def results_at(place: Path) -> list[Path]:
+    """Files that may be results: those of a folder, one at least; or the file itself, which need not exist.
+
+    Raises
+    ------
+    InputError
+        If it is a folder that holds none.
+    """
+    paths = result_files(place) if place.is_dir() else [place]
+    if not paths:
+        raise no_results(place)
+    return paths
+
+
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
     """Write a Dataset that is no result to one NetCDF file, whole or not at all."""
     kept = dataset.copy()

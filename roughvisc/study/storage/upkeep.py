@@ -16,10 +16,10 @@ from roughvisc.errors import InputError, InUseError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION, program_version
 from roughvisc.study.storage.checkpoint import checkpoint_version
-from roughvisc.study.storage.files import checksum_error, is_sealed
+from roughvisc.study.storage.files import checksum_error, is_sealed, require_folder
 from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.store import NETCDF, no_results, result_files, result_path
+from roughvisc.study.storage.store import NETCDF, result_path, results_at
 from roughvisc.variables import RESULT_FORMAT
 
 
@@ -167,10 +167,7 @@ def verify(place: str | Path) -> list[Verdict]:
     place = Path(place)
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
-    paths = result_files(place) if place.is_dir() else [place]
-    if not paths:
-        raise no_results(place)
-    return [_verdict(path) for path in paths]
+    return [_verdict(path) for path in results_at(place)]
 
 
 def _verdict(path: Path) -> Verdict:
@@ -232,8 +229,7 @@ def clean_folder(
         If there is no such folder.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
+    require_folder(folder)
     of_cases: dict[str, list[Path]] = {}
     others = []
     for path in sorted(folder.glob(".*")):

@@ -43,9 +43,8 @@ def _with_boundary(solve: SolveSection, info: ValidationInfo) -> SolveSection:
     """How it is computed, with the boundary that ``auto`` stands for, which the study then does not state itself."""
     if not {"surface", *EXPERIMENTS} <= set(info.data):  # what is wrong there is said first
         return solve
-    others = (info.data[name] for name in EXPERIMENTS)
-    only = next((section.experiment().boundary for section in others if section is not None), None)
-    found = known_boundary(solve, only, info.data["surface"].boundary)
+    stated = [section for name in EXPERIMENTS if (section := info.data[name]) is not None]
+    found = known_boundary(solve, stated[0].experiment().boundary if stated else None, info.data["surface"].boundary)
     if found is None:
         raise refuse("boundary", OPEN_BOUNDARY.format(mirror="mirror = true in [surface]"))
     if found == solve.boundary:
@@ -89,9 +88,8 @@ class Study(Section):
 
     def experiment(self) -> Experiment:
         """What is done with the surface."""
-        others = (getattr(self, name) for name in EXPERIMENTS)
-        other = next((section for section in others if section is not None), None)
-        return Loading(self.loading()) if other is None else other.experiment()
+        stated = [section for name in EXPERIMENTS if (section := getattr(self, name)) is not None]
+        return stated[0].experiment() if stated else Loading(self.loading())
 
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
@@ -102,16 +100,10 @@ class Study(Section):
     def _check_consistency(self) -> Study:
         for name, found, why in self.experiment().unsupported(self.solving()):
             raise refuse(f"{ENTRIES[name].table}.{name}", f"found {shown(found)}: {why}")
-        if self.program is None:
-            return self
-        end = self.loading().duration
-        if isinstance(self.keep.times, tuple) and self.keep.times[-1] > end * (1 + 1e-12):
-            late = self.keep.times[-1]
-            raise refuse("keep.times", f"found {late:g} s: expected times up to the end of the program, {end:g} s")
-        return self
-
-    @model_validator(mode="after")
-    def _observes_what_is_kept(self) -> Study:
+        if self.program is not None and isinstance(self.keep.times, tuple):
+            late, end = self.keep.times[-1], self.loading().duration
+            if late > end * (1 + 1e-12):
+                raise refuse("keep.times", f"found {late:g} s: expected times up to the end of the program, {end:g} s")
         found = self.observe.problem(self.keep.fields, self.solve.boundary) if self.observe else None
         if found:
             raise refuse(f"observe.{found[0]}", found[1])
