@@ -64,22 +64,6 @@ def meaning(tables: Sequence[str], key: str) -> list[str]:
     raise KeyError(f"keys.toml: [{tables[0]!r}] has no {key}: expected its meaning and an example")
 
 
-def with_meanings(schema: dict[str, Any]) -> dict[str, Any]:
-    """A JSON schema whose descriptions say what a key means, before what is expected of it."""
-    _describe(schema["properties"], ("study",))
-    for name, section in schema["$defs"].items():
-        of_material = (f"material: {name}", "material: any", "material: temperature", "material: thickness")
-        if name in _TABLES or of_material[0] in meanings():  # one that was added says itself what it means
-            _describe(section["properties"], _TABLES.get(name, of_material))
-    return schema
-
-
-def _describe(properties: dict[str, Any], tables: Sequence[str]) -> None:
-    for key, one in properties.items():
-        about = re.sub(r"[$\\]", "", meaning(tables, key)[0])  # formulas as plain letters
-        one["description"] = f"{about}; {one['description']}" if "description" in one else about
-
-
 def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
     """Unit of the value at a dotted key of a study, or of the values of a list there; empty where the key tells none.
 
@@ -172,5 +156,13 @@ def study_schema() -> dict[str, Any]:
     'whether contact may reach the border in free space: the scan outline is then treated as a punch'
     """
     schema = StudyFile.model_json_schema()
-    schema["title"] = "roughvisc study"
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **with_meanings(schema)}
+    described = [(schema["properties"], ("study",))]
+    for name, section in schema["$defs"].items():
+        of_material = (f"material: {name}", "material: any", "material: temperature", "material: thickness")
+        if name in _TABLES or of_material[0] in meanings():  # one that was added says itself what it means
+            described.append((section["properties"], _TABLES.get(name, of_material)))
+    for properties, tables in described:
+        for key, one in properties.items():  # what a key means, before what is expected of it
+            about = re.sub(r"[$\\]", "", meaning(tables, key)[0])  # formulas as plain letters
+            one["description"] = f"{about}; {one['description']}" if "description" in one else about
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "roughvisc study"}
