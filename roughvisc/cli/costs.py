@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from roughvisc.cli.group import Failure, complain, say
+from roughvisc.cli.group import PATH, Failure, complain, say
 from roughvisc.errors import printable
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the results; its disk must have room.")
+@click.argument("study", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the results; its disk must have room.")
 @click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Show what a study will model and what it will cost.
@@ -45,10 +45,8 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 
 
 @click.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the measurements. [default: results/STUDY-trade]"
-)
+@click.argument("study", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the measurements. [default: results/STUDY-trade]")
 @click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
 @click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
 @click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
@@ -131,7 +129,7 @@ _OPTIONS = {
 
 
 @click.command()
-@click.argument("study", metavar="STUDY|RESULT", type=click.Path(path_type=Path))
+@click.argument("study", metavar="STUDY|RESULT", type=PATH)
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help=_OPTIONS["quantity"])
 @click.option("--at", "places", multiple=True, metavar="VALUE", help=_OPTIONS["at"])
 @click.option("--sharp", is_flag=True, help=_OPTIONS["sharp"])
@@ -139,7 +137,7 @@ _OPTIONS = {
 @click.option("--time-scale-error", metavar="PART", help="Relative error of the times of the material at 95 %.")
 @click.option("--cutoff", metavar="LENGTH", help="Shortest wavelength that the real surface has: '2 um'.")
 @click.option("--ensemble/--patch", default=None, help=_OPTIONS["ensemble"])
-@click.option("--out", type=click.Path(path_type=Path), help=_OPTIONS["out"])
+@click.option("--out", type=PATH, help=_OPTIONS["out"])
 @click.option("--workers", type=click.IntRange(1), help="Processes side by side. [default: one a core]")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def budget(

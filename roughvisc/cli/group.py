@@ -19,6 +19,8 @@ from roughvisc.errors import ON_SCREEN, InputError, RoughviscError, printable, s
 if TYPE_CHECKING:
     from rich.console import Console
 
+#: Type of an argument or option that names a file or a folder.
+PATH = click.Path(path_type=Path)
 #: Commands that take options for what a scan file does not state; the others take a study, which has keys for it.
 _READING = ("scan", "new")
 

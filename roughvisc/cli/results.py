@@ -7,13 +7,13 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.group import Failure, complain, counted, say, say_figures
+from roughvisc.cli.group import PATH, Failure, complain, counted, say, say_figures
 from roughvisc.errors import printable
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the figures. [default: beside the result]")
+@click.argument("result", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the figures. [default: beside the result]")
 @click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
 def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw figures of a result, a folder of results, or a trade.
@@ -52,10 +52,8 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Page to write. [default: report.html in the folder]"
-)
+@click.argument("results", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Page to write. [default: report.html in the folder]")
 def report(results: Path, output: Path | None) -> None:
     """Write an HTML report of a result or a folder of results.
 
@@ -75,7 +73,7 @@ def report(results: Path, output: Path | None) -> None:
 
 
 @click.command()
-@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("result", type=PATH)
 @click.option("--work-of-adhesion", metavar="W", help='Work of adhesion of the two surfaces: "50 mJ/m^2".')
 @click.option("--yield-strength", metavar="Y", help='Tensile yield strength of the softer body: "40 MPa".')
 @click.option("--thickness", metavar="H", help='Actual thickness of the body modelled as a half-space: "5 mm".')
@@ -84,9 +82,7 @@ def report(results: Path, output: Path | None) -> None:
 @click.option("--linear-strain", metavar="STRAIN", help='Strain limit of linear behaviour: 0.05, or "5 %".')
 @click.option("--heat-conductivity", metavar="K", help='Heat conductivity of the body: "0.2 W/m/K".')
 @click.option("--volumetric-heat-capacity", metavar="C", help='Heat capacity of the body: "1.8 MJ/m^3/K".')
-@click.option(
-    "--study", type=click.Path(path_type=Path), help="Study file whose [audit] table to use instead of the stored one."
-)
+@click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
 def audit(result: Path, study: Path | None, **stated: Any) -> None:
     """Check the assumptions of the model for a result.
 
@@ -141,7 +137,7 @@ def validate(cells: int) -> None:
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@click.argument("results", type=PATH)
 def verify(results: Path) -> None:
     """Check results for damage.
 
@@ -170,7 +166,7 @@ def verify(results: Path) -> None:
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@click.argument("results", type=PATH)
 @click.option("--all", "everything", is_flag=True, help="Also remove checkpoints, damaged results and failure records.")
 @click.option("--superseded", is_flag=True, help="Also remove results that this version has computed again.")
 def clean(results: Path, everything: bool, superseded: bool) -> None:

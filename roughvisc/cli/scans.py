@@ -7,19 +7,19 @@ from pathlib import Path
 
 import click
 
-from roughvisc.cli.group import say
+from roughvisc.cli.group import PATH, say
 from roughvisc.cli.reading import read_options, reading_options
 from roughvisc.errors import InputError, printable
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture to save. [default: FILE's name.png, here]")
-@click.option("--to", type=click.Path(path_type=Path), help="Convert the heights to a .nc, .x3p or .sdf file.")
+@click.argument("file", type=PATH)
+@click.option("--plot", type=PATH, help="Picture to save. [default: FILE's name.png, here]")
+@click.option("--to", type=PATH, help="Convert the heights to a .nc, .x3p or .sdf file.")
 @click.option("--force", is_flag=True, help="Overwrite an existing picture or converted file.")
 @click.option(
     "--card",
-    type=click.Path(path_type=Path),
+    type=PATH,
     is_flag=False,
     flag_value=Path(),
     metavar="[OUT.toml]",
@@ -93,10 +93,8 @@ def scan(
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), required=False)
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), help="Study file to write. [default: FILE's name-study.toml, here]"
-)
+@click.argument("file", type=PATH, required=False)
+@click.option("-o", "--out", type=PATH, help="Study file to write. [default: FILE's name-study.toml, here]")
 @click.option(
     "--contact",
     metavar="PART",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from roughvisc.cli.costs import show
-from roughvisc.cli.group import Failure, complain, complain_of_all, keep_long_messages, say, say_figures
+from roughvisc.cli.group import PATH, Failure, complain, complain_of_all, keep_long_messages, say, say_figures
 from roughvisc.cli.interrupts import end_if_interrupted
 from roughvisc.cli.reading import naming_keys
 from roughvisc.errors import InputError, printable
@@ -27,10 +27,8 @@ _FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best
 
 
 @click.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the results. [default: results/STUDY beside it]"
-)
+@click.argument("study", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the results. [default: results/STUDY beside it]")
 @click.option("--for", "targets", multiple=True, metavar="TARGET", help=_FOR)
 @click.option("--no-plots", is_flag=True, help="Draw no figures.")
 @click.option(
@@ -38,7 +36,7 @@ _FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best
 )
 @click.option("--threads", type=click.IntRange(1), help="Threads per case on a large grid. [default: all cores]")
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
-@click.option("--scheduler-file", type=click.Path(path_type=Path), help="Scheduler file written by a Dask scheduler.")
+@click.option("--scheduler-file", type=PATH, help="Scheduler file written by a Dask scheduler.")
 @click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
 @click.option("--same-bits", is_flag=True, help="Repeat cases computed with other versions of the FFT library.")
 @click.option("--profile", is_flag=True, help="Print where the time went; runs in this process.")
