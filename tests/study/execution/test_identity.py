@@ -100,14 +100,14 @@ def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
 
 
 def test_open_scan__a_file_that_changes_while_it_is_read(scan, monkeypatch):
-    plausible = readers._from_instrument
+    plausible = readers._plausible
 
     def slow(*args):
         found = plausible(*args)
         bump(scan, 2e-5)
         return found
 
-    monkeypatch.setattr(readers, "_from_instrument", slow)
+    monkeypatch.setattr(readers, "_plausible", slow)
     with pytest.raises(InputError, match=r"scan\.npy: was changed while it was read"):
         open_scan(scan, unit="m", spacing=4e-5)
 
