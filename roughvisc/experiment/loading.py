@@ -269,9 +269,10 @@ class LoadingRows(Rows):
             del row
 
     def row(self, step: Step, converged: bool, kept: bool = True, state: LoadingState | None = None) -> Row:
-        """Row of an accepted step, from which the rows go on by a state.
+        """Make the row of an accepted step.
 
-        ``converged``: all of those since the last one that is kept.
+        ``state`` is that from which an interrupted run continues; ``converged`` tells whether all steps since the last
+        kept row did.
         """
         if not is_wide(step.scene.gap.size):
             step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
@@ -427,7 +428,7 @@ class LoadingRows(Rows):
 
     def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
         """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
-        gap = self.profile.gap[rows] + step.on_rows(step.moved, rows)
+        gap = self.profile.gap[rows] + step.on_rows(step.displaced, rows)
         self._clip_gap(gap, step.level, rows)
         gap[contact[rows]] = 0.0
         return gap

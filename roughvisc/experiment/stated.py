@@ -48,18 +48,18 @@ def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
     Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
     """
     shown, scene = step.shown, step.scene
-    if not contact.any() or not step.residual > 0:
+    if not contact.any() or not step.solver_error > 0:
         return 0.0, 0.0
     since = step.state.began if step.state.before is None else step.state.before.time
     threads, area = scene.operator.threads, scene.operator.cell_area
     mean = shown.contact.total() / np.count_nonzero(contact)
-    pressure = _SOLVER_AT_EDGE * step.residual * mean
+    pressure = _SOLVER_AT_EDGE * step.solver_error * mean
     closed = pressure * scene.operator.self_influence * scene.compliance(step.state.now.time - since)
 
     def counted(rows: slice) -> tuple[int, int]:
         here = contact[rows]
         inside = here & (step.on_rows(shown.contact, rows) <= pressure)
-        outside = ~here & (scene.gap[rows] + step.on_rows(step.moved, rows) - step.level <= closed)
+        outside = ~here & (scene.gap[rows] + step.on_rows(step.displaced, rows) - step.level <= closed)
         if scene.present is not None:
             outside &= scene.present[rows]
         return int(np.count_nonzero(inside)), int(np.count_nonzero(outside))
@@ -123,7 +123,7 @@ def error_columns(step: Step, series_error: float) -> dict[str, float]:
     state, unknown, shown = step.state, step.uncertainty, step.shown
     largest_force, largest_approach = state.largest_force, state.largest_approach
     is_viscoelastic, unit = step.scene.is_viscoelastic, step.scene.tolerance if largest_force > 0 else 0.0
-    solved = step.residual + _INHERITED * unit if is_viscoelastic else max(step.residual, _LEAST * unit)
+    solved = step.solver_error + _INHERITED * unit if is_viscoelastic else max(step.solver_error, _LEAST * unit)
     force = approach = 0.0
     if step.control == "approach" or not step.given:
         force = unknown.force + solved * shown.force + series_error * largest_force
@@ -141,7 +141,7 @@ def error_columns(step: Step, series_error: float) -> dict[str, float]:
     carried = _SUMMED * solved + series_error
     return {
         "stated_error": relative,
-        "residual": step.residual,
+        "residual": step.solver_error,
         "residual_bound": step.bound,
         "pressure_error": pressure,
         "force_error": force,

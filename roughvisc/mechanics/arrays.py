@@ -36,7 +36,7 @@ _BLOCK = 1 << 17
 def blockwise(
     work: Callable[..., Found], *fields: Any, out: NDArray[Any] | None = None, threads: int = 1
 ) -> list[Found]:
-    """What some work gives of each block of cells, in their order.
+    """Apply a function to each block of cells; return the results in order.
 
     Parameters
     ----------
@@ -394,13 +394,13 @@ _FROM = 1 << 22
 
 
 @contextmanager
-def reused(apart: bool = False) -> Iterator[None]:
+def reused(separate: bool = False) -> Iterator[None]:
     """Within it, the memory of fields of :func:`empty` that nobody holds any more is taken for the next ones.
 
     What is left at its end is given back to the system. In another one it does nothing, unless its fields are to be
-    `apart`: of another size than those of the other one, which has no use for their memory.
+    `separate`: of another size than those of the other one, which has no use for their memory.
     """
-    if _kept.get() is not None and not apart:
+    if _kept.get() is not None and not separate:
         yield
         return
     kept = _Kept()

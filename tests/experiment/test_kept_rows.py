@@ -26,7 +26,7 @@ MATERIAL, PROGRAM = rv.zener(1.0, 1.0, 0.3), rv.Program().load(1.0, over=1.0)
 def stood(**changes):
     """What a step must have for what is stated of it; the unknowns have sizes of their own."""
     given = {
-        "residual": 0.01,
+        "solver_error": 0.01,
         "bound": 0.3,
         "control": "load",
         "given": True,
@@ -72,7 +72,7 @@ def test_stated_error__is_the_largest_relative_one(worst, expected):
     sizes = {"pressure": 0.2 * 8.0, "force": 0.2 * 8.0, "approach": 0.2 * 0.5}
     sizes[worst] *= expected / 0.2
     unknown = SimpleNamespace(**sizes, work=0.0, dissipated=0.0, inside=0.0, outside=0.0)
-    exact = {"residual": 0.0, "bound": 0.0, "given": False, "uncertainty": unknown}
+    exact = {"solver_error": 0.0, "bound": 0.0, "given": False, "uncertainty": unknown}
     scene = SimpleNamespace(is_viscoelastic=False, tolerance=0.1)
     least = 0.015 * 0.1 * 4.0 / 8.0  # stated of an elastic pressure in any case
     found = error_columns(stood(**exact, scene=scene), 0.0)["stated_error"]

@@ -77,7 +77,7 @@ def test_blocks__within_each_other_are_one():
 def test_block_apart__has_memory_of_its_own_and_gives_it_back():
     with reused():
         outer = reuse._kept.get()
-        with reused(apart=True):
+        with reused(separate=True):
             inner = reuse._kept.get()
             empty(SHAPE)
             assert (sum(map(len, inner._by_size.values())), outer._by_size) == (1, {})

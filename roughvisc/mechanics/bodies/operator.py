@@ -40,7 +40,7 @@ _BLOCK = 8
 
 
 class _Work(NamedTuple):
-    """A room for the transforms along y, one for some rows or for some columns a thread, and which go together."""
+    """Working memory of the transforms: the spectrum, a buffer pair (rows, columns) for each thread, and the blocks."""
 
     spectrum: NDArray[Any]
     rooms: list[tuple[NDArray[Any], NDArray[Any]]]

@@ -154,7 +154,7 @@ def certify(
     Parameters
     ----------
     problem : ContactProblem
-        What is asked.
+        The problem.
     pressure, displacement : ndarray, shape (nx, ny)
         The pressure, and its displacement.
     contact : ndarray of int
@@ -221,8 +221,8 @@ def _under_approach(
 _CAUTION = 1.25
 
 
-class Asked(NamedTuple):
-    """L1 norm of the change that a preconditioned step asked for, but for the scale, and the duality gap then."""
+class RequestedChange(NamedTuple):
+    """L1 norm of the preconditioned residual, which is not scaled, and the duality gap at that iteration."""
 
     change: float
     duality_gap: float
@@ -234,31 +234,31 @@ def estimated_error(
     contact: Cells,
     displacement: Array,
     certificate: Certificate,
-    asked: Asked | None,
+    requested: RequestedChange | None,
 ) -> float:
     """Estimated relative L1 error of the pressure.
 
     Parameters
     ----------
     problem : ContactProblem
-        What is asked.
+        The problem.
     pressure, displacement : ndarray, shape (nx, ny)
         The pressure, and its displacement.
     contact : ndarray of int
         Cells that carry pressure, as flat indices.
     certificate : Certificate
         Of this pressure.
-    asked : Asked or None
+    requested : RequestedChange or None
         By the last preconditioned step; None where there was no such step.
     """
     if certificate.hopeless:
         return math.inf
-    if not certificate.energy > 0 and asked is None:
+    if not certificate.energy > 0 and requested is None:
         return 0.0
     # a first guess that is good enough may be far off in few cells: its gap falls with the square of what is amiss
-    if asked is None or not is_measured(problem, contact):
+    if requested is None or not is_measured(problem, contact):
         return _of_next_step(problem, pressure, contact, displacement, certificate.level)
-    return error_left(problem, pressure, certificate, asked)
+    return error_left(problem, pressure, certificate, requested)
 
 
 def is_measured(problem: ContactProblem, contact: Cells) -> bool:
@@ -270,13 +270,13 @@ def is_measured(problem: ContactProblem, contact: Cells) -> bool:
     return problem.sees_load and (problem.definite or contact.size < problem.gap.size)
 
 
-def error_left(problem: ContactProblem, pressure: Array, certificate: Certificate, asked: Asked) -> float:
-    """What the last preconditioned step asked for, less as the bound has fallen since, over the pressure."""
+def error_left(problem: ContactProblem, pressure: Array, certificate: Certificate, requested: RequestedChange) -> float:
+    """The last preconditioned residual over the pressure, reduced as the bound has fallen since."""
     load = total(pressure.reshape(-1), problem.influence.threads)
     if not load > 0:
         return math.inf
-    relative = asked.change / problem.influence.scale / load
-    fallen = max(certificate.duality_gap, 0.0) / asked.duality_gap if asked.duality_gap > 0 else 1.0
+    relative = requested.change / problem.influence.scale / load
+    fallen = max(certificate.duality_gap, 0.0) / requested.duality_gap if requested.duality_gap > 0 else 1.0
     return _CAUTION * relative * math.sqrt(fallen)
 
 

@@ -36,18 +36,18 @@ class FreeSet(NamedTuple):
     ----------
     cells : ndarray of int
         In contact, or penetrating else.
-    apart, held : ndarray
+    separation, held : ndarray
         Separation and pressure of them.
     """
 
     cells: Cells
-    apart: Array
+    separation: Array
     held: Array
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """What is asked of the solver: all lengths over one of them, all pressures over another.
+    """A contact problem in scaled variables: pressures over ``pressure_scale``, lengths over ``length_scale``.
 
     Attributes
     ----------
@@ -63,8 +63,8 @@ class ContactProblem:
         On the relative duality gap.
     present : ndarray of bool or None
         Cells where there is material; None: all.
-    unit, length, lowest : float
-        Unit of pressure [-], unit of length [m], and the gap's lowest point [m].
+    pressure_scale, length_scale, lowest : float
+        What pressures [-] and lengths [m] are divided by, and the gap's lowest point [m].
     remaining : float
         Mean gap in full contact, where the approach given determines it: periodic displacements have no mean; else NaN.
     """
@@ -75,8 +75,8 @@ class ContactProblem:
     target: float
     tolerance: float
     present: Mask | None
-    unit: float
-    length: float
+    pressure_scale: float
+    length_scale: float
     lowest: float
     remaining: float
 
@@ -94,29 +94,29 @@ class ContactProblem:
         """The problem in units in which neither a load of 1e-300 nor its square is lost; uses up the gap."""
         lowest = lowest_value(gap, present, operator.threads)
         if load is not None:
-            unit = load
-            length = load * operator.self_influence or load * operator.spacing[0]
+            pressure_scale = load
+            length_scale = load * operator.self_influence or load * operator.spacing[0]
         else:
             assert approach is not None
-            length = approach - lowest
-            unit = length / (operator.self_influence or operator.spacing[0])
+            length_scale = approach - lowest
+            pressure_scale = length_scale / (operator.self_influence or operator.spacing[0])
 
         def over_length(here: Array, out: Array) -> None:
             np.subtract(here, lowest, out=out)
-            out /= length
+            out /= length_scale
 
         blockwise(over_length, gap, out=gap, threads=operator.threads)
         target = math.nan if approach is None else 1.0
         known = load is None and not operator.definite and present is None
         return cls(
-            influence=Influence(operator, unit / length),
+            influence=Influence(operator, pressure_scale / length_scale),
             gap=gap,
-            load=None if load is None else load / unit,
+            load=None if load is None else load / pressure_scale,
             target=target,
             tolerance=tolerance,
             present=present,
-            unit=unit,
-            length=length,
+            pressure_scale=pressure_scale,
+            length_scale=length_scale,
             lowest=lowest,
             remaining=float(np.mean(gap)) - target if known else math.nan,
         )
@@ -150,7 +150,7 @@ class ContactProblem:
         return found
 
     def separation_of(self, displaced: Array, part: slice) -> Array:
-        """The same of some cells of a flat displacement, in memory of its own: it is as soon had again as fetched."""
+        """Gap under pressure of a slice of flat cells, as a new array: it is computed as fast as it would be read."""
         return self.gap.reshape(-1)[part] + displaced[part]
 
     def lowest_of(self, apart: Array, part: slice) -> float:
@@ -226,7 +226,7 @@ class ContactProblem:
 
             def over_unit(here: Array, out: Array) -> None:
                 np.maximum(here, 0, out=out)
-                out /= self.unit
+                out /= self.pressure_scale
 
             blockwise(over_unit, pressure, out=pressure, threads=threads)
         if self.present is not None:
@@ -234,5 +234,5 @@ class ContactProblem:
         factor = 1.0 if self.load is None else self.load / total(pressure.reshape(-1), threads)
         blockwise(np.multiply, pressure, factor, out=pressure, threads=threads)
         if displacement is not None:
-            blockwise(np.multiply, displacement, factor / self.length, out=displacement, threads=threads)
+            blockwise(np.multiply, displacement, factor / self.length_scale, out=displacement, threads=threads)
         return pressure, displacement

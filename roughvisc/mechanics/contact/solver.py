@@ -59,8 +59,8 @@ from roughvisc.mechanics.arrays import (
 )
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact.certificate import (
-    Asked,
     Certificate,
+    RequestedChange,
     approach_under_load,
     carries_excess,
     certify,
@@ -235,7 +235,7 @@ def pcg(
     iterate = first_iterate(problem, start, start_displacement)
     search = Search(1 / problem.influence.scale)
     previous: SearchStep | None = None  # to conjugate to
-    asked: Asked | None = None  # by the last preconditioned step
+    requested: RequestedChange | None = None  # of the last preconditioned step
     measured = estimate_error or error_tolerance is not None
 
     def is_enough(certificate: Certificate, iterate: Iterate) -> bool:
@@ -247,7 +247,9 @@ def pcg(
             return False
         if certificate.bound <= error_tolerance:
             return True
-        return asked is not None and error_left(problem, iterate.pressure, certificate, asked) <= error_tolerance
+        return (
+            requested is not None and error_left(problem, iterate.pressure, certificate, requested) <= error_tolerance
+        )
 
     for iteration in range(max_iterations + 1):
         # 1. Judge the pressure: is its duality gap, or the estimate of its error, small enough?
@@ -280,8 +282,11 @@ def pcg(
                 measured=measured,
             )
             del free
-            first, asked = asked is None, Asked(trial.asked, certificate.duality_gap) if measured else None
-            if first and is_enough(certificate, iterate):  # what is asked of the first guess is little
+            first, requested = (
+                requested is None,
+                RequestedChange(trial.requested, certificate.duality_gap) if measured else None,
+            )
+            if first and is_enough(certificate, iterate):  # the preconditioned residual of the first guess is small
                 settled = not iterate.approximate
                 if settled:
                     break
@@ -300,7 +305,9 @@ def pcg(
 
     error = math.nan
     if estimate_error:
-        error = estimated_error(problem, iterate.pressure, iterate.contact, iterate.displacement, certificate, asked)
+        error = estimated_error(
+            problem, iterate.pressure, iterate.contact, iterate.displacement, certificate, requested
+        )
     converged = certificate.converged or (settled and not certificate.hopeless)
     return in_own_units(problem, iterate, certificate._replace(converged=converged), iteration, error)
 
@@ -365,9 +372,9 @@ class SearchTrial(NamedTuple):
         Pressure on them before, the one to try, and the difference.
     slope : float
         Derivative of ``f`` along the change.
-    asked : float
-        L1 norm of the change that the preconditioner asked for, but for the scale, and times what makes it as cautious
-        a measure as one level's; NaN where it was not wanted.
+    requested : float
+        L1 norm of the preconditioned residual, which is not scaled, times ``CAUTION`` if both levels of the
+        preconditioner were used; NaN unless the error is to be estimated.
     """
 
     free_set: Cells
@@ -375,7 +382,7 @@ class SearchTrial(NamedTuple):
     pressure: Array
     change: Array
     slope: float
-    asked: float = math.nan
+    requested: float = math.nan
 
 
 class SearchStep(NamedTuple):
@@ -620,13 +627,13 @@ def in_own_units(
     if problem.load is not None:
         approach = approach_under_load(problem, pressure, iterate.contact, displacement, certificate.level)
     threads = problem.influence.threads
-    blockwise(np.multiply, pressure, problem.unit, out=pressure, threads=threads)
-    blockwise(np.multiply, displacement, problem.length, out=displacement, threads=threads)
+    blockwise(np.multiply, pressure, problem.pressure_scale, out=pressure, threads=threads)
+    blockwise(np.multiply, displacement, problem.length_scale, out=displacement, threads=threads)
     return ContactState(
         pressure=pressure,
         displacement=displacement,
-        approach=approach * problem.length + problem.lowest,
-        load=load * problem.unit,
+        approach=approach * problem.length_scale + problem.lowest,
+        load=load * problem.pressure_scale,
         bound=certificate.bound,
         converged=certificate.converged,
         iterations=iterations,
@@ -642,7 +649,7 @@ def coarse_guess(operator: Operator, gap: Array, load: float) -> Array | None:
     coarse = operator.on((gap.shape[0] // 2, gap.shape[1] // 2))
     few = _averaged(gap, coarse.shape, operator.threads)
     load *= few.size / gap.size
-    with reused(apart=True):  # none of its fields is as large as those to come
+    with reused(separate=True):  # none of its fields is as large as those to come
         found = solve_contact(coarse, few, load=load, tolerance=_COARSE_TOLERANCE, overwrite=True).pressure
     return _spread(found, gap.shape, operator.threads)
 

@@ -65,7 +65,10 @@ _USED_BY_WORK, _USED_BY_SOFT_WORK = 0.5, 0.25
 
 
 def behind(state: State) -> dict[str, Any]:
-    """What a companion is after a step that it does not take: where it was, at the state if they were one till then."""
+    """Fields of the state after a step that the companion does not take.
+
+    The companion stays where it is; if there was none, it starts as a copy of the state before that step.
+    """
     companion = state.companion
     if companion is None:
         own = {part.name: getattr(state, part.name) for part in fields(Trajectory)}
@@ -74,7 +77,7 @@ def behind(state: State) -> dict[str, Any]:
 
 
 def coarse_initial_guess(now: Instant, companion: Instant | None = None, together: Instant | None = None) -> Guess:
-    """Where the companion of a state may be: as far from it as when both were last at the same instant.
+    """First guess of the companion's contact: as far from the state's as when both were last at the same instant.
 
     Parameters
     ----------
@@ -101,33 +104,33 @@ def coarse_initial_guess(now: Instant, companion: Instant | None = None, togethe
 
 
 def difference(
-    scene: Scene, step: Step, companion: Trajectory, moved: Sum, earlier: Sparse | None, asked: bool
+    scene: Scene, step: Step, companion: Trajectory, displaced: Sum, earlier: Sparse | None, wants_area: bool
 ) -> Uncertainty:
-    """What is stated of a step, from where its companion is at the same time.
+    """Stated error of a step, from its difference to the companion at the same time.
 
     Parameters
     ----------
     scene : Scene
         What is prescribed.
     step : Step
-        The step.
+        The accepted step.
     companion : Trajectory
         Its companion after a step of its own.
-    moved : Sum
+    displaced : Sum
         Displacement after that step. [m]
     earlier : Sparse or None
         Pressure before it, if there was one. [Pa]
-    asked : bool
-        Whether the area's part is wanted too.
+    wants_area : bool
+        Whether to estimate the error of the contact area too.
 
     Notes
     -----
-    What is compared are the pressures by which both go on. The one that is shown of a step in which hardly any
-    compliance is there at once is more accurate.
+    The pressures from which both continue are compared. If hardly any compliance is instantaneous, the step shows a
+    pressure that is more accurate.
     """
     fine, coarse = step.state.now, companion.now
     area = scene.operator.cell_area
-    inside, outside = _undecided(scene, step, coarse, moved) if asked else (0, 0)
+    inside, outside = _undecided(scene, step, coarse, displaced) if wants_area else (0, 0)
     own, other = step.state.energy or Energy(), companion.energy or Energy()
     entered, soft = 0.0, scene.is_soft
     if earlier is not None and soft:
@@ -143,7 +146,7 @@ def difference(
         force=force * abs(fine.force - coarse.force) + (entered if step.control == "approach" else 0.0),
         work=energy * abs(step.state.work - companion.work) + own.unresolved,
         dissipated=energy * abs(own.dissipated - other.dissipated) + own.unresolved,
-        friction=stated * _friction_apart(scene, step, coarse.pressure, moved.field()) if scene.motions else 0.0,
+        friction=stated * _friction_apart(scene, step, coarse.pressure, displaced.field()) if scene.motions else 0.0,
         inside=area * inside,
         outside=area * outside,
         stored_excess=(own.stored - other.stored) / -3,
@@ -154,20 +157,20 @@ def difference(
 def adapt_tolerance_share(
     scene: Scene, before: State, state: State, ahead: float, left: float, unknown: Uncertainty
 ) -> ControllerState:
-    """From here on steps take the part of the tolerance's share that what they have come to leaves them.
+    """Adapt the tolerance of the next steps to the error accumulated so far.
 
     Parameters
     ----------
     scene : Scene
         What is prescribed.
     before, state : State
-        As of the last two instants at which the companion has told.
+        At the last two instants that the companion reached.
     ahead : float
-        What is prescribed at the next event over what is now, one at least: errors count relative to the larger.
+        Prescribed value at the next event over the present one, at least one: errors count relative to the larger.
     left : float
         Part of the error of the pressure that is left at the next kept time; that of the work does not fade.
     unknown : Uncertainty
-        What is stated of the state.
+        Stated error of the state.
     """
 
     def used(one: State, unknown: Uncertainty) -> float:
@@ -189,14 +192,14 @@ def _friction_apart(scene: Scene, step: Step, pressure: Array, displacement: Arr
     return abs(fine - tangential_force(scene.operator, pressure, displacement, slide))
 
 
-def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[int, int]:
+def _undecided(scene: Scene, step: Step, coarse: Instant, displaced: Sum) -> tuple[int, int]:
     """Cells in contact that may be out of it, and cells out of contact that may be in it."""
     flat = scene.gap.reshape(-1)
     present = None if scene.present is None else scene.present.reshape(-1)
 
     def work(part: slice) -> tuple[int, int]:
         fine, other, own, others = (
-            field.part(part) for field in (step.shown.contact, coarse.contact, step.moved, moved)
+            field.part(part) for field in (step.shown.contact, coarse.contact, step.displaced, displaced)
         )
         contact = fine > 0
         inside = contact & (fine <= np.abs(fine - other))
@@ -213,10 +216,9 @@ def _undecided(scene: Scene, step: Step, coarse: Instant, moved: Sum) -> tuple[i
 def followed(
     scene: Scene, state: State, segment: Segment, guess: Guess, rule: Rule | None = None
 ) -> tuple[State, Trial | None] | None:
-    """State whose companion, if it has one, has come to the same instant by one step, and that step.
+    """Bring the companion, if there is one, to the instant of the state by one step; return the state and that step.
 
-    None if that outgrew the grid. ``guess`` is where the companion may be, as of :func:`coarse_initial_guess`; it is
-    used up.
+    None if the companion outgrew the grid. ``guess``, of :func:`coarse_initial_guess`, is used up.
     """
     companion = state.companion
     if companion is None:
@@ -236,24 +238,24 @@ def coarse_step(scene: Scene, state: State, companion: Trajectory, trial: Trial)
     advanced = advance_trajectory(scene, companion, trial)
     if companion.unresolved:
         advanced = without_past(scene, advanced)
-    # no field of the instant before is ever asked for
+    # no field of the instant before is ever wants_area for
     advanced = replace(advanced, before=advanced.before and advanced.before.without_fields())
     return replace(state, companion=advanced, behind=0, **cost_after(state, trial))
 
 
 def with_error_estimate(
-    scene: Scene, step: Step, companion_trial: Trial | None, earlier: Sparse | None = None, asked: bool = True
+    scene: Scene, step: Step, companion_trial: Trial | None, earlier: Sparse | None = None, wants_area: bool = True
 ) -> Step:
-    """A step with what its companion says of it, if it has taken one."""
+    """The step with its stated error, if its companion has taken a step too."""
     companion = step.state.companion
     if companion is None or companion_trial is None:
         return step
-    moved = displacement_after(scene, companion, companion_trial)
-    return with_uncertainty(step, difference(scene, step, companion, moved, earlier, asked))
+    displaced = displacement_after(scene, companion, companion_trial)
+    return with_uncertainty(step, difference(scene, step, companion, displaced, earlier, wants_area))
 
 
 def with_uncertainty(step: Step, uncertainty: Uncertainty, **more: Any) -> Step:
-    """The step, with what is stated of it; ``more`` is what else is other of its state."""
+    """The step with a stated error; ``more`` are other changes of its state."""
     return replace(step, uncertainty=uncertainty, state=replace(step.state, uncertainty=uncertainty, **more))
 
 

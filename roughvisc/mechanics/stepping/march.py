@@ -125,7 +125,7 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
     if not scene.can_jump:
         return scene, step_of(scene, _defer_jump(scene, state, segment, value), trial_at_rest(scene, state))
     while True:
-        trial = trial_step(scene, state, segment.control, value, 0.0, "linear", stated=True)
+        trial = trial_step(scene, state, segment.control, value, 0.0, "linear", estimate_error=True)
         if not is_outgrown(scene, trial.instant):
             jumped = accept(scene, state, trial, replace(state.pace, ignore_pressure_error=False))
             found = followed(scene, jumped, segment, coarse_initial_guess(trial.instant), "linear")
@@ -183,11 +183,11 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[
             state, first = _shortened(scene, start, state, segment, trial, error, length), None
             del trial
             continue
-        single = state.behind == 0 and trial.instant.time < end
+        unpaired = state.behind == 0 and trial.instant.time < end
         fresh = state.before is None and scene.time_step is None
         judged = None
         if not outgrown:
-            waits = scene.is_viscoelastic and single
+            waits = scene.is_viscoelastic and unpaired
             accepted, guess = _accept_and_suggest(scene, state, trial, error, waits), None
             if state.companion is not None and not waits:
                 guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
@@ -204,7 +204,7 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[
             scene, state = enlarged(scene, replace(state, **cost_after(state, trial)), trial.instant.time)
             continue
         base, state = state, judged.state
-        if fresh and single:
+        if fresh and unpaired:
             first = judged
         else:
             base = state
@@ -213,19 +213,21 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[
 
 
 def _tried(scene: Scene, state: State, segment: Segment, event: float, end: float) -> tuple[Trial, float]:
-    """A step as long as it seems good, and its estimated error."""
+    """Try a step of the suggested length: the trial, and its estimated error."""
     length = step_length(scene, state, segment, event, end)
     arrival = event if length == event - state.now.time else state.now.time + length
     value = segment.value(arrival - state.began, state.start)
     # what a short discarded solve shows of a soft step's end is the step's own residual, magnified
     share = _MAGNIFIED if scene.lacks_instantaneous_compliance(length) and scene.keeps(arrival) else 1.0
-    rule, stated = rule_for(scene, state, length), scene.keeps(arrival)
-    trial = trial_step(scene, state, segment.control, value, length, rule, share, stated=stated, arrival=arrival)
+    rule = rule_for(scene, state, length)
+    trial = trial_step(
+        scene, state, segment.control, value, length, rule, share, estimate_error=scene.keeps(arrival), arrival=arrival
+    )
     return trial, acceptance_error(scene, state, trial, segment, event)
 
 
 def _too_long(scene: Scene, state: State, segment: Segment, trial: Trial, error: float, shown: bool) -> bool:
-    """Whether a step is to be tried again, shorter; ``shown``: it also judges one before it, which is kept."""
+    """Whether to try again with a shorter step; ``shown``: the error is also that of the step before, which is kept."""
     if scene.time_step is not None or trial.length <= shortest_step(scene, state, segment):
         return False
     if _seems_to_open(state, segment, trial):
@@ -251,7 +253,7 @@ def _shortened(
 
 
 def _accept_and_suggest(scene: Scene, state: State, trial: Trial, error: float, waits: bool) -> State:
-    """State after a trial, whose companion is still behind; ``waits``: it is to stay there."""
+    """Accept a trial and suggest the next length; ``waits``: the companion takes this step together with the next."""
     time = trial.instant.time
     proposed, allowed = suggestion(scene, trial, error, state), error_limit(scene, state, time)
     pace = state.pace.accepted(proposed, error, allowed, fresh=state.before is None)
@@ -268,9 +270,10 @@ def _step_with_companion(
     trial: Trial,
     guess: Guess | None,
 ) -> Step | None:
-    """The accepted step, with what the companion says of it unless it waits for another; None if that outgrew.
+    """Bring the companion to the end of the accepted step and add the error that it finds.
 
-    ``guess`` is where the companion may be, None where it waits; of the state before, numbers are asked for else.
+    None if the companion outgrew the grid. With ``guess`` None the companion waits for another step. Otherwise only
+    numbers of the state before the step are read, not its fields.
     """
     time, companion_trial = trial.instant.time, None
     if guess is not None:
@@ -286,13 +289,13 @@ def _step_with_companion(
         return step
     assert state.companion is not None
     assert accepted.companion is not None
-    asked = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
-    moved = displacement_after(scene, accepted.companion, companion_trial)
-    unknown = difference(scene, step, accepted.companion, moved, state.companion.now.contact, asked)
+    wants_area = scene.keeps(time) or (state.behind > 0 and scene.keeps(state.now.time))
+    displaced = displacement_after(scene, accepted.companion, companion_trial)
+    unknown = difference(scene, step, accepted.companion, displaced, state.companion.now.contact, wants_area)
     if companion_trial.length <= trial.length:  # it took the same step
         return with_uncertainty(step, unknown.or_worse(state.uncertainty, 0.0))
     ahead = max(1.0, growth(state, segment, time, min(scene.next_kept(time), end))) if time < end else 1.0
-    left = 1.0 if asked else remaining(scene, accepted)
+    left = 1.0 if wants_area else remaining(scene, accepted)
     return with_uncertainty(step, unknown, pace=adapt_tolerance_share(scene, state, accepted, ahead, left, unknown))
 
 

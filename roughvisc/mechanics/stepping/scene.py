@@ -93,7 +93,7 @@ class ControllerState:
     suggestion : float
         Length of the next step; zero after an event. [s]
     sharpness : float
-        Part of their usual share of the tolerance that steps may use, by what those so far have come to. [-]
+        Part of their usual share of the tolerance that the next steps may use, by the error accumulated so far. [-]
     ignore_pressure_error : bool
         Whether the next estimate leaves the pressure out, once.
     rejected_error : float
@@ -117,17 +117,17 @@ class ControllerState:
         return replace(self, suggestion=shrink * length, rejected_error=error)
 
     def accepted(self, suggestion: float, error: float, allowed: float, fresh: bool) -> ControllerState:
-        """After an accepted step; ``fresh``: it was the first after an event, and the second one judges it.
+        """After an accepted step; ``fresh``: it was the first after an event, whose error the second one finds.
 
-        Where it was accepted since shortening was in vain, the pressure has jumped: the next estimate would see that
-        jump once more.
+        If it was accepted because shortening did not help, the pressure has jumped. The next estimate ignores the
+        pressure, or it would count that jump again.
         """
         ignored = self.shortening_failed(error) and error > allowed
         rejected_error = self.rejected_error if fresh else math.inf
         return ControllerState(suggestion, self.sharpness, ignored, rejected_error)
 
     def adapt_sharpness(self, used: float, earlier: float) -> ControllerState:
-        """By what is stated, over the tolerance, now and when it was last told."""
+        """Adapt to the stated error over the tolerance, now and when it was last known."""
         if used > _MOST_USED and used > _GROWING * earlier:  # what stays whatever the steps is none of their doing
             wanted = max(_MOST_USED / used, 0.5)
         elif used < _LEAST_USED:
@@ -422,7 +422,7 @@ class Step:
     ----------
     shown : Instant
         What to report: the state's present instant, its pressure resolved where the material cannot jump.
-    moved : Sum
+    displaced : Sum
         Total displacement of the half-space then. [m]
     effective : ndarray or None
         Effective pressure ``q``, the displacement's source, where the memory is one of pressures. [-]
@@ -434,10 +434,10 @@ class Step:
         Whether the program stated its value; else it was found before, and kept.
     bound : float
         Bound on the relative error of the pressure left by the contact solver, in the energy norm.
-    residual : float
-        Estimate of it in the mean (L1).
+    solver_error : float
+        Estimated error of the pressure that the contact solver leaves (L1). [-]
     uncertainty : Uncertainty
-        What the time steps leave unknown of it.
+        Error that the time steps leave.
     converged : bool
         Whether the contact solver reached its tolerance.
     scene : Scene
@@ -447,13 +447,13 @@ class Step:
     """
 
     shown: Instant
-    moved: Sum
+    displaced: Sum
     effective: Array | None
     level: float
     control: Control
     given: bool
     bound: float
-    residual: float
+    solver_error: float
     uncertainty: Uncertainty
     converged: bool
     scene: Scene
@@ -461,8 +461,8 @@ class Step:
 
     @property
     def displacement(self) -> Array:
-        """The same on all cells, not to be changed; had anew each time where it is no field of its own. [m]"""
-        return self.moved.field()
+        """Total displacement of all cells, not to be changed; added up anew each time if it is a sum. [m]"""
+        return self.displaced.field()
 
     def on_rows(self, field: Sparse | Sum, rows: slice) -> Array:
         """Its pressure [Pa] or its total displacement [m] on some rows of cells, not to be changed."""
@@ -471,10 +471,10 @@ class Step:
 
     def with_fields(self) -> Step:
         """The same with all its fields at hand, for what asks for them again and again."""
-        if self.shown.contact.cells is None and self.moved.is_whole:
+        if self.shown.contact.cells is None and self.displaced.is_whole:
             return self
         shown = replace(self.shown, contact=Sparse.whole(self.shown.pressure))
-        return replace(self, shown=shown, moved=Sum.whole(self.displacement))
+        return replace(self, shown=shown, displaced=Sum.whole(self.displacement))
 
     @property
     def time_error(self) -> float:
@@ -508,7 +508,7 @@ class Trial:
     rule: Rule
     control: Control = "load"
     bound: float = 0.0
-    residual: float = 0.0
+    solver_error: float = 0.0
     converged: bool = True
     iterations: int = 0
     convolutions: int = 0

@@ -216,13 +216,13 @@ def _advance(
     )
     return state, Step(
         shown=now,
-        moved=Sum.whole(displacement),
+        displaced=Sum.whole(displacement),
         effective=None,
         level=solution.level,
         control="load",
         given=True,
         bound=math.nan,
-        residual=math.nan,
+        solver_error=math.nan,
         uncertainty=UNKNOWN,
         converged=solution.stagnated,
         scene=scene,

@@ -95,9 +95,9 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     step = step_of(scene, accepted, trial)
     if companion_trial is None or earlier is None:
         return step
-    asked = scene.keeps(arrival) or (state.behind > 0 and scene.keeps(state.now.time))
+    wants_area = scene.keeps(arrival) or (state.behind > 0 and scene.keeps(state.now.time))
     entered = Sparse.of(_rolled(earlier.now.pressure, segment.slide, state.behind + 1))
-    step = with_error_estimate(scene, step, companion_trial, entered, asked)
+    step = with_error_estimate(scene, step, companion_trial, entered, wants_area)
     step = replace(step, state=replace(step.state, slid=_sharpened(step, state.uncertainty)))
     # after a single step the companion knows no more than before
     return step if state.behind else with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))
@@ -117,9 +117,9 @@ def _tried(
     assert segment.slide is not None
     value = segment.value(arrival, state.start)  # it is held
     body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
-    stated = cells == 1 and scene.keeps(arrival)
+    estimated = cells == 1 and scene.keeps(arrival)
     step, control = cells * length, segment.control
-    trial = trial_step(scene, body, control, value, step, rule, share, guess, stated=stated, arrival=arrival)
+    trial = trial_step(scene, body, control, value, step, rule, share, guess, estimate_error=estimated, arrival=arrival)
     return replace(trial, slides=True)
 
 

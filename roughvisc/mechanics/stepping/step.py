@@ -65,25 +65,25 @@ def trial_step(
     rule: Rule,
     share: float = 1.0,
     guess: Guess | None = None,
-    stated: bool = False,
+    estimate_error: bool = False,
     arrival: float | None = None,
 ) -> Trial:
     """Contact state a step ahead, where the load or the approach has a given value.
 
-    ``share`` scales the contact solver's tolerance; ``guess`` is a pressure near the one sought and its displacement at
-    unit compliance, which are used up; ``stated`` asks for an estimate of the error that the solver leaves; ``arrival``
-    is the time of the end where that is known to the last bit, and not only as a sum. [s]
+    ``share`` scales the contact solver's tolerance. ``guess``, which is used up, is a first guess of the pressure and
+    its displacement at unit compliance. ``estimate_error``: whether to estimate the error that the solver leaves.
+    ``arrival`` is the time of the end if it is known to the last bit, and not only as a sum. [s]
     """
     operator, alpha, effective, field = carried_into_step(scene, state.memory, length, rule)
-    # the displacement that costs no convolution is not held while the contact is solved: the state will tell it
+    # a displacement that costs no convolution is not held while the contact is solved: the memory will give it again
     carried = None if scene.memory.acts_on == "displacement" else field
     threads = scene.operator.threads
     gap = field if carried is None else empty(field.shape)
     blockwise(np.add, scene.gap, field, out=gap, threads=threads)
     del field
     time = state.now.time + length if arrival is None else arrival
-    apart = value == 0 if control == "load" else value <= scene.lowest(gap)
-    if apart:
+    no_contact = value == 0 if control == "load" else value <= scene.lowest(gap)
+    if no_contact:
         approach = scene.lowest(gap) if control == "load" else value
         nothing = np.zeros_like(gap)
         instant = Instant(time, Sparse.of(nothing), 0.0, approach, nothing)
@@ -106,7 +106,7 @@ def trial_step(
         start_displacement=start_displacement,
         present=scene.present,
         overwrite=True,
-        estimate_error=stated,
+        estimate_error=estimate_error,
     )
     del gap, start, start_displacement
     pressure, displacement = contact.pressure, contact.displacement
@@ -271,27 +271,29 @@ def cost_after(state: State, trial: Trial) -> dict[str, Any]:
 
 def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
-    shown, converged, moved, now = trial, trial.converged, displacement_after(scene, state, trial), state.now
+    shown, converged, displaced, now = trial, trial.converged, displacement_after(scene, state, trial), state.now
     level = now.approach
     kept = trial.length > 0 and not trial.is_open and scene.keeps(state.now.time)
     if kept and scene.lacks_instantaneous_compliance(trial.length):
         # The pressure of an implicit step belongs to the step, not to its end. A short step at constant
         # pressure shows the end's (largest error of a Kelvin-Voigt pressure 39 % -> 5e-8).
         alone = replace(state, before=None)
-        shown = trial_step(scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", stated=True)
+        shown = trial_step(
+            scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", estimate_error=True
+        )
         state = replace(state, **cost_after(state, shown))
         converged = converged and shown.converged
-        moved = displacement_after(scene, alone, shown, shown.length, shown.rule)
+        displaced = displacement_after(scene, alone, shown, shown.length, shown.rule)
         now, level = replace(now, contact=shown.instant.contact), shown.instant.approach
     return Step(
         shown=now,
-        moved=moved,
+        displaced=displaced,
         effective=shown.effective,
         level=level,
         control=trial.control,
         given=scene.program.gives(segment_number(state)),
         bound=shown.bound,
-        residual=shown.residual,
+        solver_error=shown.solver_error,
         uncertainty=state.uncertainty,
         converged=converged,
         scene=scene,
@@ -397,13 +399,13 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: AnyTrajectory) -> A
     shape = scene.operator.shape
     memory = scene.memory.enlarged(state.memory, shape, offset, scene.operator.displacement)
 
-    def moved(instant: Instant) -> Instant:
+    def on_larger_grid(instant: Instant) -> Instant:
         if not instant.contact.size:  # of a companion
             return instant
         contact = Sparse.of(padded(instant.pressure, shape, offset))
         return replace(instant, contact=contact, unit_displacement=None)
 
-    now, before = moved(state.now), None if state.before is None else moved(state.before)
+    now, before = on_larger_grid(state.now), None if state.before is None else on_larger_grid(state.before)
     _, glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
     unit_displacement = scene.operator.displacement(now.pressure)
     now = replace(now, unit_displacement=unit_displacement)

@@ -11,7 +11,7 @@ from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import certificate as full_contact
 from roughvisc.mechanics.contact import problem
-from roughvisc.mechanics.contact.certificate import Asked, Certificate, certify, estimated_error
+from roughvisc.mechanics.contact.certificate import Certificate, RequestedChange, certify, estimated_error
 from roughvisc.mechanics.contact.problem import ContactProblem
 
 SHAPE, SPACING = (7, 6), (0.5, 0.8)
@@ -30,7 +30,7 @@ class Case:
             self.operator, self.gap.copy(), **wanted, tolerance=tolerance, present=present
         )
         cells = np.eye(self.gap.size).reshape(-1, *SHAPE)
-        ratio = self.problem.unit / self.problem.length
+        ratio = self.problem.pressure_scale / self.problem.length_scale
         self.matrix = np.array([self.operator.displacement(cell).ravel() for cell in cells]) * ratio
         rng = np.random.default_rng(1)
         self.pressure = rng.random(SHAPE) * (rng.random(SHAPE) < touching)
@@ -53,14 +53,16 @@ def test_scaled_problem__is_the_same_in_other_units():
         case = Case(present=there, **known)
         problem, lowest = case.problem, case.gap[there].min()
         assert problem.lowest == lowest > case.gap.min()
-        assert problem.gap * problem.length + lowest == pytest.approx(case.gap)
+        assert problem.gap * problem.length_scale + lowest == pytest.approx(case.gap)
         pressure = np.arange(case.gap.size, dtype=float).reshape(SHAPE)
         displaced = problem.influence.displacement(pressure)
-        assert displaced * problem.length == pytest.approx(case.operator.displacement(pressure * problem.unit))
+        assert displaced * problem.length_scale == pytest.approx(
+            case.operator.displacement(pressure * problem.pressure_scale)
+        )
         if "load" in known:
-            assert problem.load * problem.unit == pytest.approx(3.0)
+            assert problem.load * problem.pressure_scale == pytest.approx(3.0)
         else:
-            assert problem.target * problem.length + lowest == pytest.approx(2.0)
+            assert problem.target * problem.length_scale + lowest == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("known", [{"load": 3.0}, {"approach": 2.0}], ids=["load", "approach"])
@@ -74,7 +76,7 @@ def test_first_guess__is_made_admissible(known, told):
     pressure, displaced = case.problem.initial_iterate(guess.copy(), displacement)
     expected = np.maximum(guess, 0) * CORNER
     expected *= 3.0 / expected.sum() if "load" in known else 1.0
-    assert pressure * case.problem.unit == pytest.approx(expected)
+    assert pressure * case.problem.pressure_scale == pytest.approx(expected)
     if told:
         assert displaced == pytest.approx((case.matrix @ pressure.ravel()).reshape(SHAPE))
     else:
@@ -86,7 +88,7 @@ def test_first_guess__without_one_presses_what_lies_below_the_approach():
     for nothing in (None, np.zeros(SHAPE)):
         pressure, displaced = under.problem.initial_iterate(nothing, None)
         assert displaced is None
-        assert pressure * under.problem.length == pytest.approx(np.maximum(2.0 - under.gap, 0))
+        assert pressure * under.problem.length_scale == pytest.approx(np.maximum(2.0 - under.gap, 0))
         loaded = Case(load=3.0, present=CORNER).problem.initial_iterate(nothing, None)[0]
         assert loaded == pytest.approx(CORNER / CORNER.sum())
 
@@ -162,7 +164,7 @@ def stiffness_by_fourier(case, separation, contact):
     qx = 2 * np.pi * np.fft.fftfreq(SHAPE[0], SPACING[0])[:, None]
     qy = 2 * np.pi * np.fft.fftfreq(SHAPE[1], SPACING[1])
     over = np.fft.ifft2(np.fft.fft2(w) * np.hypot(qx, qy) / 2).real
-    return float((w * over).sum()) / w.mean() ** 2 * case.problem.length / case.problem.unit
+    return float((w * over).sum()) / w.mean() ** 2 * case.problem.length_scale / case.problem.pressure_scale
 
 
 def test_stiffness__is_that_of_the_open_gap():
@@ -235,9 +237,9 @@ def test_estimated_error__of_a_pressure_that_the_solver_improved():
     arguments = (case.problem, case.pressure, case.contact, case.displacement)
     # the change asked for, over the pressure, less as the square root of the duality gap fell
     asked = 0.05 * case.problem.influence.scale
-    assert estimated_error(*arguments, certificate, Asked(asked, 1e-2)) == pytest.approx(1.25 * 0.05 * 0.2)
+    assert estimated_error(*arguments, certificate, RequestedChange(asked, 1e-2)) == pytest.approx(1.25 * 0.05 * 0.2)
     assert estimated_error(*arguments, Certificate(4e-4, 0.0, 1.0, True, False), None) == 0
-    assert estimated_error(*arguments, Certificate(-1e-20, 2.0, 1.0, True, False), Asked(asked, 1e-2)) == 0
+    assert estimated_error(*arguments, Certificate(-1e-20, 2.0, 1.0, True, False), RequestedChange(asked, 1e-2)) == 0
     assert estimated_error(*arguments, Certificate(4e-4, 2.0, 1.0, False, True), None) == math.inf
 
 
@@ -252,7 +254,7 @@ def test_estimated_error__where_the_energy_does_not_see_the_load():
         [case.problem.influence.operator.approximate_inverse(c.astype(np.float32)).ravel()
          for c in np.eye(case.gap.size).reshape(-1, *SHAPE)]
     ).T  # fmt: skip
-    change = (inverse @ residual.ravel())[free.ravel()] * case.problem.length / case.problem.unit
+    change = (inverse @ residual.ravel())[free.ravel()] * case.problem.length_scale / case.problem.pressure_scale
     uniform = stiffness_by_fourier(case, case.separation, case.contact) * abs(residual.sum()) / case.gap.size
     assert found == pytest.approx((np.abs(change).sum() + uniform) / case.pressure.sum(), rel=1e-4)
 

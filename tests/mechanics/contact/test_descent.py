@@ -29,7 +29,11 @@ def scaled(known, boundary="free", present=None):
     wanted = {"load": None, "approach": None} | known
     problem = ContactProblem.scaled(operator, rough_gap(SHAPE), **wanted, tolerance=1e-6, present=present)
     cells = np.eye(problem.gap.size).reshape(-1, *SHAPE)
-    matrix = np.array([operator.displacement(cell).ravel() for cell in cells]) * problem.unit / problem.length
+    matrix = (
+        np.array([operator.displacement(cell).ravel() for cell in cells])
+        * problem.pressure_scale
+        / problem.length_scale
+    )
     return problem, matrix
 
 
@@ -78,9 +82,9 @@ def test_preconditioned_step__descends_as_it_says(known):
         assert after.sum() == pytest.approx(problem.load)
     # without the cut, the change is the one asked for times the step's length
     short = trial_of(problem, pressure, separation, level, step_length=1e-3, previous=None, measured=True)
-    assert np.abs(short.change).sum() == pytest.approx(1e-3 * short.asked, rel=1e-6)
+    assert np.abs(short.change).sum() == pytest.approx(1e-3 * short.requested, rel=1e-6)
     silent = trial_of(problem, pressure, separation, level, step_length=1e-3, previous=None, measured=False)
-    assert math.isnan(silent.asked)
+    assert math.isnan(silent.requested)
 
 
 @CONTROLS
@@ -249,7 +253,7 @@ def test_step_that_does_not_descend__forgets_rounding_then_history_then_the_prec
     assert exact.displacement == pytest.approx(displacement, rel=1e-12)
     assert not exact.approximate
     assert search == Search(0.7, False, False, 5.0, 3)
-    first = problem.length / problem.unit  # the preconditioner is the inverse at this length
+    first = problem.length_scale / problem.pressure_scale  # the preconditioner is the inverse at this length
     same, search = solver.forget(problem, exact, Search(0.7, False, False, 5.0, 3), previous)
     assert same is exact
     assert search == Search(pytest.approx(first), False, False, 5.0, 3)

@@ -69,10 +69,10 @@ def test_rows_of_a_step__are_those_of_its_fields(monkeypatch):
     monkeypatch.setattr(sparse, "_ABOVE", 10)
     kinds = set()
     for step in march(scene(MATERIALS["zener"], TRIANGLE, tolerance=1e-2)):
-        kinds.add((step.shown.contact.cells is not None, step.moved.is_whole))
+        kinds.add((step.shown.contact.cells is not None, step.displaced.is_whole))
         for rows in (slice(0, 3), slice(4, 9), slice(0, step.scene.gap.shape[0])):
             np.testing.assert_array_equal(step.on_rows(step.shown.contact, rows), step.shown.pressure[rows])
-            np.testing.assert_array_equal(step.on_rows(step.moved, rows), step.displacement[rows])
+            np.testing.assert_array_equal(step.on_rows(step.displaced, rows), step.displacement[rows])
     assert (True, False) in kinds
 
 
